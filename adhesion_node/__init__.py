@@ -1,0 +1,1 @@
+"""Onboard identification of the wheel-rail adhesion coefficient for ROS 2."""

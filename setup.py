@@ -1,0 +1,67 @@
+"""Packaging of adhesion_node for pip and for colcon (ament_python)."""
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from setuptools import find_packages, setup
+
+NAME = "adhesion_node"
+HERE = Path(__file__).parent
+MANIFEST = ElementTree.parse(HERE / "package.xml")
+
+NODES = ("estimator", "atp_monitor", "recorder", "replay")
+PROGRAMS = {
+    "simulator": "sim_node.node",
+    **{node: f"adhesion_node.nodes.{node}" for node in NODES},
+    "import_csv": "adhesion_node.import_csv",
+    "recover": "adhesion_node.recover",
+    "demo": "adhesion_node.demo",
+    "study": "adhesion_node.study.__main__",
+}
+
+
+def shared_files() -> list[tuple[str, list[str]]]:
+    """List what goes under share/: marker, manifest, default parameters and reference recordings."""
+    share = Path("share", NAME)
+    files = [
+        (Path("share/ament_index/resource_index/packages"), f"resource/{NAME}"),
+        (share, "package.xml"),
+        (share / "config", "adhesion_node/nodes/defaults.yaml"),
+    ]
+    recordings = [path.relative_to(HERE) for path in sorted(HERE.glob("bags/**/*")) if path.is_file()]
+    files += [(share / path.parent, str(path)) for path in recordings]
+    return [(str(folder), [file]) for folder, file in files if (HERE / file).exists()]
+
+
+setup(
+    name=NAME,
+    version=MANIFEST.findtext("version"),
+    description=MANIFEST.findtext("description"),
+    maintainer=MANIFEST.findtext("maintainer"),
+    maintainer_email=MANIFEST.find("maintainer").get("email"),
+    license=MANIFEST.findtext("license"),
+    packages=find_packages(include=["adhesion_node*", "sim_node*"]),
+    package_data={"adhesion_node": ["py.typed", "nodes/*.yaml"], "sim_node": ["py.typed"]},
+    data_files=shared_files(),
+    zip_safe=False,
+    python_requires=">=3.11",
+    install_requires=[
+        "numpy>=1.26,<3",
+        "scipy>=1.11,<2",
+        "matplotlib>=3.8,<4",
+        "mcap>=1.5,<2",
+        "lz4>=4.3,<5",
+        "zstandard>=0.22,<1",
+        "rosbags>=0.11.6,<0.12",
+        "ruamel.yaml>=0.18,<0.20",
+    ],
+    extras_require={
+        # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
+        "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],
+        "test": ["pytest>=8,<10", "mcap-ros2-support>=0.5.5,<1"],
+        "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
+        # colcon drives `setup.py develop`, which setuptools 80 removed.
+        "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
+    },
+    entry_points={"console_scripts": [f"{name} = {module}:main" for name, module in PROGRAMS.items()]},
+)

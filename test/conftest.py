@@ -1,0 +1,100 @@
+"""What every test shares: a private ROS graph, a fresh context and executor, and bounded waiting.
+
+The tests run on the tree's copy of the packages (`pythonpath` in pyproject.toml), and so do the programs that they
+start, whichever copy is installed beside them.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Protocol
+
+import pytest
+import rclpy
+from rclpy.context import Context
+from rclpy.executors import Executor, SingleThreadedExecutor
+
+DOMAINS = range(1, 101)
+ROOT = Path(__file__).resolve().parent.parent
+
+_domain_lock = socket.socket(socket.AF_UNIX)
+_ros_home = pytest.StashKey[str]()
+
+
+class SpinUntil(Protocol):
+    """Type of the `spin_until` fixture."""
+
+    def __call__(self, executor: Executor, predicate: Callable[[], object], timeout_s: float = 10.0) -> None: ...
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Set the environment of this process and of those it starts, before the first context is made."""
+    home = config.stash[_ros_home] = tempfile.mkdtemp(prefix="adhesion_node_test_")
+    for name in ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"):
+        os.environ.pop(name, None)
+    os.environ["ROS_DOMAIN_ID"] = str(_claim_domain())
+    os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ["ROS_HOME"] = home
+    os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")
+    os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+
+
+def pytest_unconfigure(config: pytest.Config) -> None:
+    """Remove the logs and give the domain back."""
+    shutil.rmtree(config.stash[_ros_home], ignore_errors=True)
+    _domain_lock.close()
+
+
+def _claim_domain() -> int:
+    """Return a domain that no other test process of this machine holds: an abstract socket is freed by any exit."""
+    for domain in DOMAINS:
+        try:
+            _domain_lock.bind(f"\0adhesion_node_test_domain_{domain}")
+        except OSError:
+            continue
+        return domain
+    raise pytest.UsageError(f"all {len(DOMAINS)} ROS domains are held by other test runs: wait for one to end")
+
+
+@pytest.fixture
+def context() -> Iterator[Context]:
+    """Return an initialised context of this test alone; it is shut down after the test."""
+    fresh = Context()
+    rclpy.init(context=fresh)
+    yield fresh
+    fresh.try_shutdown()
+
+
+@pytest.fixture
+def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
+    """Return an executor on `context`; nodes that are still in it after the test are destroyed."""
+    single = SingleThreadedExecutor(context=context)
+    yield single
+    nodes = list(single.get_nodes())
+    single.shutdown()
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.fixture
+def spin_until() -> SpinUntil:
+    """Return the function `spin_until(executor, predicate, timeout_s=10.0)`.
+
+    It spins until `predicate()` is true and fails the test when that takes longer than `timeout_s` seconds.
+    """
+    return _spin_until
+
+
+def _spin_until(executor: Executor, predicate: Callable[[], object], timeout_s: float = 10.0) -> None:
+    deadline = time.monotonic() + timeout_s
+    while not predicate():
+        remaining = deadline - time.monotonic()
+        if remaining <= 0.0:
+            raise AssertionError(f"still waiting after {timeout_s:g} s for {predicate}")
+        executor.spin_once(timeout_sec=min(remaining, 0.05))

@@ -1,0 +1,135 @@
+"""The package's papers agree with each other and with the tree: manifest, setup, changelog, README, scripts."""
+
+from __future__ import annotations
+
+import ast
+import importlib
+import inspect
+import re
+import runpy
+import sys
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+from xml.etree import ElementTree
+
+import pytest
+from conftest import ROOT
+
+OWN = ("adhesion_node", "sim_node")
+ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|interfaces)")
+FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
+    "numpy": ("numpy", "python3-numpy"),
+    "scipy": ("scipy", "python3-scipy"),
+    "matplotlib": ("matplotlib", "python3-matplotlib"),
+    "rosbags": ("rosbags", "python3-rosbags-pip"),
+    "ruamel": ("ruamel.yaml", "python3-rosbags-pip"),
+    "mcap": ("mcap", "mcap-ros2-support"),
+    "lz4": ("lz4", "mcap-ros2-support"),
+    "zstandard": ("zstandard", "mcap-ros2-support"),
+}
+
+
+@cache
+def setup_arguments() -> dict[str, Any]:
+    """Return what setup.py hands to setuptools, which a virtual environment need not have."""
+    handed: dict[str, Any] = {}
+    setuptools = SimpleNamespace(setup=handed.update, find_packages=lambda include: include)
+    with mock.patch.dict(sys.modules, {"setuptools": setuptools}):
+        runpy.run_path(str(ROOT / "setup.py"))
+    return handed
+
+
+def console_scripts() -> dict[str, str]:
+    """Return the modules of the console scripts by name; each entry must read `name = module:main`."""
+    entries = [
+        re.fullmatch(r"(\w+) = ([\w.]+):main", entry) for entry in setup_arguments()["entry_points"]["console_scripts"]
+    ]
+    return {entry[1]: entry[2] for entry in entries if entry}
+
+
+@cache
+def manifest() -> ElementTree.Element:
+    return ElementTree.parse(ROOT / "package.xml").getroot()
+
+
+@cache
+def sources() -> list[Path]:
+    return [path for package in OWN for path in (ROOT / package).rglob("*.py")]
+
+
+@cache
+def imported() -> set[str]:
+    """Return the top-level packages that the sources import from elsewhere."""
+    names: set[str] = set()
+    for path in sources():
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                names.update(alias.name.partition(".")[0] for alias in node.names)
+            elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+                names.add(node.module.partition(".")[0])
+    return names - sys.stdlib_module_names - set(OWN)
+
+
+def test_versions_agree() -> None:
+    changelog = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
+    newest = re.search(r"^(\d+\.\d+\.\d+) \(.+\)\n-+$", changelog, re.MULTILINE)
+    assert newest is not None, "CHANGELOG.rst has no heading `x.y.z (date)`"
+    assert newest[1] == manifest().findtext("version") == setup_arguments()["version"]
+
+
+def test_the_ament_index_finds_the_package() -> None:
+    installed = {(folder, file) for folder, files in setup_arguments()["data_files"] for file in files}
+    name = manifest().findtext("name")
+    assert ("share/ament_index/resource_index/packages", f"resource/{name}") in installed
+    assert (f"share/{name}", "package.xml") in installed
+    assert (f"share/{name}/config", "adhesion_node/nodes/defaults.yaml") in installed
+    assert manifest().findtext("export/build_type") == "ament_python"
+
+
+def test_every_file_of_bags_is_installed_in_its_folder() -> None:
+    installed = {(Path(folder), Path(file)) for folder, files in setup_arguments()["data_files"] for file in files}
+    recordings = [path.relative_to(ROOT) for path in (ROOT / "bags").rglob("*") if path.is_file()]
+    assert recordings
+    assert {(Path("share/adhesion_node") / path.parent, path) for path in recordings} <= installed
+
+
+def test_every_source_folder_is_a_package() -> None:
+    bare = {path.parent for path in sources() if not (path.parent / "__init__.py").is_file()}
+    assert not bare, "setuptools leaves these folders out"
+
+
+@pytest.mark.parametrize("name", sorted(console_scripts()))
+def test_a_console_script_has_its_main(name: str) -> None:
+    main = importlib.import_module(console_scripts()[name]).main
+    assert inspect.signature(main).parameters["args"].default is None
+
+
+def test_the_executables_of_the_design_are_there() -> None:
+    assert set(console_scripts()) == set(
+        ["simulator", "estimator", "atp_monitor", "recorder", "replay", "recover", "import_csv", "demo", "study"]
+    )
+
+
+def test_what_is_imported_is_declared() -> None:
+    depends = {depend.text for depend in manifest().findall("exec_depend")}
+    ros_packages = {name for name in imported() if ROS.fullmatch(name)}
+    assert ros_packages <= depends
+    required = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in setup_arguments()["install_requires"]}
+    for name in imported() - ros_packages:
+        distribution, rosdep_key = FROM_PYPI[name]
+        assert distribution in required
+        assert rosdep_key in depends
+    assert not any(ROS.fullmatch(name) for name in required), "ROS is no PyPI requirement; it stands in the extra `ros`"
+
+
+def test_the_quick_start_is_two_commands() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    sections = re.findall(r"^## Quick start\n(.*?)(?=^## |\Z)", readme, re.MULTILINE | re.DOTALL)
+    assert len(sections) == 1
+    blocks = re.findall(r"^```sh\n(.*?)^```$", sections[0], re.MULTILINE | re.DOTALL)
+    assert len(blocks) == 2
+    for block, last in zip(blocks, ("demo", "python -m pytest"), strict=True):
+        assert re.fullmatch(rf"python3 -m venv \.venv && .* && \.venv/bin/{last}\n", block), "not one command line"
