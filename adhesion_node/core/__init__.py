@@ -1,0 +1,9 @@
+"""The estimator as pure functions of arrays: no ROS, no files, no clock, no logging."""
+
+from .config import Config
+from .estimate import Estimate
+from .estimator import State, finish, init, step
+from .measurement import Measurement
+from .outcome import Outcome, Regime
+
+__all__ = ["Config", "Estimate", "Measurement", "Outcome", "Regime", "State", "finish", "init", "step"]

@@ -1,0 +1,53 @@
+"""Adhesion as a function of speed: the published laws for dry and wet rail, Xie et al. 2019, section 3.1."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from .train import KMH, Array
+
+
+class AdhesionLaw(Protocol):
+    """Adhesion coefficient as a function of speed in m/s, element by element."""
+
+    def __call__(self, speed_mps: Array) -> Array: ...
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedLaw:
+    """mu(v) = scale (floor + gain/(offset + v)) with v, gain and offset in km/h.
+
+    Raises ValueError naming the coefficient when the law is not finite and positive at every speed.
+
+    >>> [round(float(DRY(np.array(v * KMH))), 4) for v in (300, 250)]
+    [0.1432, 0.1514]
+    >>> [round(float(WET(np.array(v * KMH))), 4) for v in (300, 250, 100, 50, 0)]
+    [0.0726, 0.077, 0.1023, 0.1206, 0.1542]
+    """
+
+    floor: float
+    gain_kmh: float = 0.0
+    offset_kmh: float = 1.0
+    scale: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, least in (("floor", 0.0), ("gain_kmh", 0.0), ("offset_kmh", 1e-9), ("scale", 1e-9)):
+            value = getattr(self, name)
+            if not math.isfinite(value) or value < least:
+                raise ValueError(f"adhesion law {name} = {value!r}: give a finite number of at least {least}")
+
+    def __call__(self, speed_mps: Array) -> Array:
+        speed_kmh = np.maximum(speed_mps, 0.0) / KMH
+        return self.scale * (self.floor + self.gain_kmh / (self.offset_kmh + speed_kmh))
+
+
+DRY = SpeedLaw(0.06, 46.6, 260.0)
+WET = SpeedLaw(0.04, 13.7, 120.0)
+SNOW = SpeedLaw(0.03, 8.0, 130.0)
+
+LAWS: dict[str, SpeedLaw] = {"dry": DRY, "wet": WET, "snow": SNOW}
+"""The laws by name, as parameters and command lines spell them."""

@@ -1,0 +1,58 @@
+"""The sliding window of one braking: grows to S measurements, then moves on by L (steps 1, 4 and 5 of the paper)."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .config import Config
+from .em import Identified, ParticleSmoother, Search, identify
+from .gaussian import Gaussian, filter_window
+from .rail import kept_of_start
+from .window import Sample, window_of
+
+
+class BrakingWindow(NamedTuple):
+    """Samples of the window and the law of (s, v) at the first one, which the first one's measurement shaped."""
+
+    prior: Gaussian
+    samples: tuple[Sample, ...]
+
+    def extended(self, sample: Sample) -> BrakingWindow:
+        """The window with one more sample."""
+        return self._replace(samples=(*self.samples, sample))
+
+
+class Evaluation(NamedTuple):
+    """What a window says."""
+
+    identified: Identified
+    std: float
+    """Standard deviation of mu from this window alone, from the observed information."""
+    kept: float
+    """Share of the EM's start that is left in mu."""
+    law: Gaussian
+    """Filtered law of (s, v) at the newest sample, the uncertainty of mu included."""
+    following: BrakingWindow
+    """The window to go on with."""
+
+
+def evaluate(config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:
+    """Identify mu in the window by EM and filter the state with the result.
+
+    A full window hands on the filtered law at its sample L, which holds nothing of the samples behind it, so the
+    overlap is not counted twice.
+    """
+    motion, arrays = config.motion, window_of(window.samples)
+    identified = identify(ParticleSmoother(config.particles), motion, window.prior, arrays, search, rng)
+    filtered = filter_window(motion, window.prior, arrays, identified.mu)
+    std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
+    kept = kept_of_start(filtered.information, identified.weight, identified.iterations)
+    spread = filtered.sensitivity * min(std, config.unknown_std)
+    law = filtered.laws[-1]
+    following = window
+    if len(window.samples) >= config.window:
+        following = BrakingWindow(filtered.laws[config.step - 1], window.samples[config.step :])
+    return Evaluation(identified, std, kept, Gaussian(law.mean, law.covariance + np.outer(spread, spread)), following)

@@ -1,0 +1,89 @@
+"""Configuration of the estimator: one frozen dataclass whose fields carry their own description, unit and range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .adhesion import LAWS, SpeedLaw
+from .motion import Motion
+from .setting import check_settings, setting
+from .track import LEVEL, Track
+from .train import CRH3, KMH, Train
+
+
+@dataclass(frozen=True, slots=True)
+class Config:
+    """Settings of the estimator; `Config()` is the paper's method at the nominal noise.
+
+    Raises ValueError naming the setting, its value and its range.
+    """
+
+    train: Train = CRH3
+    track: Track = LEVEL
+    window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
+    step: int = setting(10, "Measurements between two windows, L; at most the window", low=1, high=10_000)
+    particles: int = setting(20, "Particles, M", low=2, high=100_000)
+    iterations: int = setting(50, "EM iterations at most", low=1, high=10_000)
+    tolerance: float = setting(1e-7, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
+    start_mu: float = setting(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
+    confidence: float = setting(0.95, "One-sided confidence of the lower bound", low=0.5, high=0.9999)
+    position_noise_m: float = setting(
+        0.02, "Process noise of the position, standard deviation over 0.1 s", "m", 1e-6, 100.0
+    )
+    speed_noise_mps: float = setting(
+        0.02 * KMH, "Process noise of the speed under the brake, standard deviation over 0.1 s", "m/s", 1e-7, 10.0
+    )
+    coasting_noise_mps: float = setting(
+        0.03, "Random walk of the speed while no brake is applied, standard deviation over 0.1 s", "m/s", 1e-6, 10.0
+    )
+    speed_std_mps: float = setting(0.3, "Standard deviation of a measured speed", "m/s", 1e-4, 100.0)
+    speed_while_braking: bool = setting(
+        False, "Use a measured speed under the brake too (a radar; an axle slides and would mislead)"
+    )
+    brake_threshold_pa: float = setting(
+        10e3, "Brake-cylinder pressure (gauge) from which the brake counts as applied", "Pa", 0.0, 1e6
+    )
+    assumed_pressure_pa: float = setting(
+        410e3, "Brake-cylinder pressure (gauge) taken where none is measured", "Pa", 0.0, 2e6
+    )
+    pressure_wait_s: float = setting(
+        0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
+    )
+    pressure_age_s: float = setting(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
+    low_adhesion: str = setting(
+        "snow", "Adhesion law to fall back to where nothing is known", choices=tuple(sorted(LAWS))
+    )
+    unknown_std: float = setting(0.04, "Standard deviation of mu where nothing is known", low=1e-3, high=1.0)
+    memory_s: float = setting(60.0, "Time in which knowledge that is not renewed fades to 1/e", "s", 1e-3, 1e6)
+    memory_m: float = setting(3000.0, "Distance over which it fades to 1/e", "m", 1e-3, 1e7)
+    max_lag_s: float = setting(
+        0.0, "How late a measurement may come and still be sorted in; results wait as long", "s", 0.0, 60.0
+    )
+    max_gap_s: float = setting(2.0, "Longest gap between measurements that a window may bridge", "s", 1e-3, 60.0)
+    reset_s: float = setting(60.0, "Jump of the stamps, either way, that starts the estimation anew", "s", 1.0, 1e6)
+    gate_sigma: float = setting(
+        6.0, "Innovation in standard deviations from which a position is an outlier", low=3.0, high=1e6
+    )
+    max_outliers: int = setting(
+        10, "Outliers in a row after which the train is taken to be elsewhere", low=1, high=10_000
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self, "")
+        if self.step > self.window:
+            raise ValueError(f"step = {self.step}: choose at most the window, {self.window}")
+
+    @property
+    def low_law(self) -> SpeedLaw:
+        """The low-adhesion law."""
+        return LAWS[self.low_adhesion]
+
+    @property
+    def motion(self) -> Motion:
+        """The train's state-space model with the configured noise."""
+        return Motion(self.train, self.track, self.position_noise_m**2 / 0.1, self.speed_noise_mps**2 / 0.1)
+
+    def brake(self, pressure_pa: float | None) -> float:
+        """Brake B/(M g) of a measured gauge pressure; 0 below the threshold, the assumed one without a measurement."""
+        pressure = self.assumed_pressure_pa if pressure_pa is None else pressure_pa
+        return self.train.specific_brake(pressure) if pressure >= max(self.brake_threshold_pa, 1.0) else 0.0

@@ -1,0 +1,143 @@
+"""From the present window to an `Estimate`: regime, adhesion with its bound, position and speed."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import ndtri
+
+from .braking_window import BrakingWindow, Evaluation, evaluate
+from .config import Config
+from .em import Search
+from .gaussian import Gaussian
+from .measurement import Measurement
+from .outcome import Regime
+from .rail import Rail, age, ignorance, learn, learn_bound
+
+LOWEST_NET_ADHESION = -0.05
+"""Where the brake pressure is not measured, traction may be at work: the net force may point forward."""
+
+
+class Estimate(NamedTuple):
+    """What is known at `t_ns`, the time of the newest measurement."""
+
+    t_ns: int
+    mu: float
+    mu_std: float
+    mu_lower: float
+    """One-sided lower bound of mu at the configured confidence."""
+    regime: Regime
+    position_m: float
+    speed_mps: float
+    position_std_m: float
+    speed_std_mps: float
+    window: int = 0
+    """Measurements in the window; 0 where none was evaluated."""
+    iterations: int = 0
+    converged: bool = True
+    log_likelihood: float = 0.0
+    ess: float = 0.0
+    """Smallest effective sample size in the window."""
+
+
+class Knowledge(NamedTuple):
+    """What the windows so far have taught."""
+
+    windows: int = 0
+    """Windows evaluated; numbers their random streams."""
+    mu: float | None = None
+    """Adhesion that the last window gave, the next one's start (12)."""
+    rail: Rail | None = None
+    t_ns: int = 0
+    position_m: float = 0.0
+    """When and where the rail was known so."""
+
+
+class Result(NamedTuple):
+    """An estimate and what it leaves behind."""
+
+    estimate: Estimate
+    knowledge: Knowledge
+    law: Gaussian
+    window: BrakingWindow | None
+
+
+def estimate(
+    config: Config,
+    seed: int,
+    newest: Measurement,
+    law: Gaussian,
+    window: BrakingWindow | None,
+    knowledge: Knowledge,
+) -> Result:
+    """Evaluate the window, if there is one, on top of what was known; `law` is the tracker's at `newest`."""
+    rail = _aged(config, newest, law, knowledge)
+    if window is None or len(window.samples) < 2:
+        return _result(newest, law, window, knowledge, rail, Regime.COASTING)
+    unmeasured = newest.brake_pressure_pa is None
+    search = Search(
+        start=config.start_mu if knowledge.mu is None else knowledge.mu,
+        iterations=config.iterations,
+        tolerance=config.tolerance,
+        lowest=LOWEST_NET_ADHESION if unmeasured else 0.0,
+    )
+    evaluation = evaluate(config, window, search, np.random.default_rng([seed, knowledge.windows]))
+    regime, rail = _judge(config, evaluation, rail, unmeasured)
+    knowledge = knowledge._replace(windows=knowledge.windows + 1, mu=evaluation.identified.mu)
+    result = _result(newest, evaluation.law, evaluation.following, knowledge, rail, regime)
+    identified = evaluation.identified
+    return result._replace(
+        estimate=result.estimate._replace(
+            window=len(window.samples),
+            iterations=identified.iterations,
+            converged=identified.converged,
+            log_likelihood=identified.log_likelihood,
+            ess=identified.ess,
+        )
+    )
+
+
+def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowledge) -> Rail:
+    """The rail as it was known, aged to now; ignorance before the first window."""
+    nothing = ignorance(float(config.low_law(law.mean[1])), config.unknown_std)
+    if knowledge.rail is None:
+        return nothing
+    elapsed = (newest.t_ns - knowledge.t_ns) * 1e-9 / config.memory_s
+    travelled = abs(float(law.mean[0]) - knowledge.position_m) / config.memory_m
+    return age(knowledge.rail, nothing, elapsed + travelled)
+
+
+def _judge(config: Config, evaluation: Evaluation, before: Rail, unmeasured: bool) -> tuple[Regime, Rail]:
+    """What the window shows: no brake, the brake's limit, or the adhesion."""
+    mu, std = evaluation.identified.mu, evaluation.std
+    if unmeasured and mu <= 2.0 * std:
+        return Regime.COASTING, before
+    learnt = learn(before, mu, std, evaluation.kept, float(ndtri(config.confidence)))
+    if mu + std < evaluation.identified.limit:
+        return Regime.ADHESION_LIMITED, learnt
+    return Regime.BRAKE_LIMITED, learn_bound(before, learnt)
+
+
+def _result(
+    newest: Measurement,
+    law: Gaussian,
+    window: BrakingWindow | None,
+    knowledge: Knowledge,
+    rail: Rail,
+    regime: Regime,
+) -> Result:
+    position, speed = (float(value) for value in law.mean)
+    known = knowledge._replace(rail=rail, t_ns=newest.t_ns, position_m=position)
+    estimate = Estimate(
+        t_ns=newest.t_ns,
+        mu=rail.mu,
+        mu_std=rail.std,
+        mu_lower=rail.lower,
+        regime=regime,
+        position_m=position,
+        speed_mps=max(speed, 0.0),
+        position_std_m=law.position_std,
+        speed_std_mps=law.speed_std,
+    )
+    return Result(estimate, known, law, window)

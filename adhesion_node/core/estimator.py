@@ -1,0 +1,176 @@
+"""The one way in, live and offline: `init`, `step` for every measurement, `finish` at the end of the data.
+
+A measurement is put in order, gated, and joins the window of the present braking; every L accepted measurements
+give an `Estimate`. Randomness comes from the seed and the window's number alone, so the same measurements give the
+same bits whoever feeds them.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import insort
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+
+from . import tracker
+from .braking_window import BrakingWindow
+from .config import Config
+from .estimate import Estimate, Knowledge, estimate
+from .gaussian import Gaussian
+from .measurement import Measurement
+from .outcome import Outcome
+from .window import Sample
+
+SLOWEST_MPS = 3.0
+"""Speed below which the windows stop: a train about to stand still says nothing of the adhesion."""
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """Everything the estimator remembers. Immutable: `step` returns a new one."""
+
+    seed: int
+    counts: Mapping[Outcome, int] = field(default_factory=lambda: MappingProxyType(dict.fromkeys(Outcome, 0)))
+    outcome: Outcome = Outcome.ACCEPTED
+    """What became of the measurement that came last."""
+    pending: tuple[Measurement, ...] = ()
+    """Measurements that wait, sorted, for late ones."""
+    newest: Measurement | None = None
+    """The newest measurement that was accepted."""
+    law: Gaussian | None = None
+    """Law of (s, v) at the newest accepted measurement, from the tracker."""
+    window: BrakingWindow | None = None
+    """The present braking; None while coasting or while the speed is not known."""
+    knowledge: Knowledge = field(default_factory=Knowledge)
+    outliers: int = 0
+    """Outliers in a row."""
+    since_estimate: int = 0
+    """Measurements accepted since the last estimate."""
+
+
+def init(config: Config, seed: int) -> State:
+    """State before the first measurement. Raises ValueError for a negative seed."""
+    del config  # part of every estimator's signature; this one's first state needs nothing of it
+    if seed < 0:
+        raise ValueError(f"seed = {seed}: give an integer of at least 0")
+    return State(seed)
+
+
+def step(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
+    """Take one measurement; every `config.step` accepted ones return an estimate.
+
+    What became of the measurement stands in `State.outcome` and is counted in `State.counts`. With `max_lag_s`
+    above 0 a measurement waits for late ones to be sorted in, and is judged when its turn comes.
+    """
+    newest = _newest(state)
+    if not measurement.is_valid():
+        return _counted(state, Outcome.INVALID), None
+    if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
+        state = _reset(state)
+    pending = list(state.pending)
+    insort(pending, measurement)
+    if pending[-1].t_ns - pending[0].t_ns < config.max_lag_s * 1e9:
+        return replace(state, pending=tuple(pending), outcome=Outcome.ACCEPTED), None
+    return _take(config, replace(state, pending=tuple(pending[1:])), pending[0])
+
+
+def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
+    """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
+    estimates: list[Estimate] = []
+    pending, state = state.pending, replace(state, pending=())
+    for measurement in pending:
+        state, result = _take(config, state, measurement)
+        estimates += [] if result is None else [result]
+    if state.newest is not None and state.since_estimate:
+        state, result = _estimate(config, state)
+        estimates.append(result)
+    return state, tuple(estimates)
+
+
+def _newest(state: State) -> Measurement | None:
+    return state.pending[-1] if state.pending else state.newest
+
+
+def _counted(state: State, outcome: Outcome) -> State:
+    counts = MappingProxyType({**state.counts, outcome: state.counts[outcome] + 1})
+    return replace(state, counts=counts, outcome=outcome)
+
+
+def _reset(state: State) -> State:
+    """Forget everything but the counts and the number of windows, which keeps the random streams apart."""
+    for _ in state.pending:  # they belong to the time before the jump
+        state = _counted(state, Outcome.LATE)
+    fresh = State(state.seed, counts=state.counts, knowledge=Knowledge(windows=state.knowledge.windows))
+    return _counted(fresh, Outcome.RESET)
+
+
+def _take(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
+    """Judge the next measurement in time; follow the train with it where it is good."""
+    if state.newest is None or state.law is None:
+        return _accept(config, state, measurement, tracker.meet(measurement), 0.0)
+    if measurement.t_ns <= state.newest.t_ns:
+        same = measurement.t_ns == state.newest.t_ns
+        return _counted(state, Outcome.DUPLICATE if same else Outcome.LATE), None
+    dt_s = (measurement.t_ns - state.newest.t_ns) * 1e-9
+    braked = config.brake(state.newest.brake_pressure_pa) > 0.0
+    law = tracker.predict(state.law, dt_s, braked, config.coasting_noise_mps**2 / 0.1)
+    if tracker.innovation(law, measurement) > config.gate_sigma:
+        if state.outliers + 1 < config.max_outliers:
+            return _counted(replace(state, outliers=state.outliers + 1), Outcome.OUTLIER), None
+        return _accept(config, _reset(state), measurement, tracker.meet(measurement), 0.0)
+    law = tracker.correct(law, measurement, _speed_variance(config, measurement))
+    return _accept(config, state, measurement, law, dt_s)
+
+
+def _accept(
+    config: Config, state: State, measurement: Measurement, law: Gaussian, dt_s: float
+) -> tuple[State, Estimate | None]:
+    """Let an accepted measurement join or open the window; give an estimate when one is due."""
+    brake = config.brake(measurement.brake_pressure_pa)
+    sample = Sample(
+        measurement.t_ns,
+        brake,
+        measurement.position_m,
+        measurement.variance_m2,
+        measurement.speed_mps or 0.0,
+        _speed_variance(config, measurement),
+    )
+    window = state.window if dt_s <= config.max_gap_s else None
+    if window is not None:
+        window = window.extended(sample)
+    state = replace(
+        _counted(state, Outcome.ACCEPTED),
+        newest=measurement,
+        law=law,
+        window=window,
+        outliers=0,
+        since_estimate=state.since_estimate + 1,
+    )
+    if brake == 0.0 or law.mean[1] < SLOWEST_MPS:
+        return _release(config, state)
+    if window is None and tracker.is_settled(law):
+        state = replace(state, window=BrakingWindow(law, (sample,)))
+    return _estimate(config, state) if state.since_estimate >= config.step else (state, None)
+
+
+def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
+    """Coast, or end a braking with its last, short window."""
+    if state.window is None and state.since_estimate < config.step:
+        return state, None
+    state, result = _estimate(config, state)
+    return replace(state, window=None), result
+
+
+def _estimate(config: Config, state: State) -> tuple[State, Estimate]:
+    assert state.newest is not None  # an estimate follows an accepted measurement
+    assert state.law is not None
+    result = estimate(config, state.seed, state.newest, state.law, state.window, state.knowledge)
+    state = replace(state, window=result.window, knowledge=result.knowledge, since_estimate=0)
+    return state, result.estimate
+
+
+def _speed_variance(config: Config, measurement: Measurement) -> float:
+    """Variance of the measured speed; infinite where there is none or a braked axle may slide."""
+    rolling = config.speed_while_braking or config.brake(measurement.brake_pressure_pa) == 0.0
+    return config.speed_std_mps**2 if measurement.speed_mps is not None and rolling else math.inf

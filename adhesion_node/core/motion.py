@@ -1,0 +1,73 @@
+"""The state-space model x = (s, v): step (2)(3), Jacobian, noise and log densities, Xie et al. 2019.
+
+    s' = s + T (v + v')/2 + w_s          w_s ~ N(0, q_s T)
+    v' = v - T (min(F, B) + R)/M + w_v   w_v ~ N(0, q_v T)
+    y  = s + e                           e   ~ N(0, r)
+
+with v' in the first line before its noise. Positions and speeds are arrays of any one shape; the step's length T
+and brake B/(M g) broadcast against it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .track import Track
+from .train import GRAVITY, Array, Train
+
+LOG_2PI = math.log(2.0 * math.pi)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A train on a track with the variances per second of its process noise."""
+
+    train: Train
+    track: Track
+    position_noise_rate: float
+    """q_s, m^2/s."""
+    speed_noise_rate: float
+    """q_v, (m/s)^2/s."""
+
+    def resistance(self, position_m: Array, speed_mps: Array) -> Array:
+        """Running resistance per weight R/(M g), N/N: basic (6) plus grade, curve and tunnel (7), as in (5)."""
+        basic = self.train.specific_resistance(speed_mps)
+        return basic + self.track.specific_resistance(position_m) if self.track.sections else basic
+
+    def advance(
+        self, position_m: Array, speed_mps: Array, dt_s: float | Array, brake: float | Array, mu: float
+    ) -> tuple[Array, Array]:
+        """Noise-free step (2)(3): position and speed after `dt_s` under brake B/(M g) and adhesion `mu`."""
+        resistance = self.resistance(position_m, speed_mps)
+        speed = speed_mps - dt_s * self.train.deceleration(mu, brake, resistance)
+        return position_m + 0.5 * dt_s * (speed_mps + speed), speed
+
+    def brake_limit(self, position_m: float | Array, speed_mps: float | Array, brake: float | Array) -> Array:
+        """Largest adhesion that brake B/(M g) makes use of; the motion tells of mu only that it is not below."""
+        resistance = self.resistance(np.asarray(position_m), np.asarray(speed_mps))
+        return np.asarray(self.train.used_adhesion(np.inf, brake, resistance))
+
+    def jacobian(self, speed_mps: float, dt_s: float) -> Array:
+        """Derivative of the step with respect to (s, v), shape (2, 2), the track's profile held fixed."""
+        slope = 3.6e-3 * (self.train.resistance_c1 + 2.0 * self.train.resistance_c2 * 3.6 * speed_mps)
+        kept = 1.0 - dt_s * GRAVITY * slope
+        return np.array([[1.0, 0.5 * dt_s * (1.0 + kept)], [0.0, kept]])
+
+    def noise(self, dt_s: float | Array) -> tuple[float | Array, float | Array]:
+        """Variances of w_s, m^2, and w_v, (m/s)^2, over a step of `dt_s`."""
+        return self.position_noise_rate * dt_s, self.speed_noise_rate * dt_s
+
+    def transition_log_density(self, position_error: Array, speed_error: Array, dt_s: float | Array) -> Array:
+        """ln p(x'|x) of the deviations of x' from the noise-free step (11)."""
+        var_s, var_v = self.noise(dt_s)
+        return -0.5 * (
+            position_error**2 / var_s + speed_error**2 / var_v + np.log(var_s) + np.log(var_v) + 2.0 * LOG_2PI
+        )
+
+
+def measurement_log_density(position_m: Array, measured_m: float | Array, variance_m2: float | Array) -> Array:
+    """ln p(y|x) of a measured position (11)."""
+    return -0.5 * ((measured_m - position_m) ** 2 / variance_m2 + np.log(variance_m2) + LOG_2PI)

@@ -1,0 +1,68 @@
+"""What is known of the rail: an adhesion, its standard deviation and a lower bound, learnt and forgotten.
+
+While nothing can be seen, the knowledge ages exponentially with time and distance towards the configured
+low-adhesion law; its standard deviation grows towards that of ignorance.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+
+class Rail(NamedTuple):
+    """Adhesion coefficient, its standard deviation and its one-sided lower bound."""
+
+    mu: float
+    std: float
+    lower: float
+
+
+def ignorance(low: float, std: float) -> Rail:
+    """Nothing is known: the low-adhesion law's value `low` with standard deviation `std`."""
+    return Rail(low, std, low)
+
+
+def age(rail: Rail, nothing: Rail, elapsed: float) -> Rail:
+    """Let knowledge age towards `nothing`; `elapsed` counts in memories (time and distance over their scales).
+
+    >>> age(Rail(0.10, 0.0, 0.09), ignorance(0.05, 0.04), math.log(2.0))
+    Rail(mu=0.07500000000000001, std=0.034641016151377546, lower=0.07)
+    """
+    kept = math.exp(-elapsed)
+    return Rail(
+        mu=nothing.mu + kept * (rail.mu - nothing.mu),
+        std=math.sqrt(kept**2 * rail.std**2 + (1.0 - kept**2) * nothing.std**2),
+        lower=nothing.lower + kept * (rail.lower - nothing.lower),
+    )
+
+
+def kept_of_start(observed: float, complete: float, iterations: int) -> float:
+    """Share of its start that EM still holds after `iterations`.
+
+    EM converges linearly at the rate of missing information, 1 - observed/complete (Dempster, Laird and Rubin
+    1977), so a short window whose EM is stopped early mostly repeats what it was started with.
+
+    >>> round(kept_of_start(observed=0.1, complete=1.0, iterations=10), 4)
+    0.3487
+    """
+    if complete <= 0.0:
+        return 1.0
+    return min(max(1.0 - observed / complete, 0.0), 1.0) ** iterations
+
+
+def learn(before: Rail, mu: float, std: float, kept: float, quantile: float) -> Rail:
+    """Knowledge after a window that gave `mu` with `std`, `kept` of it being the start's.
+
+    The errors of overlapping windows go together, so the standard deviations add up linearly.
+    """
+    return Rail(
+        mu=mu,
+        std=(1.0 - kept) * std + kept * before.std if kept < 1.0 else before.std,
+        lower=max(kept * before.lower + (1.0 - kept) * (mu - quantile * std), 0.0) if kept < 1.0 else before.lower,
+    )
+
+
+def learn_bound(before: Rail, bound: Rail) -> Rail:
+    """Knowledge after a window that only showed mu to be at least `bound`: the better of both."""
+    return Rail(max(before.mu, bound.mu), max(before.std, bound.std), max(before.lower, bound.lower))

@@ -1,0 +1,37 @@
+"""Settings: dataclass fields that carry their description, unit and range, for checks, parameters and tables."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import field, fields
+from typing import Any
+
+
+def setting(
+    default: Any,
+    description: str,
+    unit: str = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    choices: tuple[str, ...] = (),
+) -> Any:
+    """A dataclass field; `low` and `high` belong to the range of a number, `choices` are those of a text."""
+    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices}
+    return field(default=default, metadata=metadata)
+
+
+def check_settings(instance: Any, what: str) -> None:
+    """Check every setting of a dataclass instance; ValueError names `what`, the setting, its value and the remedy."""
+    for item in fields(instance):
+        if item.metadata:
+            _check(f"{what}{item.name}", getattr(instance, item.name), type(item.default), item.metadata)
+
+
+def _check(name: str, value: Any, kind: type, rule: Any) -> None:
+    accepted = (int, float) if kind is float else kind
+    if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
+        raise ValueError(f"{name} = {value!r}: give a value of type {kind.__name__}")
+    if kind in (int, float) and not rule["low"] <= value <= rule["high"]:
+        raise ValueError(f"{name} = {value!r}: give a value from {rule['low']:g} to {rule['high']:g} {rule['unit']}")
+    if rule["choices"] and value not in rule["choices"]:
+        raise ValueError(f"{name} = {value!r}: choose one of {', '.join(rule['choices'])}")

@@ -1,0 +1,134 @@
+"""Additional resistance along the track: grades, curves and tunnels, Xie et al. 2019, (7)-(10).
+
+All resistances are per weight (N/N), so that they do not depend on the train's mass.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import astuple, dataclass, field
+
+import numpy as np
+
+from .train import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Grade:
+    """A constant grade that rises `rise_m` (negative: falls) from `start_m` to `end_m`."""
+
+    start_m: float
+    end_m: float
+    rise_m: float
+
+    def resistance(self, train_length_m: float) -> float:
+        """Grade resistance h/l, N/N (8).
+
+        >>> Grade(0.0, 2000.0, 10.0).resistance(200.0)
+        0.005
+        """
+        return self.rise_m / (self.end_m - self.start_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A circular curve of `radius_m` that turns the track by `angle_deg` degrees."""
+
+    start_m: float
+    end_m: float
+    radius_m: float
+    angle_deg: float
+
+    def resistance(self, train_length_m: float) -> float:
+        """Curve resistance, N/N (9): 0.6/R for a curve longer than the train, else 0.0105 alpha/L.
+
+        >>> Curve(0.0, 1000.0, 4800.0, 12.0).resistance(200.0)
+        0.000125
+        >>> round(Curve(0.0, 100.0, 6000.0, 1.0).resistance(200.0), 7)
+        5.25e-05
+        """
+        if train_length_m < self.end_m - self.start_m:
+            return 0.6 / self.radius_m
+        return 0.0105 * self.angle_deg / train_length_m
+
+
+@dataclass(frozen=True, slots=True)
+class Tunnel:
+    """A tunnel."""
+
+    start_m: float
+    end_m: float
+
+    def resistance(self, train_length_m: float) -> float:
+        """Tunnel air resistance 0.00013e-3 L, N/N with the length L in m (10).
+
+        >>> round(Tunnel(0.0, 1000.0).resistance(200.0), 8)
+        0.00013
+        """
+        return 0.00013e-3 * (self.end_m - self.start_m)
+
+
+Section = Grade | Curve | Tunnel
+
+
+@dataclass(frozen=True)
+class Track:
+    """A track profile: sections may overlap; outside them the track is level, straight and open.
+
+    Raises ValueError naming the section when it does not end beyond its start or has no radius.
+    """
+
+    sections: tuple[Section, ...] = ()
+    train_length_m: float = 200.0
+    _breaks: Array = field(init=False, repr=False, compare=False)
+    _levels: Array = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for section in self.sections:
+            if not (all(map(math.isfinite, astuple(section))) and section.end_m > section.start_m):
+                raise ValueError(f"track section {section}: give finite numbers and an end_m beyond start_m")
+            if isinstance(section, Curve) and not section.radius_m > 0:
+                raise ValueError(f"track section {section}: radius_m must be above 0")
+        ends = [end for s in self.sections for end in (s.start_m, s.end_m)]
+        breaks = np.unique(np.array(ends, dtype=np.float64))
+        levels = np.zeros(breaks.size + 1)
+        for s in self.sections:
+            levels[1:][(breaks >= s.start_m) & (breaks < s.end_m)] += s.resistance(self.train_length_m)
+        object.__setattr__(self, "_breaks", breaks)
+        object.__setattr__(self, "_levels", levels)
+
+    def specific_resistance(self, position_m: Array) -> Array:
+        """Sum of grade, curve and tunnel resistance R2/(M g), N/N, at each position (7)."""
+        if not self.sections:
+            return np.zeros_like(position_m)
+        return self._levels[np.searchsorted(self._breaks, position_m, side="right")]
+
+    def least_resistance(self, from_m: float) -> float:
+        """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""
+        return float(self._levels[np.searchsorted(self._breaks, from_m, side="right") :].min())
+
+
+def parse_track(text: str, train_length_m: float) -> Track:
+    """Build a track from a text such as "grade 0 2000 10; curve 500 1500 4800 12; tunnel 1000 3000".
+
+    The numbers are those of `Grade`, `Curve` and `Tunnel` in m and degrees. Raises ValueError naming the section.
+
+    >>> parse_track("grade 0 2000 10", 200.0).sections
+    (Grade(start_m=0.0, end_m=2000.0, rise_m=10.0),)
+    """
+    kinds: dict[str, type[Section]] = {"grade": Grade, "curve": Curve, "tunnel": Tunnel}
+    sections = []
+    for entry in filter(str.strip, text.split(";")):
+        kind, *numbers = entry.split()
+        try:
+            sections.append(kinds[kind](*map(float, numbers)))
+        except (KeyError, TypeError, ValueError):
+            raise ValueError(
+                f"track section {entry.strip()!r}: write 'grade START END RISE', 'curve START END RADIUS ANGLE' or "
+                "'tunnel START END', in m and degrees, separated by ';'"
+            ) from None
+    return Track(tuple(sections), train_length_m)
+
+
+LEVEL = Track()
+"""Level, straight, open line."""
