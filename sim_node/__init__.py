@@ -1,0 +1,1 @@
+"""A simulated train: scenarios, the true motion, the sensors and the node that publishes them."""

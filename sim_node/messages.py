@@ -1,0 +1,67 @@
+"""Truth and readings as ROS messages: SI, frame `track`, one stamp for all sensors of a sample."""
+
+from __future__ import annotations
+
+from builtin_interfaces.msg import Time
+from geometry_msgs.msg import PoseWithCovarianceStamped, TwistWithCovarianceStamped
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import FluidPressure
+from std_msgs.msg import Float64, Header
+
+from adhesion_node.topics import FRAME
+
+from .plant import Truth
+
+TRAIN_FRAME = "train"
+"""Moving frame of the truth's velocity."""
+
+
+def clock(t_ns: int) -> Clock:
+    """The simulated time."""
+    return Clock(clock=_time(t_ns))
+
+
+def truth_state(t_ns: int, truth: Truth) -> Odometry:
+    """True position and speed; the covariances are 0 because they are exact."""
+    message = Odometry(header=_header(t_ns), child_frame_id=TRAIN_FRAME)
+    message.pose.pose.position.x = truth.position_m
+    message.pose.pose.orientation.w = 1.0
+    message.twist.twist.linear.x = truth.speed_mps
+    return message
+
+
+def truth_mu(truth: Truth) -> Float64:
+    """True adhesion coefficient at the present place and speed."""
+    return Float64(data=truth.mu)
+
+
+def brake_pressure(t_ns: int, absolute_pa: float, std_pa: float) -> FluidPressure:
+    """Brake-cylinder pressure, absolute; a variance of 0 stands for unknown."""
+    return FluidPressure(header=_header(t_ns), fluid_pressure=absolute_pa, variance=std_pa**2)
+
+
+def speed(t_ns: int, speed_mps: float, std_mps: float) -> TwistWithCovarianceStamped:
+    """Odometer speed."""
+    message = TwistWithCovarianceStamped(header=_header(t_ns))
+    message.twist.twist.linear.x = speed_mps
+    message.twist.covariance[0] = std_mps**2
+    return message
+
+
+def position(t_ns: int, position_m: float, std_m: float) -> PoseWithCovarianceStamped:
+    """Measured position along the track."""
+    message = PoseWithCovarianceStamped(header=_header(t_ns))
+    message.pose.pose.position.x = position_m
+    message.pose.pose.orientation.w = 1.0
+    message.pose.covariance[0] = std_m**2
+    return message
+
+
+def _header(t_ns: int) -> Header:
+    return Header(stamp=_time(t_ns), frame_id=FRAME)
+
+
+def _time(t_ns: int) -> Time:
+    seconds, nanoseconds = divmod(t_ns, 1_000_000_000)
+    return Time(sec=seconds, nanosec=nanoseconds)
