@@ -1,0 +1,11 @@
+"""Recordings: rosbag2 directories of MCAP files, written so that an interrupted one stays readable."""
+
+from __future__ import annotations
+
+from .reader import BagReader
+from .recordings import Record
+from .selection import parse_remap, select
+from .types import deserialize, serialize, typestore
+from .writer import BagWriter
+
+__all__ = ["BagReader", "BagWriter", "Record", "deserialize", "parse_remap", "select", "serialize", "typestore"]

@@ -1,0 +1,66 @@
+"""Recordings in rosbag2's other forms (sqlite3, compressed files or messages), read through rosbags."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat, QosDurability
+from rosbags.rosbag2 import Reader
+
+from .mcap_file import TopicInfo
+from .recordings import Record
+from .types import Definition
+
+_ENCODINGS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.IDL: "ros2idl"}
+
+
+class ForeignRecording:
+    """One compressed rosbag2 directory or several storage files."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        self.damage: list[str] = []
+        self._paths = paths
+        with ExitStack() as stack, self._translated():
+            self._readers = [stack.enter_context(Reader(path)) for path in paths]
+            self._stack = stack.pop_all()
+
+    def infos(self) -> Iterator[tuple[TopicInfo, int]]:
+        """Yield the topics of every file."""
+        for reader in self._readers:
+            for connection in reader.connections:
+                yield _info(connection), connection.msgcount
+
+    def records(self, wanted: Callable[[str], bool]) -> Iterator[Record]:
+        """Yield the records of all files merged; each file comes sorted from its database."""
+        streams = []
+        for reader in self._readers:
+            # Without any connection rosbags would yield them all.
+            if connections := [connection for connection in reader.connections if wanted(connection.topic)]:
+                streams.append(reader.messages(connections))
+        with self._translated():
+            for connection, log_ns, cdr in heapq.merge(*streams, key=lambda entry: entry[1]):
+                yield Record(connection.topic, connection.msgtype, bytes(cdr), log_ns)
+
+    def close(self) -> None:
+        """Close the files."""
+        self._stack.close()
+
+    @contextmanager
+    def _translated(self) -> Iterator[None]:
+        try:
+            yield
+        except Exception as error:  # rosbags lets the exceptions of sqlite, zstd and YAML through
+            names = ", ".join(str(path) for path in self._paths)
+            raise ValueError(f"bag = {names}: unreadable ({error}): name another recording") from error
+
+
+def _info(connection: Connection) -> TopicInfo:
+    encoding, latched = "cdr", False
+    if isinstance(connection.ext, ConnectionExtRosbag2):
+        encoding = connection.ext.serialization_format
+        latched = any(qos.durability is QosDurability.TRANSIENT_LOCAL for qos in connection.ext.offered_qos_profiles)
+    known_as = Definition(_ENCODINGS.get(connection.msgdef.format, ""), connection.msgdef.data)
+    return TopicInfo(connection.topic, connection.msgtype, encoding, known_as, latched)

@@ -1,0 +1,178 @@
+"""Reads one MCAP file whether or not its recording was finished.
+
+The index at the end of a file is missing when the recorder died, so it is not used at all: one pass over the file
+finds the blocks (chunks, or single messages outside of chunks), the topics and the first place that is damaged.
+Messages are then read block by block, one block at a time in memory.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from struct import Struct, error
+from typing import BinaryIO, NamedTuple
+
+from lz4.frame import decompress as lz4_decompress
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Schema
+from mcap.writer import MCAP0_MAGIC
+from zstandard import ZstdError
+from zstandard import decompress as zstd_decompress
+
+from .types import Definition, is_latched
+
+_HEAD = Struct("<BQ")
+_MESSAGE = Struct("<HIQQ")
+_CHUNK_TIMES = Struct("<QQ")
+
+_UNREADABLE = (error, ValueError, McapError, ZstdError, RuntimeError)
+"""What the decoders raise on bytes that are not what they seem."""
+
+
+class Message(NamedTuple):
+    """One message as it lies in the file."""
+
+    log_ns: int
+    channel: int
+    cdr: bytes
+
+
+class Block(NamedTuple):
+    """A chunk or a lone message: the time of its first message and where its record is."""
+
+    start_ns: int
+    offset: int
+    opcode: int
+    length: int
+
+
+class TopicInfo(NamedTuple):
+    """What a recording says of a topic."""
+
+    name: str
+    type: str
+    encoding: str
+    definition: Definition
+    latched: bool
+
+
+class McapFile:
+    """An open MCAP file: `topics` and message `counts` by channel, `blocks`, and `damage`: a sentence per loss.
+
+    Raises ValueError when it is not an MCAP file.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.topics: dict[int, TopicInfo] = {}
+        self.counts: Counter[int] = Counter()
+        self.blocks: list[Block] = []
+        self.damage: list[str] = []
+        self._schemas: dict[int, Schema] = {}
+        self._stream = path.open("rb")
+        try:
+            self._scan()
+        except BaseException:
+            self._stream.close()
+            raise
+
+    def close(self) -> None:
+        """Close the file."""
+        self._stream.close()
+
+    def messages(self, block: Block) -> Iterator[Message]:
+        """Yield the messages of a block in the order they were written; those of nameless channels are left out."""
+        self._stream.seek(block.offset)
+        for opcode, body in _unpack(block.opcode, self._stream.read(block.length)):
+            if opcode == Opcode.MESSAGE and (message := _message(body)).channel in self.topics:
+                yield message
+
+    def _scan(self) -> None:
+        if self._stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            empty = self.path.stat().st_size == 0
+            raise ValueError(f"{self.path}: {'is empty' if empty else 'is not an MCAP file'}: name another recording")
+        finished = False
+        for opcode, offset, length in _records(self._stream):
+            if opcode == Opcode.FOOTER:
+                self._stream.seek(offset + length)
+                finished = self._stream.read() == MCAP0_MAGIC
+            if opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
+                self._take_block(opcode, offset, self._stream.read(length))
+        if nameless := sum(count for channel, count in self.counts.items() if channel not in self.topics):
+            self.damage.append(f"{self.path}: {nameless} messages are left out, the names of their topics are lost")
+        if not finished:
+            self.damage.append(f"{self.path} breaks off: its recording was interrupted or the file was cut")
+
+    def _take_block(self, opcode: int, offset: int, body: bytes) -> None:
+        """Note a record of the data section; a damaged one is left out as a whole."""
+        try:
+            messages = [_message(inner) for kind, inner in _unpack(opcode, body) if not self._declares(kind, inner)]
+        except _UNREADABLE:
+            self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
+            return
+        if messages:
+            self.blocks.append(Block(min(message.log_ns for message in messages), offset, opcode, len(body)))
+            self.counts.update(message.channel for message in messages)
+
+    def _declares(self, opcode: int, body: bytes) -> bool:
+        """Take over a schema or channel record; False for a message."""
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(ReadDataStream(BytesIO(body)))
+            self._schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(body)))
+            schema = self._schemas.get(channel.schema_id) or Schema(id=0, data=b"", encoding="", name="")
+            known_as = Definition(schema.encoding, schema.data.decode())
+            latched = is_latched(channel.metadata.get("offered_qos_profiles", ""))
+            self.topics[channel.id] = TopicInfo(channel.topic, schema.name, channel.message_encoding, known_as, latched)
+        return opcode != Opcode.MESSAGE
+
+
+def _records(stream: BinaryIO) -> Iterator[tuple[int, int, int]]:
+    """Yield opcode, offset and length of the body of every record that lies in the stream as a whole."""
+    offset = stream.tell()
+    size = stream.seek(0, 2)
+    while offset + _HEAD.size <= size:
+        stream.seek(offset)
+        opcode, length = _HEAD.unpack(stream.read(_HEAD.size))
+        offset += _HEAD.size
+        if opcode == 0 or offset + length > size:
+            return
+        yield opcode, offset, length
+        if opcode == Opcode.FOOTER:
+            return
+        offset += length
+
+
+def _unpack(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and body of the records in a chunk; another record stands for itself."""
+    if opcode != Opcode.CHUNK:
+        yield opcode, body
+        return
+    stream = BytesIO(_decompress(Chunk.read(ReadDataStream(BytesIO(body)))))
+    for inner, _, length in _records(stream):
+        yield inner, stream.read(length)
+
+
+def _decompress(chunk: Chunk) -> bytes:
+    if chunk.compression == "zstd":
+        data: bytes = zstd_decompress(chunk.data, chunk.uncompressed_size)
+    elif chunk.compression == "lz4":
+        data = lz4_decompress(chunk.data)
+    elif chunk.compression == "":
+        data = chunk.data
+    else:
+        raise ValueError(f"chunk compression = {chunk.compression!r}: only zstd, lz4 and none are known")
+    if len(data) != chunk.uncompressed_size or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
+        raise ValueError("the checksum of the chunk does not fit")
+    return data
+
+
+def _message(body: bytes) -> Message:
+    channel, _, log_ns, _ = _MESSAGE.unpack_from(body)
+    return Message(log_ns, channel, body[_MESSAGE.size :])

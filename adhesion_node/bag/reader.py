@@ -1,0 +1,122 @@
+"""Reads a recording: a rosbag2 directory or a single file, finished or not, in the order of log time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Self
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from .foreign import ForeignRecording
+from .mcap_file import TopicInfo
+from .recordings import McapRecording, Record, Recording
+from .types import same_name
+
+
+class BagReader:
+    """An open recording; a context manager.
+
+    `topics` are the types and `counts` the numbers of messages by topic name, for topics that hold messages.
+    `complete` is False when something of the recording is lost; `damage` then says what, a sentence each. What is
+    there can be read all the same. Raises ValueError when there is no such recording or nothing in it is readable.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self._recording = _open(self.path)
+        try:
+            self.damage = tuple(self._recording.damage)
+            self.complete = not self.damage
+            self.infos, self.counts = self._survey()
+        except BaseException:
+            self.close()
+            raise
+        self.topics: dict[str, str] = {name: info.type for name, info in self.infos.items()}
+
+    def messages(self, names: Iterable[str] | None = None) -> Iterator[Record]:
+        """Yield the records in the order of (log time, arrival), of all topics or of those named.
+
+        Names match with or without the leading slash; a topic that is not there yields nothing.
+        """
+        chosen = set(self.topics) if names is None else {self.resolve(name) for name in names}
+        return self._recording.records(chosen.__contains__)
+
+    def resolve(self, name: str) -> str | None:
+        """Return the name under which a topic is recorded, or None when it is not there."""
+        return next((recorded for recorded in self.topics if same_name(recorded, name)), None)
+
+    def close(self) -> None:
+        """Close the files."""
+        self._recording.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _survey(self) -> tuple[dict[str, TopicInfo], dict[str, int]]:
+        infos: dict[str, TopicInfo] = {}
+        counts: Counter[str] = Counter()
+        for info, count in self._recording.infos():
+            if not count:
+                continue
+            if info.encoding != "cdr":
+                raise ValueError(f"bag = {self.path}: topic {info.name} is {info.encoding!r}: only CDR (ROS 2) is read")
+            known = infos.setdefault(info.name, info)
+            if known.type != info.type:
+                raise ValueError(f"bag = {self.path}: topic {info.name} is both {known.type} and {info.type}: split it")
+            counts[info.name] += count
+        if self.damage and not infos:
+            raise ValueError(f"bag = {self.path}: holds no readable message ({self.damage[0]}): name another recording")
+        return infos, dict(counts)
+
+
+def _open(path: Path) -> Recording:
+    if path.is_dir():
+        return _open_directory(path)
+    if not path.exists():
+        raise ValueError(f"bag = {path}: does not exist: name a rosbag2 directory or an .mcap file")
+    if path.suffix == ".mcap":
+        return McapRecording([path])
+    if path.suffix == ".db3":
+        return ForeignRecording([path])
+    hint = "convert it with rosbags-convert" if path.suffix == ".bag" else "name a rosbag2 directory or an .mcap file"
+    raise ValueError(f"bag = {path}: is no recording of ROS 2: {hint}")
+
+
+def _open_directory(path: Path) -> Recording:
+    """Open what is there: the metadata is only asked for what the files cannot tell."""
+    metadata = _metadata(path / "metadata.yaml")
+    if str(metadata.get("compression_mode") or "none").lower() != "none":
+        return ForeignRecording([path])
+    recording: Recording
+    if mcaps := _numbered(path, ".mcap"):
+        recording = McapRecording(mcaps)
+    elif databases := _numbered(path, ".db3"):
+        recording = ForeignRecording(databases)
+        if not metadata:
+            recording.damage.append(f"{path} has no metadata.yaml: its recording was interrupted")
+    else:
+        raise ValueError(f"bag = {path}: holds no .mcap or .db3 file: name the directory of a recording")
+    for name in metadata.get("relative_file_paths") or []:
+        if not (path / Path(name).name).exists():
+            recording.damage.append(f"{path / Path(name).name} is missing")
+    return recording
+
+
+def _numbered(path: Path, suffix: str) -> list[Path]:
+    """Return the files of a split recording in their order: x_2 before x_10."""
+    return sorted(path.glob(f"*{suffix}"), key=lambda file: (len(file.name), file.name))
+
+
+def _metadata(path: Path) -> dict[str, Any]:
+    """Return the metadata; {} when it is missing or unreadable, as after an interruption."""
+    try:
+        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+        return dict(document["rosbag2_bagfile_information"])
+    except (OSError, UnicodeDecodeError, YAMLError, LookupError, TypeError, ValueError):
+        return {}

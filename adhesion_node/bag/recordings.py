@@ -1,0 +1,87 @@
+"""A recording of one or more files as one stream of records in the order of (log time, arrival)."""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, closing
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+from .mcap_file import McapFile, Message, TopicInfo
+from .types import deserialize
+
+
+class Record(NamedTuple):
+    """One recorded message."""
+
+    topic: str
+    type: str
+    cdr: bytes
+    log_ns: int
+
+    @property
+    def message(self) -> Any:
+        """The decoded message, decoded anew at each access. Raises ValueError when the bytes do not fit the type."""
+        try:
+            return deserialize(self.cdr, self.type)
+        except ValueError as error:
+            raise ValueError(f"{self.topic} at {self.log_ns} ns: {error}") from error
+
+
+class Recording(Protocol):
+    """What `BagReader` needs of a recording."""
+
+    damage: list[str]
+
+    def infos(self) -> Iterator[tuple[TopicInfo, int]]:
+        """Yield the topics with their numbers of messages; a topic may come several times."""
+
+    def records(self, wanted: Callable[[str], bool]) -> Iterator[Record]:
+        """Yield the records of the topics whose name is wanted."""
+
+    def close(self) -> None:
+        """Close the files."""
+
+
+class McapRecording:
+    """MCAP files, also unfinished and damaged ones."""
+
+    def __init__(self, paths: Sequence[Path]) -> None:
+        with ExitStack() as stack:
+            self._files = [stack.enter_context(closing(McapFile(path))) for path in paths]
+            self._stack = stack.pop_all()
+        self.damage = [sentence for file in self._files for sentence in file.damage]
+
+    def infos(self) -> Iterator[tuple[TopicInfo, int]]:
+        """Yield the topics of every file."""
+        for file in self._files:
+            for channel, info in file.topics.items():
+                yield info, file.counts[channel]
+
+    def records(self, wanted: Callable[[str], bool]) -> Iterator[Record]:
+        """Yield the records: a block is read once no earlier message can follow, so few are in memory at a time."""
+        blocks = sorted(
+            (block.start_ns, number, block.offset, block)
+            for number, file in enumerate(self._files)
+            for block in file.blocks
+        )
+        pending: list[tuple[int, int, int, int, Message]] = []
+        for start_ns, number, offset, block in blocks:
+            while pending and pending[0][0] < start_ns:
+                yield self._record(heapq.heappop(pending))
+            file = self._files[number]
+            for index, message in enumerate(file.messages(block)):
+                if wanted(file.topics[message.channel].name):
+                    heapq.heappush(pending, (message.log_ns, number, offset, index, message))
+        while pending:
+            yield self._record(heapq.heappop(pending))
+
+    def close(self) -> None:
+        """Close the files."""
+        self._stack.close()
+
+    def _record(self, entry: tuple[int, int, int, int, Message]) -> Record:
+        message = entry[-1]
+        info = self._files[entry[1]].topics[message.channel]
+        return Record(info.name, info.type, message.cdr, message.log_ns)

@@ -1,0 +1,77 @@
+"""Which topics of a recording stand for which of ours: remapping, and clear words when they do not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from .. import topics
+from .types import same_name
+
+_OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}
+
+
+def parse_remap(text: str) -> tuple[str, str]:
+    """Split "FROM:=TO" into the two topic names.
+
+    >>> parse_remap("/odometry/position:=position")
+    ('/odometry/position', 'position')
+    """
+    source, separator, target = text.partition(":=")
+    if not (separator and source.strip("/") and target.strip("/")) or ":=" in target:
+        raise ValueError(f"remap = {text!r}: write FROM:=TO, for instance /odometry/position:=position")
+    return source, target
+
+
+def select(
+    recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]] = (), names: Iterable[str] | None = None
+) -> dict[str, str]:
+    """Return the topics to replay: from the name in the recording to the name after remapping.
+
+    `recorded` holds the types by name. Replayed are `names` (after remapping), or else the sensors and the truth,
+    not recorded results. Our own topics come out under their relative names, so that namespaces apply. Raises
+    ValueError when a remapped or named topic is missing, has the wrong type, or when no position is among them.
+    """
+    renamed = _rename(recorded, remaps)
+    chosen = list(_OURS) if names is None else list(names)
+    selection: dict[str, str] = {}
+    for name in chosen:
+        source = next((source for source, target in renamed.items() if same_name(target, name)), None)
+        if source is not None:
+            selection[source] = _own_name(name)
+            _require_type(name, source, recorded)
+        elif names is not None or same_name(name, topics.POSITION.name):
+            raise ValueError(f"topic {name}: not in the recording. {_what_there_is(name, recorded)}")
+    return selection
+
+
+def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]]) -> dict[str, str]:
+    """Return the name after remapping by recorded name; what a remapping displaces is left out."""
+    renamed = {}
+    for source, target in remaps:
+        match = next((name for name in recorded if same_name(name, source)), None)
+        if match is None:
+            raise ValueError(f"remap from {source}: not in the recording. {_what_there_is(target, recorded)}")
+        renamed[match] = target
+    taken = {target.lstrip("/") for target in renamed.values()}
+    return renamed | {name: name for name in recorded if name not in renamed and name.lstrip("/") not in taken}
+
+
+def _own_name(name: str) -> str:
+    """Return one of our names as it is spelt in `topics`, relative; another name unchanged."""
+    return name.lstrip("/") if name.lstrip("/") in _OURS else name
+
+
+def _require_type(name: str, source: str, recorded: Mapping[str, str]) -> None:
+    expected = _OURS.get(name.lstrip("/"))
+    if expected is not None and recorded[source] != expected:
+        raise ValueError(
+            f"topic {source}: type = {recorded[source]}: {name} needs {expected}. {_what_there_is(name, recorded)}"
+        )
+
+
+def _what_there_is(name: str, recorded: Mapping[str, str]) -> str:
+    """List the recording's topics and show a remapping: from a topic of the right type where there is one."""
+    listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(recorded.items())) or "none"
+    expected = _OURS.get(name.lstrip("/"))
+    fitting = next((topic for topic, kind in sorted(recorded.items()) if kind == expected), "/recorded/name")
+    return f"It holds: {listed}. Name the right one, for instance --remap {fitting}:={name.lstrip('/')}"

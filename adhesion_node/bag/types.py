@@ -1,0 +1,78 @@
+"""Message classes, CDR and message definitions of ROS 2 Jazzy, without an installed ROS."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any, NamedTuple
+
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_typestore
+from rosbags.typesys.store import Typestore
+
+
+class Definition(NamedTuple):
+    """A message definition as a bag holds it: the text and its encoding ("ros2msg" or "ros2idl")."""
+
+    encoding: str
+    text: str
+
+
+@cache
+def typestore() -> Typestore:
+    """Return the types of ROS 2 Jazzy; `typestore().types["std_msgs/msg/Float64"]` is a message class."""
+    return get_typestore(Stores.ROS2_JAZZY)
+
+
+def serialize(message: object, type_name: str) -> bytes:
+    """Return `message` as little-endian CDR: equal messages give equal bytes, padding included."""
+    _require(type_name)
+    return bytes(typestore().serialize_cdr(message, type_name, little_endian=True))
+
+
+def deserialize(cdr: bytes, type_name: str) -> Any:
+    """Return the message that `cdr` holds. Raises ValueError when the type is unknown or the bytes do not fit it."""
+    _require(type_name)
+    try:
+        return typestore().deserialize_cdr(cdr, type_name)
+    except (SerdeError, IndexError) as error:
+        raise ValueError(
+            f"message of {len(cdr)} bytes: it does not decode as {type_name} ({error}); was another type recorded?"
+        ) from error
+
+
+def definition(type_name: str) -> Definition:
+    """Return the definition of a type with all that it is made of. Raises ValueError when the type is unknown."""
+    _require(type_name)
+    return Definition("ros2msg", typestore().generate_msgdef(type_name, ros_version=2)[0])
+
+
+def type_hash(type_name: str) -> str:
+    """Return the RIHS01 hash of a type, or "" for a type that is not part of ROS 2 Jazzy."""
+    try:
+        return typestore().hash_rihs01(type_name)
+    except (KeyError, TypesysError):
+        return ""
+
+
+def same_name(one: str, other: str) -> bool:
+    """Tell whether two topic names are the same, with or without the leading slash.
+
+    >>> same_name("/position", "position"), same_name("/train1/position", "position")
+    (True, False)
+    """
+    return one.lstrip("/") == other.lstrip("/")
+
+
+def is_latched(offered_qos_profiles: str) -> bool:
+    """Tell whether a QoS list as written in bags (names since version 9, numbers before) is transient local.
+
+    >>> is_latched("- durability: 1"), is_latched('[{"durability": "transient_local"}]'), is_latched("")
+    (True, True, False)
+    """
+    return re.search(r'durability"?:\s*"?(1|transient_local)\b', offered_qos_profiles) is not None
+
+
+def _require(type_name: str) -> None:
+    if type_name not in typestore().fielddefs:
+        raise ValueError(f"message type = {type_name!r}: only the standard messages of ROS 2 Jazzy can be decoded")

@@ -1,0 +1,79 @@
+"""What the command line tools share: --json, exit codes, errors in one line, progress on standard error."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, TypeVar
+
+Item = TypeVar("Item")
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+"""Exit codes of every tool."""
+
+PROGRESS_S = 1.0
+"""Time between two signs of life."""
+
+
+def json_option() -> argparse.ArgumentParser:
+    """Return the parent of every tool's parser: `ArgumentParser(parents=[json_option()])`."""
+    parent = argparse.ArgumentParser(add_help=False)
+    parent.add_argument("--json", metavar="FILE", help="write the result as JSON to FILE, or - for standard output")
+    return parent
+
+
+def run_tool(
+    parser: argparse.ArgumentParser,
+    work: Callable[[argparse.Namespace], int],
+    args: Sequence[str] | None = None,
+) -> int:
+    """Parse the command line, do the work and return the exit code.
+
+    A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback.
+    Bad usage ends the program with 2 (SystemExit).
+    """
+    options = parser.parse_args(args)
+    try:
+        return work(options)
+    except ValueError as error:
+        return _complain(parser, str(error), BAD_INPUT)
+    except OSError as error:
+        return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}", FAILED)
+    except KeyboardInterrupt:
+        return _complain(parser, "interrupted", FAILED)
+
+
+def report(destination: str | None, result: Mapping[str, Any] | Sequence[Any], text: str) -> None:
+    """Print `text`, and write `result` as JSON to `destination`; for "-" the JSON stands alone on standard output.
+
+    Raises ValueError for a number that is not finite, which JSON cannot hold.
+    """
+    if destination != "-":
+        print(text)
+    if destination is None:
+        return
+    document = json.dumps(result, indent=2, allow_nan=False) + "\n"
+    if destination == "-":
+        sys.stdout.write(document)
+    else:
+        Path(destination).write_text(document, encoding="utf-8")
+
+
+def progress(items: Iterable[Item], noun: str, total: int | None = None) -> Iterator[Item]:
+    """Yield the items and say on standard error about every second how many have passed; short work stays silent."""
+    of_all = "" if total is None else f" of {total}"
+    due = time.monotonic() + PROGRESS_S
+    for count, item in enumerate(items):
+        if (now := time.monotonic()) >= due:
+            due = now + PROGRESS_S
+            print(f"{count}{of_all} {noun}", file=sys.stderr)
+        yield item
+
+
+def _complain(parser: argparse.ArgumentParser, message: str, code: int) -> int:
+    print(f"{parser.prog}: {' '.join(message.split())}", file=sys.stderr)
+    return code

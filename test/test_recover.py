@@ -1,0 +1,109 @@
+"""`recover` makes a complete recording of an interrupted, cut or foreign one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import Reader
+
+from adhesion_node import recover
+from adhesion_node.bag import BagReader, BagWriter, sensors
+from adhesion_node.bag.writer import FILE_NAME
+from adhesion_node.topics import BRAKING_CURVE, POSITION
+
+S = 10**9
+
+
+def interrupted(path: Path, steps: int) -> None:
+    """Leave a recording as a killed recorder does: without index and metadata, ending within a chunk."""
+    writer = BagWriter(path)
+    writer.add_topic("/curve", BRAKING_CURVE.type, latched=True)
+    writer.write("/curve", BRAKING_CURVE.type, b"\0\1\0\0", 0)
+    for step in range(steps):
+        writer.write("/position", POSITION.type, sensors.position(step * S, step / 3, 0.25), step * S)
+        if step % 100 == 99:
+            writer.flush()
+    writer.close()
+    (path / "metadata.yaml").unlink()
+    with (path / FILE_NAME).open("r+b") as file:
+        file.truncate(file.seek(0, 2) * 2 // 3)
+
+
+def test_an_interrupted_recording_becomes_complete(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    interrupted(tmp_path / "bag", 1000)
+    assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole"), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert summary["complete"] is False
+    assert summary["damage"] == err.splitlines()
+    assert "breaks off" in err
+    with (
+        BagReader(tmp_path / "bag") as before,
+        BagReader(tmp_path / "whole") as after,
+        Reader(tmp_path / "whole") as it,
+    ):
+        read = list(after.messages())
+        assert read == list(before.messages())
+        assert after.complete
+        assert after.infos["/curve"].latched
+        assert it.message_count == len(read) == sum(summary["messages"].values()) > 100
+
+
+def test_recovering_twice_changes_nothing(tmp_path: Path) -> None:
+    interrupted(tmp_path / "bag", 500)
+    recover.recover(tmp_path / "bag", tmp_path / "one")
+    summary = recover.recover(tmp_path / "one", tmp_path / "two")
+    assert summary["complete"]
+    assert (tmp_path / "one" / FILE_NAME).read_bytes() == (tmp_path / "two" / FILE_NAME).read_bytes()
+
+
+def test_types_of_others_are_kept(tmp_path: Path) -> None:
+    file = tmp_path / "foreign.mcap"
+    with file.open("wb") as stream:
+        writer: Any = Writer(stream, compression=CompressionType.LZ4)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("foo_msgs/msg/Bar", "ros2msg", b"int32 baz")
+        channel = writer.register_channel("/bar", "cdr", schema)
+        writer.add_message(channel, log_time=5, data=b"\0\1\0\0\7\0\0\0", publish_time=5)
+        writer.finish()
+    recover.recover(file, tmp_path / "kept")
+    with BagReader(tmp_path / "kept") as reader:
+        (record,) = reader.messages()
+        assert (record.topic, record.type, record.cdr, record.log_ns) == (
+            "/bar",
+            "foo_msgs/msg/Bar",
+            b"\0\1\0\0\7\0\0\0",
+            5,
+        )
+        assert reader.infos["/bar"].definition.text == "int32 baz"
+        with pytest.raises(ValueError, match="/bar at 5 ns: message type = 'foo_msgs/msg/Bar'"):
+            _ = record.message
+
+
+@pytest.mark.parametrize("content", [b"", b"garbage" * 50])
+def test_nothing_to_recover(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x.mcap").write_bytes(content)
+    assert recover.main([str(tmp_path / "x.mcap"), "--output", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("recover: ")
+    assert "name another recording" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_output_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    interrupted(tmp_path / "bag", 200)
+    assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "bag")]) == 2
+    assert "it exists already" in capsys.readouterr().err
+    with BagReader(tmp_path / "bag") as reader:
+        assert reader.counts["/position"] > 0
+
+
+def test_bad_usage_is_code_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        recover.main(["bag"])
+    assert end.value.code == 2
+    assert "--output" in capsys.readouterr().err
