@@ -1,0 +1,173 @@
+"""Publishes the sensor topics of a recording with /clock; `replay` is the program around it."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from itertools import groupby
+from typing import Any
+
+from rclpy.clock import Clock as NodeClock
+from rclpy.clock import ClockType
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import ReliabilityPolicy
+from rosgraph_msgs.msg import Clock
+
+from .. import topics
+from ..bag import BagReader, Record
+from .qos import SENSOR_PUBLISHER, advertise
+
+PERIOD_S, RUSH_PERIOD_S = 0.002, 0.0005
+"""Between two ticks at a given rate and as fast as possible."""
+
+BURST = 20
+"""Log times per tick at most: a fraction of a subscriber's queue."""
+
+SUBSCRIBERS_S = 10.0
+"""Longest wait for subscribers."""
+
+SETTLE_S = 0.5
+"""The subscribers count as found when no other one has appeared for so long: discovery is not finished on the other
+side, nor for its other topics, when the first one is seen."""
+
+ACKNOWLEDGED_S = 10.0
+"""Longest wait for reliable subscribers to take what was published."""
+
+
+class Replay(Node):
+    """Publishes the records of `selection` (recorded name -> topic name), as raw bytes, each log time on /clock first.
+
+    `rate` is the speed against the log times; 0 publishes as fast as the reliable subscribers take it. It starts
+    once `subscribers` are there. `finished` becomes True at the end; `failure` then says why it ended early, or is
+    None. Raises ValueError when the rate is not usable.
+    """
+
+    def __init__(
+        self, reader: BagReader, selection: Mapping[str, str], rate: float = 1.0, subscribers: int = 1, **kwargs: Any
+    ) -> None:
+        if not math.isfinite(rate) or rate < 0:
+            raise ValueError(f"rate = {rate!r}: give a finite factor, or 0 for as fast as possible")
+        super().__init__("replay", **kwargs)
+        self.finished = False
+        self.failure: str | None = None
+        self.published: Counter[str] = Counter()
+        self._rate = rate
+        self._wanted = subscribers
+        self._clock_out = advertise(self, topics.CLOCK, SENSOR_PUBLISHER)
+        self._outputs = {
+            source: advertise(self, topics.Topic(target, reader.topics[source]), SENSOR_PUBLISHER)
+            for source, target in selection.items()
+        }
+        self._steps = groupby(reader.messages(selection), key=lambda record: record.log_ns)
+        self._next: tuple[int, Iterator[Record]] | None = None
+        self._origin: tuple[float, int] | None = None
+        self._waiting_since = time.monotonic()
+        self._seen: tuple[int, ...] = ()
+        self._seen_since = self._waiting_since
+        period = PERIOD_S if rate else RUSH_PERIOD_S
+        self.create_timer(period, self.tick, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
+
+    def tick(self) -> None:
+        """Publish what is due."""
+        if self.finished:
+            return
+        try:
+            if self._origin is None:
+                self._start_when_heard()
+            else:
+                self._publish_due()
+        except ValueError as error:  # the recording turns out unreadable on the way
+            self.failure = str(error)
+            self.finished = True
+
+    def _start_when_heard(self) -> None:
+        now = time.monotonic()
+        heard = tuple(publisher.get_subscription_count() for publisher in self._outputs.values())
+        if heard != self._seen:
+            self._seen, self._seen_since = heard, now
+        enough = self._position().get_subscription_count() >= self._wanted
+        if enough and (now - self._seen_since >= SETTLE_S or not self._wanted):
+            self._warn_of_losses()
+        elif now - self._waiting_since >= SUBSCRIBERS_S:
+            self.get_logger().warning(
+                f"{self._position().topic_name}: fewer than {self._wanted} subscribers after {SUBSCRIBERS_S:g} s: "
+                "replaying all the same"
+            )
+        else:
+            return
+        self._advance()
+        self._origin = (now, self._next[0] if self._next else 0)
+
+    def _position(self) -> Publisher:
+        """Return the publisher whose subscribers count: the position's, or the first one's without a position."""
+        named = {publisher.topic_name: publisher for publisher in self._outputs.values()}
+        return named.get(self.resolve_topic_name(topics.POSITION.name)) or next(iter(named.values()))
+
+    def _warn_of_losses(self) -> None:
+        """At full speed only a reliable subscriber can slow the replay down; any other one may lose messages."""
+        for publisher in self._outputs.values() if not self._rate else ():
+            for end in self.get_subscriptions_info_by_topic(publisher.topic_name):
+                if end.qos_profile.reliability != ReliabilityPolicy.RELIABLE:
+                    override = f"qos_overrides.{publisher.topic_name}.subscription"
+                    self.get_logger().warning(
+                        f"{end.node_name} subscribes {publisher.topic_name} best effort and may lose messages: start "
+                        f"it with -p {override}.reliability:=reliable -p {override}.history:=keep_all, or set a --rate"
+                    )
+
+    def _publish_due(self) -> None:
+        for _ in range(BURST if self._rate else 1):
+            if self._next is None:
+                self._finish()
+                return
+            log_ns, records = self._next
+            if log_ns > self._due_ns():
+                return
+            self._clock_out.publish(_clock_message(log_ns))
+            for record in records:
+                self._publish(record)
+            self._advance()
+
+    def _publish(self, record: Record) -> None:
+        """Publish one record; a full queue first waits until the reliable subscribers have taken all of it.
+
+        Only then: DDS asks for acknowledgements when the queue is full, and else just every three seconds.
+        """
+        output = self._outputs[record.topic]
+        if self.published[record.topic] % output.qos_profile.depth == 0:
+            self._await_acknowledgement(output)
+        output.publish(record.cdr)
+        self.published[record.topic] += 1
+
+    def _advance(self) -> None:
+        self._next = next(self._steps, None)
+
+    def _due_ns(self) -> float:
+        """Return the log time reached by now."""
+        assert self._origin is not None
+        started, first_ns = self._origin
+        return first_ns + (time.monotonic() - started) * self._rate * 1e9 if self._rate else math.inf
+
+    def _await_acknowledgement(self, output: Publisher) -> bool:
+        """Wait until reliable subscribers have taken everything; what they have not would be overwritten."""
+        if output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S)):
+            return True
+        self.get_logger().warning(
+            f"{output.topic_name}: a subscriber did not take its messages within {ACKNOWLEDGED_S:g} s",
+            throttle_duration_sec=60.0,
+        )
+        return False
+
+    def _finish(self) -> None:
+        if not all(self._await_acknowledgement(output) for output in self._outputs.values()):
+            self.failure = "the last messages were not acknowledged: did a subscriber hang?"
+        self.finished = True
+
+
+def _clock_message(log_ns: int) -> Clock:
+    message = Clock()
+    message.clock.sec, message.clock.nanosec = divmod(log_ns, 10**9)
+    return message

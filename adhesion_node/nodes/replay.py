@@ -1,0 +1,101 @@
+"""Replays a recording: to topics with /clock, or with --offline straight through the estimator."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from functools import partial
+
+from ..bag import BagReader, parse_remap, select
+from ..cli import DONE, FAILED, json_option, report, run_tool
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run `replay BAG`."""
+    arguments = list(sys.argv[1:] if args is None else args)
+    if "--offline" in arguments:
+        return run_tool(_parser(), _offline, arguments)
+    # Only here: ROS is neither needed nor loaded for --offline.
+    from . import runtime
+
+    own, ros = runtime.split_ros_arguments(arguments)
+    return run_tool(_parser(), partial(_live, ros=ros), own)
+
+
+def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
+    from . import runtime
+    from .player import Replay
+
+    if options.set or options.params or options.seed is not None:
+        raise ValueError("--set, --params and --seed are for --offline: give a live estimator its own parameters")
+    with BagReader(options.bag) as reader:
+        selection = _selection(reader, options)
+        nodes: list[Replay] = []
+
+        def make_node() -> Replay:
+            nodes.append(Replay(reader, selection, options.rate, options.wait_for_subscribers))
+            return nodes[0]
+
+        code = runtime.run(make_node, ros)
+        if code != DONE:
+            return code
+        (node,) = nodes
+        complete = node.finished and node.failure is None
+        if node.failure is not None:
+            print(f"replay: {node.failure}", file=sys.stderr)
+        result = {"messages": dict(node.published), "complete": complete}
+        lines = [f"{count} {name}" for name, count in node.published.items()]
+        report(options.json, result, "\n".join(lines))
+        return DONE if node.failure is None else FAILED
+
+
+def _offline(options: argparse.Namespace) -> int:
+    from .. import offline
+
+    with BagReader(options.bag) as reader:
+        return offline.run(options, reader, _selection(reader, options))
+
+
+def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]:
+    """Return the topics to replay and say what the recording lacks."""
+    for loss in reader.damage:
+        print(f"replay: {loss}", file=sys.stderr)
+    try:
+        return select(reader.topics, [parse_remap(text) for text in options.remap], options.topics)
+    except ValueError as error:
+        raise ValueError(f"bag = {reader.path}: {error}") from error
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "replay", description=__doc__, parents=[json_option()], usage="%(prog)s BAG [options] [--ros-args ...]"
+    )
+    add = parser.add_argument
+    add("bag", metavar="BAG", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
+    add(
+        "--remap",
+        metavar="FROM:=TO",
+        action="extend",
+        nargs="+",
+        default=[],
+        help="which recorded topic is which of ours, for instance /odometry/position:=position",
+    )
+    add(
+        "--topics", metavar="TOPIC", nargs="+", help="replay these (after --remap) instead of the sensors and the truth"
+    )
+    live = parser.add_argument_group("to topics").add_argument
+    live("--rate", type=float, default=1.0, help="speed; 0 = as fast as reliable subscribers take it (default: 1)")
+    live(
+        "--wait-for-subscribers",
+        metavar="N",
+        type=int,
+        default=1,
+        help="of position, for 10 s at most; 0 = none (default: 1)",
+    )
+    straight = parser.add_argument_group("offline").add_argument
+    straight("--offline", action="store_true", help="straight through the estimator, without ROS")
+    straight("--seed", type=int, help="seed of the estimator")
+    straight("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
+    straight("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
+    return parser

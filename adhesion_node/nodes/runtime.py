@@ -1,0 +1,160 @@
+"""The one main of every node: start, spin until a signal or the node's own end, close, exit code.
+
+rclpy's own signal handlers end in a traceback or a wrong exit code when SIGTERM or a second signal meets a
+spinning node. Here the handlers only note the first signal; the loop sees the note between two callbacks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+import rclpy
+from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import ok, try_shutdown
+
+from .params import Spec
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+"""Exit codes of every program."""
+
+POLL_S = 0.1
+"""Longest time until a signal is seen: no signal interrupts rclpy's wait."""
+
+GOODBYE_S = 0.5
+"""Longest wait at the end for reliable subscribers to have the last messages."""
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+_BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidationException)
+"""What a node's start raises for bad input; the RuntimeErrors are those of rcl."""
+
+
+class StopRequest:
+    """Whether SIGINT or SIGTERM has come. Later signals change nothing."""
+
+    __slots__ = ("requested",)
+
+    def __init__(self) -> None:
+        self.requested = False
+
+
+@contextmanager
+def stop_on_signals() -> Iterator[StopRequest]:
+    """Turn SIGINT and SIGTERM into a request to stop; call it in the main thread.
+
+    After a signal both stay ignored for good: the program is on its way out, and a second signal must not cut
+    its exit short. Without one the earlier handlers return.
+    """
+    stop = StopRequest()
+
+    def note(_signal: int, _frame: FrameType | None) -> None:
+        stop.requested = True
+
+    earlier = {number: signal.signal(number, note) for number in _SIGNALS}
+    try:
+        yield stop
+    finally:
+        # Blocked meanwhile: a signal between two of these lines would be reported as lost in a race.
+        signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        for number, handler in earlier.items():
+            signal.signal(number, signal.SIG_IGN if stop.requested else handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
+
+
+def run(make_node: Callable[[], Node], args: Sequence[str] | None = None, parameters: Sequence[Spec] = ()) -> int:
+    """Run one node as a program and return its exit code: 0 after a clean stop, 1 failed, 2 bad input.
+
+    `args` are ROS arguments alone, without the program's name (None: those of the command line); anything else
+    is refused, a forgotten --ros-args for one. --help shows the docstring of `make_node` and `parameters`; both
+    end the program, as argparse does. A ValueError, OSError or rclpy error at start is one line on
+    stderr and code 2; an OSError later, a full disk for one, is one line and code 1. The node ends on SIGINT
+    or SIGTERM or when it sets its attribute `finished`; then its method `close`, if it has one, may publish a
+    last time.
+    """
+    with stop_on_signals() as stop:
+        own, ros = split_ros_arguments(sys.argv[1:] if args is None else args)
+        _parser(make_node, parameters).parse_args(own)
+        try:
+            return _start_and_spin(make_node, ros, stop)
+        finally:
+            try_shutdown()
+
+
+def split_ros_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Split a command line into the program's own arguments and those for ROS.
+
+    >>> split_ros_arguments(["--output", "x", "--ros-args", "-p", "a:=1", "--", "y"])
+    (['--output', 'x', 'y'], ['--ros-args', '-p', 'a:=1', '--'])
+    """
+    own: list[str] = []
+    ros: list[str] = []
+    inside = False
+    for argument in args:
+        inside = inside or argument == "--ros-args"
+        (ros if inside else own).append(argument)
+        inside = inside and argument != "--"
+    return own, ros
+
+
+def _parser(make_node: Callable[[], Node], parameters: Sequence[Spec]) -> argparse.ArgumentParser:
+    described = [f"  {spec.name} (default {spec.default}): {spec.description}; {spec.allowed()}" for spec in parameters]
+    return argparse.ArgumentParser(
+        description=inspect.getdoc(make_node),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        usage="%(prog)s [--help] [--ros-args -p NAME:=VALUE ... --params-file FILE -r FROM:=TO ...]",
+        epilog="\n".join(["parameters:", *described]) if described else None,
+    )
+
+
+def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopRequest) -> int:
+    try:
+        rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
+        node = make_node()
+    except _BAD_START as error:
+        return _complain(error, BAD_INPUT)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        _spin(executor, node, stop)
+        return DONE
+    except OSError as error:
+        return _complain(error, FAILED)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+
+
+def _spin(executor: SingleThreadedExecutor, node: Node, stop: StopRequest) -> None:
+    try:
+        while not stop.requested and not getattr(node, "finished", False):
+            executor.spin_once(timeout_sec=POLL_S)
+    except ExternalShutdownException:  # the node itself shut rclpy down
+        return
+    finally:
+        close = getattr(node, "close", None)
+        if close is not None:
+            close()
+        if ok():
+            _say_goodbye(node)
+
+
+def _say_goodbye(node: Node) -> None:
+    deadline = time.monotonic() + GOODBYE_S
+    for publisher in node.publishers:
+        publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+
+
+def _complain(error: Exception, code: int) -> int:
+    print(" ".join(str(error).split()), file=sys.stderr)
+    return code

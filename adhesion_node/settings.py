@@ -1,0 +1,96 @@
+"""The estimator's settings by name: what its ROS parameters, parameter files and command lines have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, NamedTuple
+
+from .core import Config
+from .core.track import parse_track
+from .core.train import Train
+from .topics import FRAME
+
+
+class Setting(NamedTuple):
+    """A setting: its default's type is its type; `low` and `high` bound a number, `choices` a text."""
+
+    name: str
+    default: bool | int | float | str
+    description: str
+    unit: str
+    low: float
+    high: float
+    choices: tuple[str, ...]
+
+
+def _settings_of(kind: type[Any], prefix: str) -> list[Setting]:
+    defaults = kind()
+    return [
+        Setting(prefix + item.name, getattr(defaults, item.name), **item.metadata)
+        for item in fields(kind)
+        if item.metadata
+    ]
+
+
+TRACK = Setting(
+    "track",
+    "",
+    "Track profile: 'grade START END RISE', 'curve START END RADIUS ANGLE', 'tunnel START END', separated by ';'",
+    "m, degrees",
+    0.0,
+    0.0,
+    (),
+)
+
+SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, ())
+
+FRAME_ID = Setting("frame", FRAME, "frame_id that sensor messages must have", "", 0.0, 0.0, ())
+
+SETTINGS = (SEED, FRAME_ID, *_settings_of(Config, ""), *_settings_of(Train, "train."), TRACK)
+"""All settings of the estimator."""
+
+
+class Setup(NamedTuple):
+    """What an estimator is set up with."""
+
+    config: Config
+    seed: int
+    frame: str
+    """The frame_id that sensor messages must have."""
+
+
+def setup_of(values: Mapping[str, Any]) -> Setup:
+    """Build the set-up from values by setting name; what is not named keeps its default.
+
+    Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
+    """
+    names = {setting.name for setting in SETTINGS}
+    for name in values:
+        if name not in names:
+            raise ValueError(f"setting {name} = {values[name]!r}: there is none; choose of {', '.join(sorted(names))}")
+    train = Train(**{name.removeprefix("train."): value for name, value in values.items() if name.startswith("train.")})
+    own = {item.name for item in fields(Config) if item.metadata}
+    config = Config(
+        train=train,
+        track=parse_track(str(values.get(TRACK.name, TRACK.default)), train.length_m),
+        **{name: value for name, value in values.items() if name in own},
+    )
+    return Setup(config, values.get(SEED.name, SEED.default), values.get(FRAME_ID.name, FRAME_ID.default))
+
+
+def parse_setting(text: str) -> tuple[str, bool | int | float | str]:
+    """Split "NAME=VALUE" and read the value as the setting's type. Raises ValueError naming the setting.
+
+    >>> parse_setting("start_mu=0.12")
+    ('start_mu', 0.12)
+    """
+    name, separator, value = text.partition("=")
+    setting = next((setting for setting in SETTINGS if setting.name == name), None)
+    if setting is None or not separator:
+        raise ValueError(f"setting {text!r}: write NAME=VALUE with one of {', '.join(s.name for s in SETTINGS)}")
+    kind = type(setting.default)
+    try:
+        return name, {"true": True, "false": False}[value.lower()] if kind is bool else kind(value)
+    except (ValueError, KeyError):
+        raise ValueError(f"setting {name} = {value!r}: give a value of type {kind.__name__}") from None
