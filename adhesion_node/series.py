@@ -1,0 +1,51 @@
+"""Series over time out of a recording: what pictures and tables are made from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import reading
+from .bag import BagReader
+from .core.train import Array
+from .topics import Topic
+
+Times = NDArray[np.int64]
+
+
+class Series(NamedTuple):
+    """Values at increasing times; both of shape (n,)."""
+
+    t_ns: Times
+    values: NDArray[Any]
+
+    def at(self, t_ns: Times) -> Array:
+        """Values interpolated at other times; held constant before the first and after the last."""
+        return np.asarray(np.interp(t_ns, self.t_ns, self.values), dtype=np.float64)
+
+
+def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any]) -> Series:
+    """Read `value` of every message of a topic, by its stamp, or by its log time where there is no header.
+
+    Empty when the recording lacks the topic.
+    """
+    rows = [(_time(record.message, record.log_ns), value(record.message)) for record in reader.messages([topic.name])]
+    return Series(np.array([t for t, _ in rows], dtype=np.int64), np.array([v for _, v in rows]))
+
+
+def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
+    """Read the value of `key` in a topic of diagnostics, as texts."""
+    return read_series(reader, topic, lambda message: _status_value(message, key))
+
+
+def _time(message: Any, log_ns: int) -> int:
+    header = getattr(message, "header", None)
+    return log_ns if header is None else reading.stamp_ns(header)
+
+
+def _status_value(message: Any, key: str) -> str:
+    pairs = ((pair.key, pair.value) for status in message.status for pair in status.values)
+    return next((value for name, value in pairs if name == key), "")

@@ -1,0 +1,1 @@
+"""Studies: the papers' figures as commands."""

@@ -1,0 +1,24 @@
+"""`study NAME`: reproduces the figures of the papers."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from ..cli import json_option, run_tool
+from . import distances
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run one study."""
+    parser = argparse.ArgumentParser("study", description="Reproduces the figures of the papers.")
+    studies = parser.add_subparsers(metavar="NAME", required=True)
+    summary = "braking distances and times beside the published ones"
+    studies.add_parser("distances", help=summary, description=distances.__doc__, parents=[json_option()]).set_defaults(
+        run=distances.run
+    )
+    return run_tool(parser, lambda options: int(options.run(options)), args)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
