@@ -39,7 +39,7 @@ class Probe(Node):
         say("starting")
         super().__init__("probe", automatically_declare_parameters_from_overrides=True)
         self.values = declare(self, SPECS)
-        self.words = self.create_publisher(Float64, "last_word", 10)
+        self.words = self.create_publisher(Float64, "last_word", 100)
         self.create_timer(0.001, self.tick)
         self.task = os.environ.get("TASK", "")
 
@@ -51,8 +51,8 @@ class Probe(Node):
             raise OSError(28, "No space left on device")
         if self.task == "finish":
             self.finished = True
-        if self.task == "finish when heard":
-            self.finished = self.words.get_subscription_count() > 0
+        if self.task == "call":
+            self.words.publish(Float64(data=-1.0))
 
     def close(self):
         say("closing")
@@ -148,8 +148,10 @@ def test_the_last_messages_arrive(
         heard.append(message.data)
 
     listener.create_subscription(Float64, "last_word", hear, 100)
-    program = start(TASK="finish when heard")
-    spin_until(executor, lambda: len(heard) == 50, timeout_s=30.0)
+    program = start(TASK="call")
+    spin_until(executor, lambda: heard, timeout_s=30.0)  # both sides know each other
+    program.send_signal(signal.SIGTERM)
+    spin_until(executor, lambda: heard[-50:] == [float(number) for number in range(50)], timeout_s=30.0)
     assert end(program) == (0, [])
 
 
