@@ -163,7 +163,7 @@ def _evaluate(reader: BagReader, seed: int) -> dict[str, Any]:
     """Replay the demo's own recording offline, and sum up what the ATP monitor said."""
     selection = select(reader.topics)
     pipeline, truth = Pipeline(Config(), seed), Truth()
-    predictions = offline.replay(pipeline, truth, offline.messages(reader, selection))
+    replayed = offline.replay(pipeline, truth, offline.messages(reader, selection))
     levels = read_status(reader, ATP_STATUS, "level").values.tolist()
     changes = [level for previous, level in pairwise(["", *levels]) if level != previous]
-    return {**offline.summary(pipeline, predictions, truth), "atp": " > ".join(changes)}
+    return {**offline.summary(pipeline, replayed, truth), "atp": " > ".join(changes)}

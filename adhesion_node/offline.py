@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+import numpy as np
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -36,41 +39,57 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         values[SEED.name] = options.seed
     setup, truth = setup_of(values), Truth()
     pipeline = Pipeline(setup.config, setup.seed)
-    predictions = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.frame)
-    result = summary(pipeline, predictions, truth)
+    replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.frame)
+    result = summary(pipeline, replayed, truth)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
-    return DONE if predictions else FAILED
+    return DONE if replayed.predictions else FAILED
 
 
-def replay(
-    pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, int]], frame: str = FRAME
-) -> list[Prediction]:
+class Replayed(NamedTuple):
+    """Result of a replay."""
+
+    predictions: list[Prediction]
+    window_ms: list[float]
+    """How long each full window took, estimate and curves included."""
+
+
+def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, int]], frame: str = FRAME) -> Replayed:
     """Feed recorded messages to the pipeline, and the simulator's truth to `truth`.
 
     A message comes with our name of its topic and its log time in ns; sensor messages must be in `frame`.
     """
-    predictions = []
+    replayed = Replayed([], [])
     for name, message, log_ns in recorded:
         if name in READERS:
-            try:
-                sample = READERS[name](message, frame)
-            except reading.Rejected as error:
-                pipeline.refuse(error.reason)
-            else:
-                predictions += pipeline.push(sample)
-                if isinstance(sample, PressureSample):
-                    truth.pressure_pa[sample.t_ns] = sample.pressure_pa
+            _take_sample(pipeline, truth, replayed, partial(READERS[name], message, frame))
         elif name == TRUTH_MU.name:
             truth.mu[log_ns] = float(message.data)
         elif name == TRUTH_STATE.name:
             truth.speed_mps[reading.stamp_ns(message.header)] = float(message.twist.twist.linear.x)
-    return predictions + pipeline.finish()
+    replayed.predictions.extend(pipeline.finish())
+    return replayed
 
 
-def summary(pipeline: Pipeline, predictions: list[Prediction], truth: Truth) -> dict[str, Any]:
+def _take_sample(pipeline: Pipeline, truth: Truth, replayed: Replayed, read: Callable[[], Sample]) -> None:
+    try:
+        sample = read()
+    except reading.Rejected as refusal:
+        pipeline.refuse(refusal.reason)
+        return
+    if isinstance(sample, PressureSample):
+        truth.pressure_pa[sample.t_ns] = sample.pressure_pa
+    started = time.perf_counter()
+    predictions = pipeline.push(sample)
+    if any(prediction.estimate.window >= pipeline.config.window for prediction in predictions):
+        replayed.window_ms.append(1e3 * (time.perf_counter() - started))
+    replayed.predictions.extend(predictions)
+
+
+def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, Any]:
     """What a replay reports; without any estimate the final values are None."""
-    last = predictions[-1].estimate if predictions else None
-    result = {
+    estimates = [prediction.estimate for prediction in replayed.predictions]
+    last = estimates[-1] if estimates else None
+    result: dict[str, Any] = {
         "measurements": pipeline.received,
         "accepted": pipeline.accepted,
         "dropped": pipeline.dropped,
@@ -80,8 +99,12 @@ def summary(pipeline: Pipeline, predictions: list[Prediction], truth: Truth) -> 
         "regime_final": last and last.regime.name,
         "digest": pipeline.digest,
     }
-    error = mean_relative_error_percent(pipeline.config, truth, [prediction.estimate for prediction in predictions])
-    return result if error is None else {**result, "mean_relative_error_percent": error}
+    error = mean_relative_error_percent(pipeline.config, truth, estimates)
+    if error is not None:
+        result["mean_relative_error_percent"] = error
+    if replayed.window_ms:
+        result |= {f"ms_per_window_p{p}": float(np.percentile(replayed.window_ms, p)) for p in (50, 99)}
+    return result
 
 
 def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[tuple[str, Any, int]]:
@@ -99,4 +122,12 @@ def _read_parameters(path: str) -> dict[str, Any]:
         raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
     if "estimator" not in nodes and "**" not in nodes:
         raise ValueError(f"params = {path}: has {', '.join(nodes)}: name the node 'estimator' or '/**'")
-    return {**nodes.get("**", {}), **nodes.get("estimator", {})}
+    return {**_flat(nodes.get("**", {})), **_flat(nodes.get("estimator", {}))}
+
+
+def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Parameter names as ROS spells them: `train: {mass_kg: 1}` is `train.mass_kg`."""
+    flat: dict[str, Any] = {}
+    for name, value in values.items():
+        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
+    return flat

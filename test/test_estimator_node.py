@@ -205,7 +205,7 @@ def test_a_missing_brake_pressure_is_said(line: Line) -> None:
 
 def test_a_combination_out_of_range_is_refused_at_start(context: Context) -> None:
     overrides = [Parameter("window", value=5), Parameter("step", value=10)]
-    with pytest.raises(ValueError, match="step = 10: choose at most the window, 5"):
+    with pytest.raises(ValueError, match="step = 10: choose less than the window, 5"):
         Estimator(context=context, parameter_overrides=overrides, namespace="/refused")
 
 

@@ -42,8 +42,8 @@ class Evaluation(NamedTuple):
 def evaluate(config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:
     """Identify mu in the window by EM and filter the state with the result.
 
-    A full window hands on the filtered law at its sample L, which holds nothing of the samples behind it, so the
-    overlap is not counted twice.
+    A full window moves on so far that L more measurements fill it again. The filtered law at its new first sample
+    holds nothing of the samples behind it, so the overlap is not counted twice.
     """
     motion, arrays = config.motion, window_of(window.samples)
     identified = identify(ParticleSmoother(config.particles), motion, window.prior, arrays, search, rng)
@@ -53,6 +53,7 @@ def evaluate(config: Config, window: BrakingWindow, search: Search, rng: np.rand
     spread = filtered.sensitivity * min(std, config.unknown_std)
     law = filtered.laws[-1]
     following = window
-    if len(window.samples) >= config.window:
-        following = BrakingWindow(filtered.laws[config.step - 1], window.samples[config.step :])
+    spent = len(window.samples) - config.window + config.step
+    if spent >= config.step:
+        following = BrakingWindow(filtered.laws[spent - 1], window.samples[spent:])
     return Evaluation(identified, std, kept, Gaussian(law.mean, law.covariance + np.outer(spread, spread)), following)

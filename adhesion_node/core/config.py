@@ -21,7 +21,7 @@ class Config:
     train: Train = CRH3
     track: Track = LEVEL
     window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
-    step: int = setting(10, "Measurements between two windows, L; at most the window", low=1, high=10_000)
+    step: int = setting(10, "Measurements between two windows, L; less than the window", low=1, high=10_000)
     particles: int = setting(20, "Particles, M", low=2, high=100_000)
     iterations: int = setting(50, "EM iterations at most", low=1, high=10_000)
     tolerance: float = setting(1e-7, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
@@ -70,8 +70,8 @@ class Config:
 
     def __post_init__(self) -> None:
         check_settings(self, "")
-        if self.step > self.window:
-            raise ValueError(f"step = {self.step}: choose at most the window, {self.window}")
+        if self.step >= self.window:
+            raise ValueError(f"step = {self.step}: choose less than the window, {self.window}")
 
     @property
     def low_law(self) -> SpeedLaw:

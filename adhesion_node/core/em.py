@@ -150,7 +150,9 @@ def identify(
     while done < search.iterations and moved > search.tolerance:
         expected = smoother(motion, prior, window, mu, rng)
         previous, mu = mu, maximise(expected, search.lowest)
-        moved = abs(mu - previous)
+        # At either end of its range mu stands still for the end's sake, not because EM has arrived.
+        inside = search.lowest < mu < float(np.max(expected.limit))
+        moved = abs(mu - previous) if inside else np.inf
         done += 1
     return Identified(
         mu=mu,

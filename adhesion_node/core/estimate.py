@@ -13,7 +13,7 @@ from .em import Search
 from .gaussian import Gaussian
 from .measurement import Measurement
 from .outcome import Regime
-from .rail import Rail, age, ignorance, learn, learn_bound
+from .rail import Finding, Rail, age, ignorance, learn, learn_bound
 
 LOWEST_NET_ADHESION = -0.05
 """Where the brake pressure is not measured, traction may be at work: the net force may point forward."""
@@ -83,7 +83,7 @@ def estimate(
         lowest=LOWEST_NET_ADHESION if unmeasured else 0.0,
     )
     evaluation = evaluate(config, window, search, np.random.default_rng([seed, knowledge.windows]))
-    regime, rail = _judge(config, evaluation, rail, unmeasured)
+    regime, rail = _judge(config, evaluation, rail, search.start, unmeasured)
     knowledge = knowledge._replace(windows=knowledge.windows + 1, mu=evaluation.identified.mu)
     result = _result(newest, evaluation.law, evaluation.following, knowledge, rail, regime)
     identified = evaluation.identified
@@ -108,12 +108,14 @@ def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowled
     return age(knowledge.rail, nothing, elapsed + travelled)
 
 
-def _judge(config: Config, evaluation: Evaluation, before: Rail, unmeasured: bool) -> tuple[Regime, Rail]:
+def _judge(
+    config: Config, evaluation: Evaluation, before: Rail, start: float, unmeasured: bool
+) -> tuple[Regime, Rail]:
     """What the window shows: no brake, the brake's limit, or the adhesion."""
     mu, std = evaluation.identified.mu, evaluation.std
     if unmeasured and mu <= 2.0 * std:
         return Regime.COASTING, before
-    learnt = learn(before, mu, std, evaluation.kept, float(ndtri(config.confidence)))
+    learnt = learn(before, Finding(mu, std, start, evaluation.kept), float(ndtri(config.confidence)))
     if mu + std < evaluation.identified.limit:
         return Regime.ADHESION_LIMITED, learnt
     return Regime.BRAKE_LIMITED, learn_bound(before, learnt)

@@ -8,7 +8,7 @@ same bits whoever feeds them.
 from __future__ import annotations
 
 import math
-from bisect import insort
+from bisect import bisect_right, insort
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -61,7 +61,8 @@ def step(config: Config, state: State, measurement: Measurement) -> tuple[State,
     """Take one measurement; every `config.step` accepted ones return an estimate.
 
     What became of the measurement stands in `State.outcome` and is counted in `State.counts`. With `max_lag_s`
-    above 0 a measurement waits for late ones to be sorted in, and is judged when its turn comes.
+    above 0 a measurement waits for late ones to be sorted in, and is judged when its turn comes; should several
+    estimates fall due at once, after a gap, the newest is returned.
     """
     newest = _newest(state)
     if not measurement.is_valid():
@@ -69,10 +70,15 @@ def step(config: Config, state: State, measurement: Measurement) -> tuple[State,
     if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
         state = _reset(state)
     pending = list(state.pending)
-    insort(pending, measurement)
-    if pending[-1].t_ns - pending[0].t_ns < config.max_lag_s * 1e9:
-        return replace(state, pending=tuple(pending), outcome=Outcome.ACCEPTED), None
-    return _take(config, replace(state, pending=tuple(pending[1:])), pending[0])
+    insort(pending, measurement, key=lambda waiting: waiting.t_ns)
+    due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)
+    due = bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns)
+    state = replace(state, pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
+    newest_estimate: Estimate | None = None
+    for waiting in pending[:due]:
+        state, estimated = _take(config, state, waiting)
+        newest_estimate = estimated or newest_estimate
+    return state, newest_estimate
 
 
 def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
@@ -149,7 +155,7 @@ def _accept(
     )
     if brake == 0.0 or law.mean[1] < SLOWEST_MPS:
         return _release(config, state)
-    if window is None and tracker.is_settled(law):
+    if window is None and tracker.is_settled(law, measurement.variance_m2 * dt_s):
         state = replace(state, window=BrakingWindow(law, (sample,)))
     return _estimate(config, state) if state.since_estimate >= config.step else (state, None)
 

@@ -89,13 +89,14 @@ def filter_window(motion: Motion, prior: Gaussian, window: Window, mu: float) ->
     for k in range(window.steps):
         dt_s = float(window.dt_s[k])
         position, speed = motion.advance(law.mean[0], law.mean[1], dt_s, float(window.brake[k]), mu)
-        jacobian = motion.jacobian(float(law.mean[1]), dt_s)
+        brake_limits = bool(motion.brake_limit(law.mean[0], law.mean[1], float(window.brake[k])) < mu)
+        jacobian = motion.jacobian(float(law.mean[1]), dt_s, brake_limits)
         sensitivity = jacobian @ sensitivity
-        if motion.brake_limit(law.mean[0], law.mean[1], float(window.brake[k])) >= mu:
+        if not brake_limits:
             sensitivity -= GRAVITY * dt_s * np.array([0.5 * dt_s, 1.0])
         covariance = jacobian @ law.covariance @ jacobian.T + np.diag(np.array(motion.noise(dt_s), dtype=np.float64))
         law = Gaussian(np.array([position, speed]), covariance)
-        for index, value, variance in window.observations(k):
+        for index, value, variance in window.observations[k]:
             information += sensitivity[index] ** 2 / (law.covariance[index, index] + variance)
             sensitivity = sensitivity - law.gain(index, variance) * sensitivity[index]
             law = observe(law, index, value, variance)

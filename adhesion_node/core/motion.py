@@ -50,9 +50,11 @@ class Motion:
         resistance = self.resistance(np.asarray(position_m), np.asarray(speed_mps))
         return np.asarray(self.train.used_adhesion(np.inf, brake, resistance))
 
-    def jacobian(self, speed_mps: float, dt_s: float) -> Array:
+    def jacobian(self, speed_mps: float, dt_s: float, brake_limits: bool) -> Array:
         """Derivative of the step with respect to (s, v), shape (2, 2), the track's profile held fixed."""
         slope = 3.6e-3 * (self.train.resistance_c1 + 2.0 * self.train.resistance_c2 * 3.6 * speed_mps)
+        if brake_limits:  # M (1 + rho) a = B + R
+            slope /= 1.0 + self.train.rotating_mass_fraction
         kept = 1.0 - dt_s * GRAVITY * slope
         return np.array([[1.0, 0.5 * dt_s * (1.0 + kept)], [0.0, kept]])
 

@@ -19,6 +19,6 @@ class Outcome(Enum):
 class Regime(Enum):
     """What limits the motion at present; the value says what that tells of the adhesion."""
 
-    COASTING = "no brake: nothing is learnt of the adhesion"
+    COASTING = "nothing can be learnt of the adhesion: no brake, or too little seen yet"
     BRAKE_LIMITED = "the brake limits: the adhesion is at least what it uses"
     ADHESION_LIMITED = "the adhesion limits: it is identified"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .gaussian import Gaussian
-from .motion import LOG_2PI, Motion, measurement_log_density
+from .motion import Motion, measurement_log_density
 from .train import Array
 from .window import Observation, Window
 
@@ -56,7 +56,6 @@ def particle_filter(
     offsets = rng.random(steps)
     grid = np.arange(count)
     dt, brake = window.dt_s.tolist(), window.brake.tolist()
-    observations = [window.observations(k) for k in range(steps)]
     position[0], speed[0] = prior.draw(count, rng).T
     log_weights[0] = 0.0
     s, v, log_w, ess = position[0], speed[0], log_weights[0], float(count)
@@ -70,13 +69,13 @@ def particle_filter(
             s, v, log_w = s[parents], v[parents], log_weights[0]
         s, v = motion.advance(s, v, dt[k], brake[k], mu)
         s, v = s + jitter_s[k], v + jitter_v[k]
-        log_w = log_w + _relative_log_density(observations[k], s, v)
+        log_w = log_w + _relative_log_density(window.observations[k], s, v)
         relative = np.exp(log_w - log_w.max())
         ess = float(relative.sum()) ** 2 / float(relative @ relative)
         smallest_ess = min(smallest_ess, ess)
         position[k + 1], speed[k + 1], log_weights[k + 1] = s, v, log_w
-    constant = -0.5 * sum(LOG_2PI + math.log(variance) for observed in observations for _, _, variance in observed)
-    return Particles(position, speed, log_weights, log_likelihood + _normalised(log_w)[1] + constant, smallest_ess)
+    log_likelihood += _normalised(log_w)[1] + window.log_constant
+    return Particles(position, speed, log_weights, log_likelihood, smallest_ess)
 
 
 def particle_smoother(motion: Motion, particles: Particles, window: Window, mu: float) -> Smoothed:
@@ -84,10 +83,7 @@ def particle_smoother(motion: Motion, particles: Particles, window: Window, mu: 
 
     The backward kernel is normalised in logarithms, so a step that no particle explains well is still a law.
     """
-    position_error, speed_error = pairwise_errors(motion, particles, window, mu)
-    var_s, var_v = motion.noise(window.dt_s[:, None, None])
-    kernel = position_error**2 * (-0.5 / var_s) + speed_error**2 * (-0.5 / var_v)
-    kernel += particles.log_weights[:-1, :, None]
+    kernel = _log_kernel(motion, particles, window, mu)
     kernel -= kernel.max(axis=1, keepdims=True)
     np.exp(kernel, out=kernel)
     kernel /= kernel.sum(axis=1, keepdims=True)
@@ -96,6 +92,26 @@ def particle_smoother(motion: Motion, particles: Particles, window: Window, mu: 
     for k in range(window.steps - 1, -1, -1):
         marginal[k] = kernel[k] @ marginal[k + 1]
     return Smoothed(marginal, kernel)
+
+
+def _log_kernel(motion: Motion, particles: Particles, window: Window, mu: float) -> Array:
+    """ln w_t^i p(x_t+1^j | x_t^i) up to a term of j, which cancels in the normalisation; shape (K, N, N).
+
+    -(x - m)^2/2q = x m/q - m^2/2q - x^2/2q with m the step of i and x = x_t+1^j: without the last term this is one
+    product of matrices (N, 3) and (3, N). Counted from the middle of the cloud, it keeps all its digits.
+    """
+    position, speed = particles.position_m[1:], particles.speed_mps[1:]
+    middle_s, middle_v = position.mean(axis=1, keepdims=True), speed.mean(axis=1, keepdims=True)
+    step_s, step_v = motion.advance(
+        particles.position_m[:-1], particles.speed_mps[:-1], window.dt_s[:, None], window.brake[:, None], mu
+    )
+    step_s, step_v = step_s - middle_s, step_v - middle_v
+    var_s, var_v = motion.noise(window.dt_s[:, None])
+    scaled_s, scaled_v = step_s / var_s, step_v / var_v
+    own = particles.log_weights[:-1] - 0.5 * (step_s * scaled_s + step_v * scaled_v)
+    before = np.stack([scaled_s, scaled_v, own], axis=2)
+    after = np.stack([position - middle_s, speed - middle_v, np.ones_like(speed)], axis=1)
+    return np.asarray(before @ after, dtype=np.float64)
 
 
 def pairwise_errors(motion: Motion, particles: Particles, window: Window, mu: float) -> tuple[Array, Array]:

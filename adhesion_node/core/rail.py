@@ -51,16 +51,30 @@ def kept_of_start(observed: float, complete: float, iterations: int) -> float:
     return min(max(1.0 - observed / complete, 0.0), 1.0) ** iterations
 
 
-def learn(before: Rail, mu: float, std: float, kept: float, quantile: float) -> Rail:
-    """Knowledge after a window that gave `mu` with `std`, `kept` of it being the start's.
+class Finding(NamedTuple):
+    """What EM found in a window."""
 
-    The errors of overlapping windows go together, so the standard deviations add up linearly.
+    mu: float
+    std: float
+    """Standard deviation from the window alone."""
+    start: float
+    """Where EM started."""
+    kept: float
+    """Share of the start that is still in `mu`."""
+
+
+def learn(before: Rail, finding: Finding, quantile: float) -> Rail:
+    """Knowledge after a window: what EM kept of its start is replaced by what was known before.
+
+    The errors of overlapping windows go together, so the standard deviations add up linearly. `quantile` is that of
+    the lower bound's confidence.
     """
-    return Rail(
-        mu=mu,
-        std=(1.0 - kept) * std + kept * before.std if kept < 1.0 else before.std,
-        lower=max(kept * before.lower + (1.0 - kept) * (mu - quantile * std), 0.0) if kept < 1.0 else before.lower,
-    )
+    kept = finding.kept
+    if kept >= 1.0:  # nothing learnt; the window's standard deviation may be infinite
+        return before
+    mu = max(finding.mu + kept * (before.mu - finding.start), 0.0)
+    lower = kept * before.lower + (1.0 - kept) * (mu - quantile * finding.std)
+    return Rail(mu, (1.0 - kept) * finding.std + kept * before.std, min(max(lower, 0.0), mu))
 
 
 def learn_bound(before: Rail, bound: Rail) -> Rail:

@@ -19,8 +19,8 @@ MET_SPEED_MPS = 50.0
 BRAKED_NOISE_RATE = 1.0
 """(m/s)^2/s: an unknown deceleration of up to about 1 m/s^2, taken as a random walk."""
 
-SETTLED_STD_MPS = 1.0
-"""Standard deviation below which the speed is known well enough to start a window."""
+SETTLED = 1.5
+"""Ratio of the speed's variance to its stationary value at which the tracker counts as settled."""
 
 
 def meet(measurement: Measurement) -> Gaussian:
@@ -48,6 +48,11 @@ def correct(predicted: Gaussian, measurement: Measurement, speed_variance: float
     return law
 
 
-def is_settled(law: Gaussian) -> bool:
-    """Whether the speed is known well enough to start a window."""
-    return law.speed_std <= SETTLED_STD_MPS
+def is_settled(law: Gaussian, measured_rate: float) -> bool:
+    """Whether the speed is known about as well as the tracker can know it under the brake.
+
+    `measured_rate` is a position's variance times the time between two, m^2 s. With it and the noise rate q, the
+    stationary variance of the speed is sqrt(2) q^(3/4) rate^(1/4), the Riccati equation's solution.
+    """
+    stationary = math.sqrt(2.0) * BRAKED_NOISE_RATE**0.75 * measured_rate**0.25
+    return bool(law.covariance[1, 1] <= SETTLED * stationary)

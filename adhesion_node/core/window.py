@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -25,7 +28,8 @@ Observation = tuple[int, float, float]
 """Index of the observed state (0 position, 1 speed), value and variance."""
 
 
-class Window(NamedTuple):
+@dataclass(frozen=True)
+class Window:
     """K steps and the measurement at the end of each; every array has shape (K,)."""
 
     dt_s: Array
@@ -42,12 +46,26 @@ class Window(NamedTuple):
         """Number of steps K."""
         return int(self.dt_s.size)
 
-    def observations(self, k: int) -> list[Observation]:
-        """What was measured at the end of step `k`: the position, and the speed where there is one."""
-        observed = [(0, float(self.position_m[k]), float(self.variance_m2[k]))]
-        if np.isfinite(self.speed_variance[k]):
-            observed.append((1, float(self.speed_mps[k]), float(self.speed_variance[k])))
-        return observed
+    @cached_property
+    def observations(self) -> list[list[Observation]]:
+        """What was measured at the end of each step: the position, and the speed where there is one."""
+        observed = [
+            [(0, s, r), (1, v, q)]
+            for s, r, v, q in zip(
+                *(
+                    column.tolist()
+                    for column in (self.position_m, self.variance_m2, self.speed_mps, self.speed_variance)
+                ),
+                strict=True,
+            )
+        ]
+        return [[item for item in items if math.isfinite(item[2])] for items in observed]
+
+    @cached_property
+    def log_constant(self) -> float:
+        """The part of ln p(y|x), summed over the window, that does not depend on x."""
+        variances = [variance for observed in self.observations for _, _, variance in observed]
+        return -0.5 * sum(math.log(2.0 * math.pi * variance) for variance in variances)
 
 
 def window_of(samples: Sequence[Sample]) -> Window:
