@@ -24,7 +24,7 @@ from rclpy.signals import SignalHandlerOptions
 from sim_node.node import Simulator
 from sim_node.scenario import SCENARIOS
 
-from . import offline, picture
+from . import offline
 from .bag import BagReader, select
 from .cli import DONE, FAILED, json_option, report, run_tool
 from .core import Config, Estimate
@@ -32,9 +32,12 @@ from .core.train import KMH
 from .nodes.atp_monitor import AtpMonitor
 from .nodes.estimator import Estimator
 from .nodes.recorder import Recorder
+from .picture import draw
 from .pipeline import Pipeline
+from .recorded_run import read_run
 from .score import Truth
 from .series import read_status
+from .table import table
 from .topics import ATP_STATUS, POSITION
 
 PATIENCE_S = 10.0
@@ -61,14 +64,30 @@ def _demo(options: argparse.Namespace) -> int:
     started = time.monotonic()
     digest = _play(options.scenario, output / "bag", options.seed)
     with BagReader(output / "bag") as reader:
-        result = _evaluate(reader, options.seed)
-        end_kmh = (SCENARIOS[options.scenario].end_speed_mps or 0.0) / KMH
-        picture.draw(picture.read_run(reader), output / "run.png", f"{options.scenario}, seed {options.seed}", end_kmh)
+        result, run = _evaluate(reader, options.seed), read_run(reader)
+    target_kmh = _target_kmh(options.scenario)
+    draw(run, output / "run.png", f"{options.scenario}, seed {options.seed}", target_kmh)
     result |= {"live_digest": digest, "live_equals_offline": digest == result["digest"]}
     result |= {"bag": str(output / "bag"), "picture": str(output / "run.png")}
     result["seconds"] = round(time.monotonic() - started, 1)
-    report(options.json, result, "\n".join(["", *(f"{name:<28} {value}" for name, value in result.items())]))
+    report(options.json, result, "\n".join(["", table(run, target_kmh), "", *_said(result)]))
     return DONE if result["live_equals_offline"] else FAILED
+
+
+def _said(result: dict[str, Any]) -> Iterator[str]:
+    """The result in words."""
+    if "mean_relative_error_percent" in result:
+        yield f"mean relative error while adhesion limits: {result['mean_relative_error_percent']:.2f} %"
+    if "ms_per_window_p50" in result:
+        yield f"a full window takes {result['ms_per_window_p50']:.0f} ms (median of {result['windows']} windows)"
+    same = "gives the same numbers to the last bit" if result["live_equals_offline"] else "GIVES OTHER NUMBERS"
+    yield f"an offline replay of the recording {same} (digest {result['digest'][:16]}...)"
+    yield f"ATP monitor: {result['atp']}"
+    yield f"recording: {result['bag']}    picture: {result['picture']}    ({result['seconds']} s)"
+
+
+def _target_kmh(scenario: str) -> float:
+    return (SCENARIOS[scenario].end_speed_mps or 0.0) / KMH
 
 
 def _free(wanted: Path) -> Path:
@@ -79,7 +98,6 @@ def _free(wanted: Path) -> Path:
 
 def _play(scenario: str, bag: Path, seed: int) -> str:
     """Run the nodes until the scenario ends; the digest of what the estimator published."""
-    target_kmh = (SCENARIOS[scenario].end_speed_mps or 0.0) / KMH
     with _executor() as executor:
         common: dict[str, Any] = {"context": executor.context}
         simulated = [Parameter("use_sim_time", value=True)]
@@ -89,7 +107,7 @@ def _play(scenario: str, bag: Path, seed: int) -> str:
             parameter_overrides=[
                 *simulated,
                 Parameter("target_position_m", value=6000.0),
-                Parameter("target_speed_kmh", value=target_kmh),
+                Parameter("target_speed_kmh", value=_target_kmh(scenario)),
             ],
             **common,
         )
@@ -113,7 +131,8 @@ def _play(scenario: str, bag: Path, seed: int) -> str:
 def _executor() -> Iterator[SingleThreadedExecutor]:
     """An executor in a context of its own; its nodes are destroyed at the end."""
     context = rclpy.Context()
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    quiet = ["--ros-args", "--log-level", "error"]
+    rclpy.init(args=quiet, context=context, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor(context=context)
     try:
         yield executor

@@ -3,54 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from .bag import BagReader
-from .core import braking
 from .core.train import CRH3, KMH, Array, Train
 from .reading import ATMOSPHERE_PA
-from .series import Series, read_series, read_status
-from .topics import BRAKE_PRESSURE, DIAGNOSTICS, MU, MU_LOWER, STATE, TRUTH_MU, TRUTH_STATE
-
-FIXED_MU = 0.0726
-"""The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""
+from .recorded_run import FIXED_MU, Run, distance_to_target
+from .series import Series
 
 SHADES = {"COASTING": "0.93", "BRAKE_LIMITED": "#dbe9f6", "ADHESION_LIMITED": "#fdebd0"}
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0b5fa5", "#c75b00", "0.45"
-
-
-class Run(NamedTuple):
-    """The series of a recording that the picture shows."""
-
-    true_mu: Series
-    true_speed: Series
-    pressure: Series
-    """Absolute, Pa."""
-    mu: Series
-    mu_lower: Series
-    speed: Series
-    regime: Series
-
-
-def read_run(reader: BagReader) -> Run:
-    """Read the series. Raises ValueError when the recording holds no estimates."""
-    run = Run(
-        true_mu=read_series(reader, TRUTH_MU, lambda message: message.data),
-        true_speed=read_series(reader, TRUTH_STATE, lambda message: message.twist.twist.linear.x),
-        pressure=read_series(reader, BRAKE_PRESSURE, lambda message: message.fluid_pressure),
-        mu=read_series(reader, MU, lambda message: message.data),
-        mu_lower=read_series(reader, MU_LOWER, lambda message: message.data),
-        speed=read_series(reader, STATE, lambda message: message.twist.twist.linear.x),
-        regime=read_status(reader, DIAGNOSTICS, "regime"),
-    )
-    if not run.mu.t_ns.size or not run.speed.t_ns.size:
-        raise ValueError(f"bag = {reader.path}: holds no {MU.name}: record while the estimator runs")
-    return run
 
 
 def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH3) -> None:
@@ -75,17 +41,6 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
     shades = [Patch(color=color) for color in SHADES.values()]
     figure.legend(shades, names, loc="outside lower center", ncols=len(names), title="what limits the motion")
     figure.savefig(path, dpi=110)
-
-
-def distance_to_target(run: Run, mu: Array | float, target_mps: float, train: Train) -> Array:
-    """Braking distance, m, from the speed at each estimate to the target speed with adhesion `mu`; 0 below it."""
-    speeds = run.speed.values
-    return np.array(
-        [
-            float(braking.curve(train, float(speed), float(value), min(target_mps, float(speed))).distance_m[-1])
-            for speed, value in zip(speeds, np.broadcast_to(mu, speeds.shape), strict=True)
-        ]
-    )
 
 
 def _seconds(t_ns: Any, origin_ns: int) -> Array:

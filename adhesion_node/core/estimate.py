@@ -108,9 +108,7 @@ def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowled
     return age(knowledge.rail, nothing, elapsed + travelled)
 
 
-def _judge(
-    config: Config, evaluation: Evaluation, before: Rail, start: float, unmeasured: bool
-) -> tuple[Regime, Rail]:
+def _judge(config: Config, evaluation: Evaluation, before: Rail, start: float, unmeasured: bool) -> tuple[Regime, Rail]:
     """What the window shows: no brake, the brake's limit, or the adhesion."""
     mu, std = evaluation.identified.mu, evaluation.std
     if unmeasured and mu <= 2.0 * std:
