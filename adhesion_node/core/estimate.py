@@ -60,7 +60,9 @@ class Result(NamedTuple):
     estimate: Estimate
     knowledge: Knowledge
     law: Gaussian
+    """Of (s, v) at the estimate; the window's where there is one."""
     window: BrakingWindow | None
+    """To go on with."""
 
 
 def estimate(

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from . import tracker
 from .braking_window import BrakingWindow
 from .config import Config
-from .estimate import Estimate, Knowledge, estimate
+from .estimate import Estimate, Knowledge, Result, estimate
 from .gaussian import Gaussian
 from .measurement import Measurement
 from .outcome import Outcome
@@ -89,8 +89,8 @@ def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
         state, result = _take(config, state, measurement)
         estimates += [] if result is None else [result]
     if state.newest is not None and state.since_estimate:
-        state, result = _estimate(config, state)
-        estimates.append(result)
+        state, last = _estimate(config, state)
+        estimates.append(last.estimate)
     return state, tuple(estimates)
 
 
@@ -157,7 +157,10 @@ def _accept(
         return _release(config, state)
     if window is None and tracker.is_settled(law, measurement.variance_m2 * dt_s):
         state = replace(state, window=BrakingWindow(law, (sample,)))
-    return _estimate(config, state) if state.since_estimate >= config.step else (state, None)
+    if state.since_estimate < config.step:
+        return state, None
+    state, result = _estimate(config, state)
+    return state, result.estimate
 
 
 def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
@@ -165,15 +168,14 @@ def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
     if state.window is None and state.since_estimate < config.step:
         return state, None
     state, result = _estimate(config, state)
-    return replace(state, window=None), result
+    return replace(state, window=None, law=result.law), result.estimate
 
 
-def _estimate(config: Config, state: State) -> tuple[State, Estimate]:
+def _estimate(config: Config, state: State) -> tuple[State, Result]:
     assert state.newest is not None  # an estimate follows an accepted measurement
     assert state.law is not None
     result = estimate(config, state.seed, state.newest, state.law, state.window, state.knowledge)
-    state = replace(state, window=result.window, knowledge=result.knowledge, since_estimate=0)
-    return state, result.estimate
+    return replace(state, window=result.window, knowledge=result.knowledge, since_estimate=0), result
 
 
 def _speed_variance(config: Config, measurement: Measurement) -> float:
