@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -61,7 +60,12 @@ def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, 
     replayed = Replayed([], [])
     for name, message, log_ns in recorded:
         if name in READERS:
-            _take_sample(pipeline, truth, replayed, partial(READERS[name], message, frame))
+            try:
+                sample = READERS[name](message, frame)
+            except reading.Rejected as refusal:
+                pipeline.refuse(name, refusal.reason)
+            else:
+                _take_sample(pipeline, truth, replayed, sample)
         elif name == TRUTH_MU.name:
             truth.mu[log_ns] = float(message.data)
         elif name == TRUTH_STATE.name:
@@ -70,12 +74,7 @@ def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, 
     return replayed
 
 
-def _take_sample(pipeline: Pipeline, truth: Truth, replayed: Replayed, read: Callable[[], Sample]) -> None:
-    try:
-        sample = read()
-    except reading.Rejected as refusal:
-        pipeline.refuse(refusal.reason)
-        return
+def _take_sample(pipeline: Pipeline, truth: Truth, replayed: Replayed, sample: Sample) -> None:
     if isinstance(sample, PressureSample):
         truth.pressure_pa[sample.t_ns] = sample.pressure_pa
     started = time.perf_counter()
@@ -90,7 +89,7 @@ def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, A
     estimates = [prediction.estimate for prediction in replayed.predictions]
     last = estimates[-1] if estimates else None
     result: dict[str, Any] = {
-        "measurements": pipeline.received,
+        "measurements": pipeline.measurements,
         "accepted": pipeline.accepted,
         "dropped": pipeline.dropped,
         "windows": pipeline.windows,

@@ -8,9 +8,10 @@ from collections import Counter
 from collections.abc import Iterable
 
 from .core import Config, Estimate, Measurement, Outcome, finish, init, step
-from .core.align import Aligner, Sample
+from .core.align import Aligner, PositionSample, Sample
 from .core.braking import BrakingCurve
 from .core.prediction import Prediction, predict
+from .topics import POSITION
 
 
 class Pipeline:
@@ -22,6 +23,8 @@ class Pipeline:
     def __init__(self, config: Config, seed: int) -> None:
         self.config = config
         self.state = init(config, seed)
+        self.measurements = 0
+        """Positions received, whatever became of them."""
         self.refused: Counter[str] = Counter()
         self.windows = 0
         self.last: Estimate | None = None
@@ -30,10 +33,12 @@ class Pipeline:
 
     def push(self, sample: Sample) -> list[Prediction]:
         """Take one sample of any stream and return what it completes."""
+        self.measurements += isinstance(sample, PositionSample)
         return self._run(self._aligner.push(sample))
 
-    def refuse(self, reason: str) -> None:
-        """Count a message that never became a sample."""
+    def refuse(self, topic: str, reason: str) -> None:
+        """Count a message of a topic that never became a sample."""
+        self.measurements += topic == POSITION.name
         self.refused[reason] += 1
 
     def finish(self) -> list[Prediction]:
@@ -43,18 +48,13 @@ class Pipeline:
         return predictions + self._published(estimates)
 
     @property
-    def received(self) -> int:
-        """Position measurements so far, whatever became of them."""
-        return self.accepted + sum(self.dropped.values()) + len(self.state.pending)
-
-    @property
     def accepted(self) -> int:
         """Measurements that the estimator used."""
         return self.state.counts[Outcome.ACCEPTED]
 
     @property
     def dropped(self) -> dict[str, int]:
-        """Numbers of messages that were not used, by reason; reasons that did not occur are left out."""
+        """Numbers of messages of any sensor that were not used, by reason; only reasons that occurred."""
         drops = (Outcome.LATE, Outcome.DUPLICATE, Outcome.INVALID, Outcome.OUTLIER)
         counts = self.refused + Counter({outcome.name: self.state.counts[outcome] for outcome in drops})
         return {reason: count for reason, count in sorted(counts.items()) if count}

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from oracles import specific_resistance
 
 from adhesion_node.core.adhesion import WET, AdhesionLaw
 from adhesion_node.core.braking import BrakingCurve, curve, distance_to
 from adhesion_node.core.train import CRH3, KMH, Train
-from oracles import specific_resistance
 
 FREE = Train(resistance_c0=0.0, resistance_c1=0.0, resistance_c2=0.0)
 """CRH3 without running resistance."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -87,7 +88,7 @@ def test_rotating_masses_leave_no_step_at_the_kink() -> None:
         ({"wheel_radius_m": "big"}, r"train\.wheel_radius_m = 'big': give a value of type float"),
     ],
 )
-def test_refuses_a_constant_out_of_range(changes: dict[str, float], message: str) -> None:
+def test_refuses_a_constant_out_of_range(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         replace(CRH3, **changes)
 

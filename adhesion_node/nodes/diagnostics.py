@@ -38,7 +38,7 @@ def _judgement(pipeline: Pipeline, refusal: str) -> tuple[bytes, str]:
 def _values(pipeline: Pipeline) -> dict[str, str]:
     drops = {f"dropped.{reason}": str(count) for reason, count in pipeline.dropped.items()}
     counts = {
-        "measurements": str(pipeline.received),
+        "measurements": str(pipeline.measurements),
         "accepted": str(pipeline.accepted),
         "resets": str(pipeline.state.counts[Outcome.RESET]),
         "windows": str(pipeline.windows),

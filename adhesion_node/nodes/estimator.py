@@ -96,7 +96,7 @@ class Estimator(Node):
         """Evaluate the last, short window and publish it."""
         self._publish(self._pipeline.finish())
         self.get_logger().info(
-            f"{self._pipeline.accepted} measurements, {self._pipeline.windows} windows, "
+            f"{self._pipeline.measurements} measurements, {self._pipeline.windows} windows, "
             f"dropped {self._pipeline.dropped or 'none'}, digest {self.digest}"
         )
 
@@ -115,7 +115,7 @@ class Estimator(Node):
 
     def _refuse(self, topic: topics.Topic, refusal: reading.Rejected) -> None:
         """Count a refused message; the first of its kind and then every tenth reach the operator."""
-        self._pipeline.refuse(refusal.reason)
+        self._pipeline.refuse(topic.name, refusal.reason)
         count = self._pipeline.refused[refusal.reason]
         if count % self._pipeline.config.step == 1:
             self.get_logger().warning(f"{topic.name}: {refusal} ({count} so far)")
