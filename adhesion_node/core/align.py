@@ -8,7 +8,7 @@ stamps decide, never the clock: a live node and an offline replay pair alike.
 from __future__ import annotations
 
 from bisect import bisect_right, insort
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from .measurement import Measurement
 
@@ -37,8 +37,10 @@ class SpeedSample(NamedTuple):
 
 Sample = PositionSample | PressureSample | SpeedSample
 
+Timed = TypeVar("Timed", PressureSample, SpeedSample)
+
 HORIZON_NS = 60_000_000_000
-"""Samples further than this from the newest position belong to another time (a clock step) or are spent."""
+"""Samples further apart than this belong to different times: the older ones are spent, or the clock has jumped."""
 
 
 class Aligner:
@@ -56,12 +58,13 @@ class Aligner:
         """Take one sample; return the measurements that are complete now, in the order of their arrival."""
         before: list[Measurement] = []
         if isinstance(sample, PressureSample):
-            insort(self._pressures, sample)
+            _insert(self._pressures, sample)
         elif isinstance(sample, SpeedSample):
-            insort(self._speeds, sample)
+            _insert(self._speeds, sample)
         else:
             if self._newest_ns is not None and abs(sample.t_ns - self._newest_ns) > HORIZON_NS:
-                before, self._newest_ns = self.flush(), None
+                before = self.flush()
+                self._start_anew(sample.t_ns)
             self._newest_ns = sample.t_ns if self._newest_ns is None else max(self._newest_ns, sample.t_ns)
             self._positions.append(sample)
         return before + self._release()
@@ -73,7 +76,6 @@ class Aligner:
     def _release(self) -> list[Measurement]:
         if self._newest_ns is None:
             return []
-        self._forget(self._newest_ns)
         known_until = max(self._pressures[-1].t_ns if self._pressures else 0, self._newest_ns - self._max_wait_ns)
         ready = 0
         while ready < len(self._positions) and self._positions[ready].t_ns <= known_until:
@@ -96,9 +98,17 @@ class Aligner:
             return None
         return self._speeds.pop(newest).speed_mps  # one observation: it must not count twice
 
-    def _forget(self, newest_ns: int) -> None:
-        for samples in (self._pressures, self._speeds):
-            while samples and abs(samples[0].t_ns - newest_ns) > HORIZON_NS:
-                samples.pop(0)
-            while samples and abs(samples[-1].t_ns - newest_ns) > HORIZON_NS:
-                samples.pop()
+    def _start_anew(self, t_ns: int) -> None:
+        """Keep of pressures and speeds only those of the new time, which may have come before its first position."""
+        self._newest_ns = None
+        self._pressures = [sample for sample in self._pressures if abs(sample.t_ns - t_ns) <= HORIZON_NS]
+        self._speeds = [sample for sample in self._speeds if abs(sample.t_ns - t_ns) <= HORIZON_NS]
+
+
+def _insert(samples: list[Timed], sample: Timed) -> None:
+    """Insert in order of stamps; drop what is spent, or everything when the stamps have jumped."""
+    if samples and abs(sample.t_ns - samples[-1].t_ns) > HORIZON_NS:
+        samples.clear()
+    insort(samples, sample)
+    while samples[-1].t_ns - samples[0].t_ns > HORIZON_NS:
+        samples.pop(0)

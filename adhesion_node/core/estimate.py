@@ -18,6 +18,9 @@ from .rail import Finding, Rail, age, ignorance, learn, learn_bound
 LOWEST_NET_ADHESION = -0.05
 """Where the brake pressure is not measured, traction may be at work: the net force may point forward."""
 
+UNDECIDED = 0.5
+"""Share of the EM's start in its result above which a window has seen too little to tell what limits the motion."""
+
 
 class Estimate(NamedTuple):
     """What is known at `t_ns`, the time of the newest measurement."""
@@ -112,12 +115,15 @@ def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowled
 
 def _judge(config: Config, evaluation: Evaluation, before: Rail, start: float, unmeasured: bool) -> tuple[Regime, Rail]:
     """What the window shows: no brake, the brake's limit, or the adhesion."""
-    mu, std = evaluation.identified.mu, evaluation.std
-    if unmeasured and mu <= 2.0 * std:
+    limit = evaluation.identified.limit
+    finding = Finding(evaluation.identified.mu, evaluation.std, min(start, limit), evaluation.kept)
+    learnt = learn(before, finding, float(ndtri(config.confidence)))
+    if unmeasured and learnt.mu <= 2.0 * learnt.std:
         return Regime.COASTING, before
-    learnt = learn(before, Finding(mu, std, start, evaluation.kept), float(ndtri(config.confidence)))
-    if mu + std < evaluation.identified.limit:
+    if learnt.mu + learnt.std < limit:
         return Regime.ADHESION_LIMITED, learnt
+    if finding.kept > UNDECIDED:
+        return Regime.COASTING, learnt
     return Regime.BRAKE_LIMITED, learn_bound(before, learnt)
 
 
