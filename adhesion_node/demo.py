@@ -18,6 +18,7 @@ from typing import Any
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import LoggingSeverity, set_logger_level
 from rclpy.parameter import Parameter
 from rclpy.signals import SignalHandlerOptions
 
@@ -43,6 +44,9 @@ from .topics import ATP_STATUS, POSITION
 PATIENCE_S = 10.0
 """Longest wait for a message between two nodes of the process."""
 
+NODES = ("recorder", "estimator", "atp_monitor", "simulator")
+"""Their errors are shown, the rest of their log is not: the demo says itself how far it is."""
+
 SHOWN_EVERY_S = 5.0
 """Simulated time between two lines of progress."""
 
@@ -60,7 +64,6 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _demo(options: argparse.Namespace) -> int:
     output = _free(options.output)
-    output.mkdir(parents=True)
     started = time.monotonic()
     digest = _play(options.scenario, output / "bag", options.seed)
     with BagReader(output / "bag") as reader:
@@ -100,6 +103,9 @@ def _play(scenario: str, bag: Path, seed: int) -> str:
     """Run the nodes until the scenario ends; the digest of what the estimator published."""
     with _executor() as executor:
         common: dict[str, Any] = {"context": executor.context}
+        settings = [Parameter("scenario", value=scenario), Parameter("seed", value=seed)]
+        # First: a bad seed ends here, before anything is written.
+        simulator = Simulator(paced=False, parameter_overrides=settings, **common)
         simulated = [Parameter("use_sim_time", value=True)]
         recorder = Recorder(bag, parameter_overrides=simulated, **common)
         estimator = Estimator(parameter_overrides=[*simulated, Parameter("seed", value=seed)], **common)
@@ -111,8 +117,6 @@ def _play(scenario: str, bag: Path, seed: int) -> str:
             ],
             **common,
         )
-        settings = [Parameter("scenario", value=scenario), Parameter("seed", value=seed)]
-        simulator = Simulator(paced=False, parameter_overrides=settings, **common)
         for node in (recorder, estimator, monitor, simulator):
             executor.add_node(node)
         progress = _Progress()
@@ -131,12 +135,15 @@ def _play(scenario: str, bag: Path, seed: int) -> str:
 def _executor() -> Iterator[SingleThreadedExecutor]:
     """An executor in a context of its own; its nodes are destroyed at the end."""
     context = rclpy.Context()
-    quiet = ["--ros-args", "--log-level", "error"]
-    rclpy.init(args=quiet, context=context, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
     executor = SingleThreadedExecutor(context=context)
+    for name in NODES:
+        set_logger_level(name, LoggingSeverity.ERROR)
     try:
         yield executor
     finally:
+        for name in NODES:
+            set_logger_level(name, LoggingSeverity.UNSET)
         nodes = list(executor.get_nodes())
         executor.shutdown()
         for node in nodes:

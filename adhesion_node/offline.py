@@ -29,6 +29,9 @@ READERS: dict[str, Callable[[Any, str], Sample]] = {
 }
 """How the messages of a sensor topic become samples."""
 
+OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides.")
+"""Parameters that ROS itself gives to every node: they may stand in a parameter file and mean nothing here."""
+
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
@@ -116,12 +119,13 @@ def _read_parameters(path: str) -> dict[str, Any]:
     """Settings of the estimator in a ROS parameter file; ValueError when it is unreadable or not for the estimator."""
     try:
         document = YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))
-        nodes = {name.strip("/"): content["ros__parameters"] for name, content in document.items()}
+        nodes = {name.strip("/"): _flat(content["ros__parameters"]) for name, content in document.items()}
     except (OSError, UnicodeDecodeError, YAMLError, AttributeError, LookupError, TypeError) as error:
         raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
     if "estimator" not in nodes and "**" not in nodes:
         raise ValueError(f"params = {path}: has {', '.join(nodes)}: name the node 'estimator' or '/**'")
-    return {**_flat(nodes.get("**", {})), **_flat(nodes.get("estimator", {}))}
+    given = {**nodes.get("**", {}), **nodes.get("estimator", {})}
+    return {name: value for name, value in given.items() if not name.startswith(OF_EVERY_NODE)}
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -90,10 +90,14 @@ def _bytes(prediction: Prediction) -> bytes:
         *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, e.position_std_m, e.speed_std_mps),
         *(e.log_likelihood, e.ess),
     )
-    curves = [column for curve in (prediction.safe, prediction.nominal) if curve for column in _columns(curve)]
-    return b"".join([whole, e.regime.name.encode(), real, *curves])
+    return b"".join(
+        [whole, e.regime.name.encode(), real, _curve_bytes(prediction.safe), _curve_bytes(prediction.nominal)]
+    )
 
 
-def _columns(curve: BrakingCurve) -> list[bytes]:
+def _curve_bytes(curve: BrakingCurve | None) -> bytes:
+    """The columns of a curve behind its number of points: 0 for none, so that it shows which one is missing."""
+    if curve is None:
+        return struct.pack("<q", 0)
     columns = (curve.distance_m, curve.speed_mps, curve.deceleration_mps2, curve.time_s)
-    return [column.astype("<f8").tobytes() for column in columns]
+    return struct.pack("<q", curve.speed_mps.size) + b"".join(column.astype("<f8").tobytes() for column in columns)

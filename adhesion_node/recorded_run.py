@@ -42,8 +42,9 @@ def read_run(reader: BagReader) -> Run:
         speed=read_series(reader, STATE, lambda message: message.twist.twist.linear.x),
         regime=read_status(reader, DIAGNOSTICS, "regime"),
     )
-    if not run.mu.t_ns.size or not run.speed.t_ns.size:
-        raise ValueError(f"bag = {reader.path}: holds no {MU.name}: record while the estimator runs")
+    for topic, series in ((MU, run.mu), (MU_LOWER, run.mu_lower), (STATE, run.speed)):
+        if not series.t_ns.size:
+            raise ValueError(f"bag = {reader.path}: holds no {topic.name}: record while the estimator runs")
     return run
 
 

@@ -24,8 +24,11 @@ class Truth:
 
     def limits(self, config: Config, t_ns: int) -> bool:
         """Whether the true adhesion, not the brake, limited the train at a time."""
-        mu, pressure = self.mu.get(t_ns), self.pressure_pa.get(t_ns)
-        return mu is not None and pressure is not None and mu < config.brake(pressure)
+        mu, speed, pressure = self.mu.get(t_ns), self.speed_mps.get(t_ns), self.pressure_pa.get(t_ns)
+        if mu is None or speed is None or pressure is None:
+            return False
+        resistance = config.train.specific_resistance(np.asarray(speed))
+        return bool(config.train.used_adhesion(mu, config.brake(pressure), resistance) == mu)
 
     def converged_speed(self, config: Config) -> float:
         """Speed, m/s, below which estimates count: that of the first braking less 30 km/h."""

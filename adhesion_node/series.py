@@ -33,6 +33,7 @@ def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any]) ->
     Empty when the recording lacks the topic.
     """
     rows = [(_time(record.message, record.log_ns), value(record.message)) for record in reader.messages([topic.name])]
+    rows.sort(key=lambda row: row[0])  # stamps may come late; log times do not tell
     return Series(np.array([t for t, _ in rows], dtype=np.int64), np.array([v for _, v in rows]))
 
 

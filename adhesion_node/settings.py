@@ -7,6 +7,7 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from .core import Config
+from .core.setting import check_value
 from .core.track import parse_track
 from .core.train import Train
 from .topics import FRAME
@@ -69,11 +70,13 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     for name in values:
         if name not in names:
             raise ValueError(f"setting {name} = {values[name]!r}: there is none; choose of {', '.join(sorted(names))}")
+    for setting in (SEED, FRAME_ID, TRACK):
+        check_value(setting.name, values.get(setting.name, setting.default), type(setting.default), setting._asdict())
     train = Train(**{name.removeprefix("train."): value for name, value in values.items() if name.startswith("train.")})
     own = {item.name for item in fields(Config) if item.metadata}
     config = Config(
         train=train,
-        track=parse_track(str(values.get(TRACK.name, TRACK.default)), train.length_m),
+        track=parse_track(values.get(TRACK.name, ""), train.length_m),
         **{name: value for name, value in values.items() if name in own},
     )
     return Setup(config, values.get(SEED.name, SEED.default), values.get(FRAME_ID.name, FRAME_ID.default))

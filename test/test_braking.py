@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from oracles import specific_resistance
+from scipy.integrate import quad
 
 from adhesion_node.core.adhesion import WET, AdhesionLaw
 from adhesion_node.core.braking import BrakingCurve, curve, distance_to
@@ -74,6 +75,17 @@ def test_agrees_with_an_integration_in_time(grade: float) -> None:
     braking = curve(CRH3, 300 * KMH, WET, 100 * KMH, grade)
     assert braking.distance_m[-1] == pytest.approx(s, rel=1e-4)
     assert braking.time_s[-1] == pytest.approx(t, rel=1e-4)
+
+
+def test_is_an_exact_quadrature_away_from_the_kink() -> None:
+    def slowing(speed: float) -> float:
+        return 9.8 * (0.04 + 13.7 / (120.0 + 3.6 * speed) + float(specific_resistance(np.array(speed))))
+
+    braking = curve(CRH3, 83.0, WET, 40.0)  # the brake limits below 35.6 m/s
+    distance, _ = quad(lambda v: v / slowing(v), 40.0, 83.0, epsabs=0.0, epsrel=1e-13)
+    time, _ = quad(lambda v: 1.0 / slowing(v), 40.0, 83.0, epsabs=0.0, epsrel=1e-13)
+    assert braking.distance_m[-1] == pytest.approx(distance, rel=1e-11)
+    assert braking.time_s[-1] == pytest.approx(time, rel=1e-11)
 
 
 def test_runs_monotonely_from_here_and_now_to_the_target() -> None:

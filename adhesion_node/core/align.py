@@ -76,7 +76,9 @@ class Aligner:
     def _release(self) -> list[Measurement]:
         if self._newest_ns is None:
             return []
-        known_until = max(self._pressures[-1].t_ns if self._pressures else 0, self._newest_ns - self._max_wait_ns)
+        known_until = self._newest_ns - self._max_wait_ns
+        if self._pressures:
+            known_until = max(known_until, self._pressures[-1].t_ns)
         ready = 0
         while ready < len(self._positions) and self._positions[ready].t_ns <= known_until:
             ready += 1

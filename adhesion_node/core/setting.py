@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import field, fields
 from typing import Any
 
@@ -24,10 +25,11 @@ def check_settings(instance: Any, what: str) -> None:
     """Check every setting of a dataclass instance; ValueError names `what`, the setting, its value and the remedy."""
     for item in fields(instance):
         if item.metadata:
-            _check(f"{what}{item.name}", getattr(instance, item.name), type(item.default), item.metadata)
+            check_value(f"{what}{item.name}", getattr(instance, item.name), type(item.default), item.metadata)
 
 
-def _check(name: str, value: Any, kind: type, rule: Any) -> None:
+def check_value(name: str, value: Any, kind: type, rule: Mapping[str, Any]) -> None:
+    """Check one value against its type and its rule, the metadata of a setting; ValueError as above."""
     accepted = (int, float) if kind is float else kind
     if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
         raise ValueError(f"{name} = {value!r}: give a value of type {kind.__name__}")

@@ -54,6 +54,10 @@ OUTPUTS = {
 """What the node publishes, in the order of publishing."""
 
 
+SAID_EVERY = 10
+"""Of the messages refused for one reason, the first and then every tenth is said."""
+
+
 class Estimator(Node):
     """Identifies the adhesion while the train brakes and publishes the braking curve that follows from it.
 
@@ -114,10 +118,10 @@ class Estimator(Node):
         return receive
 
     def _refuse(self, topic: topics.Topic, refusal: reading.Rejected) -> None:
-        """Count a refused message; the first of its kind and then every tenth reach the operator."""
+        """Count a refused message; the first of its kind and then some reach the operator."""
         self._pipeline.refuse(topic.name, refusal.reason)
         count = self._pipeline.refused[refusal.reason]
-        if count % self._pipeline.config.step == 1:
+        if count % SAID_EVERY == 1:
             self.get_logger().warning(f"{topic.name}: {refusal} ({count} so far)")
             self._send(topics.DIAGNOSTICS, diagnostics_message(self._newest_ns, self._pipeline, str(refusal)))
 

@@ -1,0 +1,124 @@
+"""The demo on a scenario cut short: live equals offline, what it leaves behind, and its words."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.image import imread
+
+from adhesion_node import demo
+from adhesion_node.bag import BagReader
+from adhesion_node.core.adhesion import DRY, WET
+from adhesion_node.core.track import LEVEL
+from adhesion_node.nodes import replay
+from adhesion_node.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH
+from sim_node import scenario
+from sim_node.scenario import SCENARIOS, Brake, Rail
+
+CRUISE_S, END_S = 4.0, 9.0
+SAMPLES = 91
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Brake on wet rail from 4 s, end at 9 s: tunnel_entry would take half a minute."""
+    full = SCENARIOS["tunnel_entry"]
+    rail = Rail(((0.0, DRY), (full.speed_mps * (CRUISE_S - 0.05), WET)))
+    cut = replace(full, rail=rail, brake=Brake(CRUISE_S), track=LEVEL, end_s=END_S)
+    for module in (scenario, demo):
+        monkeypatch.setattr(module, "SCENARIOS", {**SCENARIOS, "tunnel_entry": cut})
+
+
+@pytest.fixture
+def run_demo(tmp_path: Path) -> Callable[..., dict[str, Any]]:
+    """Return a function that runs the demo into `tmp_path/demo` and returns its result."""
+
+    def _run(*options: str) -> dict[str, Any]:
+        file = tmp_path / "result.json"
+        assert demo.main(["--output", str(tmp_path / "demo"), "--json", str(file), *options]) == 0
+        result: dict[str, Any] = json.loads(file.read_text())
+        return result
+
+    return _run
+
+
+def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
+    tmp_path: Path, run_demo: Callable[..., dict[str, Any]], capfd: pytest.CaptureFixture[str]
+) -> None:
+    result = run_demo("--seed", "3")
+    out, err = capfd.readouterr()
+    assert result["live_equals_offline"] is True
+    assert result["live_digest"] == result["digest"]
+    assert (result["measurements"], result["accepted"], result["dropped"]) == (SAMPLES, SAMPLES, {})
+    assert result["windows"] >= 4
+    assert result["regime_final"] == "ADHESION_LIMITED"
+    assert result["mu_final"] == pytest.approx(0.0726 + 0.002, abs=0.02)  # wet at 280 km/h
+    assert Path(result["bag"]) == tmp_path / "demo" / "bag"
+    _check_bag(Path(result["bag"]))
+    assert imread(result["picture"]).shape[:2] == (990, 1210)
+    assert Path(result["picture"]).parent == tmp_path / "demo"
+    assert result["atp"].split(" > ")[0] in {"EMERGENCY_BRAKE", "NORMAL"}
+    assert "to the last bit" in out
+    assert "adhesion coefficient" in out
+    assert "regime" in err.splitlines()[0]
+    assert "Traceback" not in err
+
+    assert replay.main([result["bag"], "--offline", "--seed", "3", "--json", str(tmp_path / "again.json")]) == 0
+    assert json.loads((tmp_path / "again.json").read_text())["digest"] == result["live_digest"]
+
+
+def _check_bag(path: Path) -> None:
+    """The sensors, the truth and every result are there, whole and with all their messages."""
+    with BagReader(path) as reader:
+        counts = {name.lstrip("/"): count for name, count in reader.counts.items()}
+        assert reader.complete
+        assert sum(1 for _ in reader.messages()) == sum(counts.values())
+    assert counts.pop(ATP_STATUS.name) >= 1
+    estimates = (SAMPLES + 9) // 10
+    assert counts == {
+        **{topic.name: SAMPLES for topic in (POSITION, BRAKE_PRESSURE, *TRUTH)},
+        **{topic.name.lstrip("/"): estimates for topic in (*RESULTS, DIAGNOSTICS)},
+    }
+
+
+def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable[..., dict[str, Any]]) -> None:
+    for name in ("demo", "demo_2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.txt").write_text("keep")
+    result = run_demo()
+    assert Path(result["bag"]) == tmp_path / "demo_3" / "bag"
+    for name in ("demo", "demo_2"):
+        assert [path.name for path in (tmp_path / name).iterdir()] == ["mine.txt"]
+
+
+def test_bad_usage_ends_with_code_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        demo.main(["--scenario", "avalanche"])
+    assert ended.value.code == 2
+    err = capsys.readouterr().err
+    assert "'avalanche'" in err
+    assert "tunnel_exit" in err
+
+
+def test_a_bad_seed_is_one_line_and_code_2_and_leaves_nothing(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert demo.main(["--output", str(tmp_path / "demo"), "--seed", "-1"]) == 2
+    out, err = capfd.readouterr()
+    (line,) = err.splitlines()
+    assert out == ""
+    assert line.startswith("demo: seed = -1: give ")
+    assert not (tmp_path / "demo").exists()
+
+
+def test_an_output_that_cannot_be_is_one_line_and_code_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert demo.main(["--output", str(tmp_path / "file" / "demo")]) == 1
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("demo: ")
+    assert "Not a directory" in line

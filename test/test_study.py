@@ -1,0 +1,96 @@
+"""`study`: the published braking distances and times, as a table and as JSON."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from adhesion_node.study.__main__ import main
+
+PUBLISHED = {
+    (300, 100, "0.1542"): (3060.7, 56.1),
+    (300, 100, "0.0726"): (3946.7, 71.7),
+    (300, 100, "wet law"): (3481.1, 62.8),
+    (250, 50, "0.1542"): (2404.3, 59.3),
+    (250, 50, "0.0726"): (2958.9, 72.7),
+    (250, 50, "wet law"): (2614.4, 62.7),
+}
+"""Distance in m and time in s by speeds in km/h and adhesion, as printed in the paper."""
+
+
+def integrated(from_kmh: float, to_kmh: float, case: str) -> tuple[float, float]:
+    """Distance and time by small steps of time, with the constants of the paper written out."""
+    speed, distance, time, step = from_kmh / 3.6, 0.0, 0.0, 1e-3
+    while speed > to_kmh / 3.6:
+        kmh = 3.6 * speed
+        mu = 0.04 + 13.7 / (120.0 + kmh) if case == "wet law" else float(case)
+        resistance = (0.79 + 0.0064 * kmh + 0.000115 * kmh**2) / 1000.0
+        slower = speed - step * 9.8 * (min(mu, 0.9332 / 9.8) + resistance)
+        distance += step * (speed + slower) / 2.0
+        speed, time = slower, time + step
+    return distance, time
+
+
+def test_distances_as_json_stand_alone_and_near_the_paper(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["distances", "--json", "-"]) == 0
+    table = json.loads(capsys.readouterr().out)
+    assert {(row["from_kmh"], row["to_kmh"], row["case"]) for row in table} == set(PUBLISHED)
+    assert len(table) == 6
+    for row in table:
+        assert {"from_kmh", "to_kmh", "case", "distance_m", "time_s", "paper_distance_m", "paper_time_s"} <= set(row)
+        paper = PUBLISHED[row["from_kmh"], row["to_kmh"], row["case"]]
+        assert (row["paper_distance_m"], row["paper_time_s"]) == paper
+        assert row["distance_m"] == pytest.approx(paper[0], rel=0.045)
+        assert row["time_s"] == pytest.approx(paper[1], rel=0.045)
+        assert row["distance_deviation_percent"] == pytest.approx(100 * (row["distance_m"] - paper[0]) / paper[0])
+        assert row["time_deviation_percent"] == pytest.approx(100 * (row["time_s"] - paper[1]) / paper[1])
+
+
+def test_distances_are_those_of_a_plain_integration(capsys: pytest.CaptureFixture[str]) -> None:
+    main(["distances", "--json", "-"])
+    for row in json.loads(capsys.readouterr().out):
+        distance, time = integrated(row["from_kmh"], row["to_kmh"], row["case"])
+        assert row["distance_m"] == pytest.approx(distance, rel=1e-3)
+        assert row["time_s"] == pytest.approx(time, rel=1e-3)
+
+
+def test_the_table_is_for_people_and_the_file_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["distances", "--json", str(tmp_path / "d.json")]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 7
+    rows = json.loads((tmp_path / "d.json").read_text())
+    for line, row in zip(lines[1:], rows, strict=True):
+        assert f"{row['distance_m']:.1f}" in line
+        assert f"{row['paper_distance_m']:.1f}" in line
+    assert main(["distances"]) == 0
+    assert capsys.readouterr().out.splitlines() == lines
+
+
+@pytest.mark.parametrize("args", [["--help"], ["distances", "--help"]])
+def test_help_is_shown(args: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(args)
+    assert ended.value.code == 0
+    assert "distances" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("args", [[], ["speeds"], ["distances", "--nothing"], ["distances", "--json"]])
+def test_bad_usage_ends_with_code_2(args: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(args)
+    assert ended.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert "study" in err
+    assert "Traceback" not in err
+
+
+def test_a_file_that_cannot_be_written_is_one_line_and_code_1(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["distances", "--json", str(tmp_path / "nowhere" / "d.json")]) == 1
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("study: ")
+    assert "d.json" in line
