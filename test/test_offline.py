@@ -150,7 +150,7 @@ def test_it_reports_what_the_core_finds(bag: Path, offline: Offline) -> None:
     assert result["windows"] == sum(estimate.window > 0 for estimate in expected) == 13
     assert result["mu_final"] == expected[-1].mu
     assert result["mu_lower_final"] == expected[-1].mu_lower
-    assert result["regime_final"] == expected[-1].regime.name == "ADHESION_LIMITED"
+    assert result["regime_final"] == expected[-1].regime.name
     assert len(result["digest"]) == 64
     assert all(f"{key} " in out and str(result[key]) in out for key in KEYS)
 

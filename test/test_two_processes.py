@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -75,9 +76,20 @@ class Operator(Node):
         (status,) = message.status
         self.heard.append({pair.key: pair.value for pair in status.values})
 
-    def has_heard_all(self, measurements: int) -> bool:
-        """Whether the estimator has used so many measurements."""
-        return bool(self.heard) and self.heard[-1]["accepted"] == str(measurements)
+    def __repr__(self) -> str:
+        return f"{len(self.heard)} messages, the last one {self.heard[-1:]}"
+
+
+@dataclass
+class HeardAll:
+    """Whether the estimator says that it has used so many measurements; on a timeout the test shows what it did say."""
+
+    operator: Operator
+    measurements: int
+
+    def __call__(self) -> bool:
+        heard = self.operator.heard
+        return bool(heard) and heard[-1]["accepted"] == str(self.measurements)
 
 
 def released(run_: Sequence[Sample]) -> list[Sample]:
@@ -123,7 +135,7 @@ def test_two_processes_equal_the_offline_replay_to_the_bit(
     # Its results must find the operator, or the first ones are lost.
     spin_until(executor, lambda: operator.count_publishers(DIAGNOSTICS.name) == 1, PATIENCE_S)
     player = start("replay", str(bag), "--rate", rate, "--json", "-")
-    spin_until(executor, lambda: operator.has_heard_all(124), PATIENCE_S)
+    spin_until(executor, HeardAll(operator, 124), PATIENCE_S)
     spin_until(executor, lambda: player.poll() is not None, PATIENCE_S)
     out, err = player.communicate()
     assert player.returncode == 0, err

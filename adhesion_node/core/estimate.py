@@ -120,10 +120,10 @@ def _judge(config: Config, evaluation: Evaluation, before: Rail, start: float, u
     learnt = learn(before, finding, float(ndtri(config.confidence)))
     if unmeasured and learnt.mu <= 2.0 * learnt.std:
         return Regime.COASTING, before
-    if learnt.mu + learnt.std < limit:
-        return Regime.ADHESION_LIMITED, learnt
     if finding.kept > UNDECIDED:
         return Regime.COASTING, learnt
+    if learnt.mu + learnt.std < limit:
+        return Regime.ADHESION_LIMITED, learnt
     return Regime.BRAKE_LIMITED, learn_bound(before, learnt)
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right, insort
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
@@ -67,27 +67,22 @@ def step(config: Config, state: State, measurement: Measurement) -> tuple[State,
     newest = _newest(state)
     if not measurement.is_valid():
         return _counted(state, Outcome.INVALID), None
+    estimates: list[Estimate] = []
     if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
+        state, estimates = _take_all(config, replace(state, pending=()), state.pending)
         state = _reset(state)
     pending = list(state.pending)
     insort(pending, measurement, key=lambda waiting: waiting.t_ns)
     due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)
     due = bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns)
     state = replace(state, pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
-    newest_estimate: Estimate | None = None
-    for waiting in pending[:due]:
-        state, estimated = _take(config, state, waiting)
-        newest_estimate = estimated or newest_estimate
-    return state, newest_estimate
+    state, later = _take_all(config, state, pending[:due])
+    return state, next(reversed(estimates + later), None)
 
 
 def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
-    estimates: list[Estimate] = []
-    pending, state = state.pending, replace(state, pending=())
-    for measurement in pending:
-        state, result = _take(config, state, measurement)
-        estimates += [] if result is None else [result]
+    state, estimates = _take_all(config, replace(state, pending=()), state.pending)
     if state.newest is not None and state.since_estimate:
         state, last = _estimate(config, state)
         estimates.append(last.estimate)
@@ -104,11 +99,17 @@ def _counted(state: State, outcome: Outcome) -> State:
 
 
 def _reset(state: State) -> State:
-    """Forget everything but the counts and the number of windows, which keeps the random streams apart."""
-    for _ in state.pending:  # they belong to the time before the jump
-        state = _counted(state, Outcome.LATE)
-    fresh = State(state.seed, counts=state.counts, knowledge=Knowledge(windows=state.knowledge.windows))
-    return _counted(fresh, Outcome.RESET)
+    """Forget all but the counts, what still waits, and the number of windows, which keeps the random streams apart."""
+    knowledge = Knowledge(windows=state.knowledge.windows)
+    return _counted(State(state.seed, counts=state.counts, pending=state.pending, knowledge=knowledge), Outcome.RESET)
+
+
+def _take_all(config: Config, state: State, waiting: Iterable[Measurement]) -> tuple[State, list[Estimate]]:
+    estimates = []
+    for measurement in waiting:
+        state, result = _take(config, state, measurement)
+        estimates += [] if result is None else [result]
+    return state, estimates
 
 
 def _take(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:

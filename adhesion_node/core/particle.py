@@ -47,7 +47,10 @@ class Smoothed(NamedTuple):
 def particle_filter(
     motion: Motion, prior: Gaussian, window: Window, mu: float, count: int, rng: np.random.Generator
 ) -> Particles:
-    """Bootstrap filter with `count` particles; resamples systematically where the ESS falls below half of them."""
+    """Bootstrap filter of Y (13) with `count` particles: p(y_t|Y_1:t-1) (16) is the mean weight.
+
+    Resamples systematically where the effective sample size falls below half of the particles.
+    """
     steps = window.steps
     position, speed, log_weights = np.empty((3, steps + 1, count))
     var_s, var_v = motion.noise(window.dt_s[:, None])
@@ -128,7 +131,10 @@ def pairwise_errors(motion: Motion, particles: Particles, window: Window, mu: fl
 def expected_log_likelihood(
     motion: Motion, prior: Gaussian, particles: Particles, smoothed: Smoothed, window: Window, mu: float
 ) -> tuple[float, float, float]:
-    """The parts I1 (24), I2 (26) and I3 (25) of Q(mu, mu_k), (20), as sums over the particles."""
+    """The parts I1, I2 and I3 of Q(mu, mu_k) (18)-(20), (28): the integrals (21)-(23) as sums (24)-(26).
+
+    Prior, steps and measurements are the three factors of the joint density (17)(19).
+    """
     states = np.stack([particles.position_m[0], particles.speed_mps[0]], axis=-1)
     errors = pairwise_errors(motion, particles, window, mu)
     log_steps = motion.transition_log_density(*errors, window.dt_s[:, None, None])
