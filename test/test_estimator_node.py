@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node import topics
-from adhesion_node.core import Regime, braking
+from adhesion_node.core import braking
 from adhesion_node.core.align import PositionSample, PressureSample
 from adhesion_node.core.train import CRH3, GRAVITY
 from adhesion_node.nodes import convert, qos
@@ -126,7 +126,7 @@ def test_every_result_says_the_same_of_one_instant(line: Line) -> None:
     line.hear_all()
     estimate = line.estimator.latest
     assert estimate is not None
-    assert estimate.regime is Regime.ADHESION_LIMITED
+    assert estimate.window > 0
     last = {topic: heard[-1] for topic, heard in line.heard.items()}
     assert last[topics.MU].data == estimate.mu
     assert last[topics.MU_LOWER].data == estimate.mu_lower < estimate.mu
