@@ -9,9 +9,10 @@ NAME = "adhesion_node"
 HERE = Path(__file__).parent
 MANIFEST = ElementTree.parse(HERE / "package.xml")
 
-NODES = ("estimator", "atp_monitor", "recorder", "replay")
+NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay")
 PROGRAMS = {
     "simulator": "sim_node.node",
+    "slip_simulator": "sim_node.slip_node",
     **{node: f"adhesion_node.nodes.{node}" for node in NODES},
     "import_csv": "adhesion_node.import_csv",
     "recover": "adhesion_node.recover",

@@ -39,6 +39,8 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     values |= dict(map(parse_setting, options.set))
     if options.seed is not None:
         values[SEED.name] = options.seed
+    if POSITION.name not in selection.values():
+        raise ValueError(f"bag = {reader.path}: holds no {POSITION.name}, without which nothing is identified")
     setup, truth = setup_of(values), Truth()
     pipeline = Pipeline(setup.config, setup.seed)
     replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.frame)

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import Any
 
 from .core.align import PositionSample, PressureSample, SpeedSample
+from .core.creep_align import ForceSample, WheelSample
 from .core.measurement import MAX_POSITION_M, MAX_SPEED_MPS, MAX_VARIANCE_M2, MIN_VARIANCE_M2
 from .topics import FRAME, TRAIN
 
@@ -19,6 +20,12 @@ ATMOSPHERE_PA = 101_325.0
 
 MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA = 50e3, 5e6
 """No place on earth that has a railway is below 50 kPa; no brake works above 5 MPa."""
+
+MAX_WHEEL_RADPS = 1e3
+"""No wheel of a train turns faster: 500 km/h on a wheel of 0.3 m are 463 rad/s."""
+
+MAX_FORCE_N = 1e7
+"""No train pulls harder; the strongest locomotives reach 2 MN."""
 
 NS = 1_000_000_000
 
@@ -35,6 +42,9 @@ class Reason(Enum):
         f"add {ATMOSPHERE_PA:g} Pa to a gauge pressure, multiply kPa by 1000 and bar by 100000"
     )
     IMPLAUSIBLE_SPEED = f"speed is in m/s, not km/h, within +-{MAX_SPEED_MPS:g}"
+    NO_AXLE = "give one velocity, rad/s, for every driven axle in name"
+    IMPLAUSIBLE_WHEEL_SPEED = f"velocity is in rad/s, not rpm, within +-{MAX_WHEEL_RADPS:g}"
+    IMPLAUSIBLE_FORCE = f"force.x is in N, within +-{MAX_FORCE_N:g}"
     BAD_CURVE = (
         f"give one joint '{TRAIN}', at least two points, each with one position, velocity and acceleration; "
         "positions and times rise, speeds fall and are not negative, accelerations are below 0"
@@ -81,6 +91,26 @@ def speed(message: Any, frame: str = FRAME) -> SpeedSample:
     check_frame(message, frame)
     value = plausible("speed x", message.twist.twist.linear.x, MAX_SPEED_MPS, Reason.IMPLAUSIBLE_SPEED)
     return SpeedSample(stamp_ns(message.header), value)
+
+
+def wheel_speed(message: Any, frame: str = FRAME) -> WheelSample:
+    """Read the speeds of the driven axles, rad/s, from a JointState; raises Rejected."""
+    check_frame(message, frame)
+    names, velocities = list(message.name), list(message.velocity)
+    if not names or len(names) != len(velocities):
+        raise Rejected(Reason.NO_AXLE, f"wheel speed names = {names}, velocities = {len(velocities)}")
+    speeds = (
+        plausible(f"wheel speed of {name}", velocity, MAX_WHEEL_RADPS, Reason.IMPLAUSIBLE_WHEEL_SPEED)
+        for name, velocity in zip(names, velocities, strict=True)
+    )
+    return WheelSample(stamp_ns(message.header), tuple(speeds))
+
+
+def traction_force(message: Any, frame: str = FRAME) -> ForceSample:
+    """Read the traction force of all driven axles, N at the rim, from a WrenchStamped; raises Rejected."""
+    check_frame(message, frame)
+    force = plausible("traction force x", message.wrench.force.x, MAX_FORCE_N, Reason.IMPLAUSIBLE_FORCE)
+    return ForceSample(stamp_ns(message.header), force)
 
 
 def check_frame(message: Any, frame: str = FRAME) -> None:

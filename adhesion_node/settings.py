@@ -7,32 +7,10 @@ from dataclasses import fields
 from typing import Any, NamedTuple
 
 from .core import Config
-from .core.setting import check_value
+from .core.setting import Setting, check_value, settings_of
 from .core.track import parse_track
 from .core.train import Train
 from .topics import FRAME
-
-
-class Setting(NamedTuple):
-    """A setting: its default's type is its type; `low` and `high` bound a number, `choices` a text."""
-
-    name: str
-    default: bool | int | float | str
-    description: str
-    unit: str
-    low: float
-    high: float
-    choices: tuple[str, ...]
-
-
-def _settings_of(kind: type[Any], prefix: str) -> list[Setting]:
-    defaults = kind()
-    return [
-        Setting(prefix + item.name, getattr(defaults, item.name), **item.metadata)
-        for item in fields(kind)
-        if item.metadata
-    ]
-
 
 TRACK = Setting(
     "track",
@@ -48,7 +26,7 @@ SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, ())
 
 FRAME_ID = Setting("frame", FRAME, "frame_id that sensor messages must have", "", 0.0, 0.0, ())
 
-SETTINGS = (SEED, FRAME_ID, *_settings_of(Config, ""), *_settings_of(Train, "train."), TRACK)
+SETTINGS = (SEED, FRAME_ID, *settings_of(Config), *settings_of(Train, "train."), TRACK)
 """All settings of the estimator."""
 
 

@@ -39,5 +39,13 @@ ATP_STATUS = Topic("atp/status", "diagnostic_msgs/msg/DiagnosticArray")
 DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock")
 
-RECORDED = (*SENSORS, *TRUTH, *RESULTS, ATP_STATUS, DIAGNOSTICS)
+WHEEL_SPEED = Topic("wheel_speed", "sensor_msgs/msg/JointState")
+TRACTION_FORCE = Topic("traction_force", "geometry_msgs/msg/WrenchStamped")
+CREEP_SENSORS = (WHEEL_SPEED, TRACTION_FORCE)
+
+CREEP_MU_MAX = Topic("creep/mu_max", "std_msgs/msg/Float64")
+CREEP_LAMBDA_M = Topic("creep/lambda_m", "std_msgs/msg/Float64")
+CREEP_RESULTS = (CREEP_MU_MAX, CREEP_LAMBDA_M)
+
+RECORDED = (*SENSORS, *CREEP_SENSORS, *TRUTH, *RESULTS, *CREEP_RESULTS, ATP_STATUS, DIAGNOSTICS)
 """What the recorder subscribes to; /clock is left out because every message carries its log time."""

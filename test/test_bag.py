@@ -35,7 +35,7 @@ from adhesion_node.bag import (
     typestore,
 )
 from adhesion_node.bag.writer import FILE_NAME
-from adhesion_node.topics import BRAKE_PRESSURE, BRAKING_CURVE, CLOCK, MU, POSITION, RECORDED
+from adhesion_node.topics import BRAKE_PRESSURE, BRAKING_CURVE, CLOCK, MU, POSITION, RECORDED, WHEEL_SPEED
 
 S = 10**9
 
@@ -418,9 +418,10 @@ RECORDED_ELSEWHERE = {"/odo/pose": POSITION.type, "/brake_pressure": BRAKE_PRESS
 
 def test_selection_renames_and_takes_sensors_and_truth_alone() -> None:
     own = {f"/{topic.name}": topic.type for topic in RECORDED} | {CLOCK.name: CLOCK.type}
-    assert select(own) == {
-        f"/{name}": name for name in ("position", "brake_pressure", "speed", "truth/state", "truth/mu")
-    }
+    sensors = ("position", "brake_pressure", "speed", "wheel_speed", "traction_force")
+    assert select(own) == {f"/{name}": name for name in (*sensors, "truth/state", "truth/mu")}
+    creep = {"/wheel_speed": WHEEL_SPEED.type}
+    assert select(creep) == {"/wheel_speed": "wheel_speed"}, "a recording for the creep curve needs no position"
     remapped = select(RECORDED_ELSEWHERE, [parse_remap("odo/pose:=/position")])
     assert remapped == {"/odo/pose": "position", "/brake_pressure": "brake_pressure"}
     assert select(RECORDED_ELSEWHERE, [], ["brake_pressure", "/x"]) == {"/brake_pressure": "brake_pressure", "/x": "/x"}

@@ -18,9 +18,10 @@ from ruamel.yaml import YAML
 from test_offline import samples, write_run
 
 from adhesion_node.core import Config
-from adhesion_node.nodes import atp_monitor, estimator, replay
+from adhesion_node.nodes import atp_monitor, creep_estimator, estimator, replay
 from adhesion_node.nodes.params import Spec, Value
 from sim_node import node as simulator
+from sim_node import slip_node
 
 DEFAULTS = ROOT / "adhesion_node" / "nodes" / "defaults.yaml"
 
@@ -28,6 +29,8 @@ NODES: dict[str, tuple[Callable[..., Node], tuple[Spec, ...]]] = {
     "simulator": (simulator.Simulator, simulator.PARAMETERS),
     "estimator": (estimator.Estimator, estimator.PARAMETERS),
     "atp_monitor": (atp_monitor.AtpMonitor, atp_monitor.PARAMETERS),
+    "creep_estimator": (creep_estimator.CreepEstimator, creep_estimator.PARAMETERS),
+    "slip_simulator": (slip_node.SlipSimulator, slip_node.PARAMETERS),
 }
 
 

@@ -8,7 +8,8 @@ import pytest
 from conftest import ROOT
 
 from adhesion_node import topics
-from adhesion_node.settings import SETTINGS, Setting
+from adhesion_node.core.setting import Setting
+from adhesion_node.settings import SETTINGS
 from adhesion_node.study import distances
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")

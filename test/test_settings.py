@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from adhesion_node.core import Config
+from adhesion_node.core.setting import Setting
 from adhesion_node.core.track import Curve, Grade, Tunnel
 from adhesion_node.core.train import CRH3
 from adhesion_node.nodes.estimator import PARAMETERS
-from adhesion_node.settings import SETTINGS, Setting, Setup, parse_setting, setup_of
+from adhesion_node.settings import SETTINGS, Setup, parse_setting, setup_of
 
 FREE_TEXTS = {"track", "frame"}
 """The settings that are neither a number nor one of a few words."""

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from .. import topics
 from .types import same_name
 
-_OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}
+_OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH)}
 
 
 def parse_remap(text: str) -> tuple[str, str]:
@@ -29,9 +29,11 @@ def select(
 
     `recorded` holds the types by name. Replayed are `names` (after remapping), or else the sensors and the truth,
     not recorded results. Our own topics come out under their relative names, so that namespaces apply. Raises
-    ValueError when a remapped or named topic is missing, has the wrong type, or when no position is among them.
+    ValueError when a remapped or named topic is missing, has the wrong type, or when there is neither a position nor,
+    for the creep curve, a wheel speed.
     """
     renamed = _rename(recorded, remaps)
+    creep = any(same_name(target, topics.WHEEL_SPEED.name) for target in renamed.values())
     chosen = list(_OURS) if names is None else list(names)
     selection: dict[str, str] = {}
     for name in chosen:
@@ -39,7 +41,7 @@ def select(
         if source is not None:
             selection[source] = _own_name(name)
             _require_type(name, source, recorded)
-        elif names is not None or same_name(name, topics.POSITION.name):
+        elif names is not None or (same_name(name, topics.POSITION.name) and not creep):
             raise ValueError(f"topic {name}: not in the recording. {_what_there_is(name, recorded)}")
     return selection
 

@@ -5,7 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import field, fields
-from typing import Any
+from typing import Any, NamedTuple
+
+
+class Setting(NamedTuple):
+    """A setting: its default's type is its type; `low` and `high` bound a number, `choices` a text."""
+
+    name: str
+    default: bool | int | float | str
+    description: str
+    unit: str
+    low: float
+    high: float
+    choices: tuple[str, ...]
 
 
 def setting(
@@ -37,3 +49,13 @@ def check_value(name: str, value: Any, kind: type, rule: Mapping[str, Any]) -> N
         raise ValueError(f"{name} = {value!r}: give a value from {rule['low']:g} to {rule['high']:g} {rule['unit']}")
     if rule["choices"] and value not in rule["choices"]:
         raise ValueError(f"{name} = {value!r}: choose one of {', '.join(rule['choices'])}")
+
+
+def settings_of(kind: type[Any], prefix: str = "") -> list[Setting]:
+    """Return the settings among the fields of a dataclass."""
+    defaults = kind()
+    return [
+        Setting(prefix + item.name, getattr(defaults, item.name), **item.metadata)
+        for item in fields(kind)
+        if item.metadata
+    ]

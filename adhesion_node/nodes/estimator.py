@@ -7,7 +7,6 @@ Every message goes through `Pipeline`, as in an offline replay; stamps drive the
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -19,27 +18,13 @@ from adhesion_node.core import Config, Estimate
 from adhesion_node.core.align import Sample
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.pipeline import Pipeline
-from adhesion_node.settings import SETTINGS, Setting, setup_of
+from adhesion_node.settings import SETTINGS, setup_of
 
 from . import convert, qos, runtime
 from .diagnostics import diagnostics_message
-from .params import Spec, declare
+from .params import declare, spec_of
 
-
-def _spec(setting: Setting) -> Spec:
-    number = not isinstance(setting.default, (str, bool))
-    return Spec(
-        setting.name,
-        setting.default,
-        setting.description,
-        setting.unit,
-        setting.low if number and math.isfinite(setting.low) else None,
-        setting.high if number and math.isfinite(setting.high) else None,
-        setting.choices,
-    )
-
-
-PARAMETERS = tuple(map(_spec, SETTINGS))
+PARAMETERS = tuple(map(spec_of, SETTINGS))
 
 
 OUTPUTS = {

@@ -12,6 +12,8 @@ from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescri
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
+from adhesion_node.core.setting import Setting
+
 Value = bool | int | float | str
 
 _INT64_MAX = 2**63 - 1
@@ -102,6 +104,13 @@ class Spec:
             return True
         low, high = self.minimum, self.maximum
         return math.isfinite(value) and (low is None or value >= low) and (high is None or value <= high)
+
+
+def spec_of(setting: Setting) -> Spec:
+    """Return the ROS parameter of a setting."""
+    number = not isinstance(setting.default, (str, bool))
+    low, high = (limit if number and math.isfinite(limit) else None for limit in (setting.low, setting.high))
+    return Spec(setting.name, setting.default, setting.description, setting.unit, low, high, setting.choices)
 
 
 def declare(node: Node, specs: Sequence[Spec]) -> dict[str, Any]:

@@ -148,4 +148,5 @@ def main(args: Sequence[str] | None = None) -> int:
 def _profile(topic: topics.Topic) -> QoSProfile:
     if topic in LATCHED:
         return LATCHED_SUBSCRIPTION
-    return SENSOR_SUBSCRIPTION if topic in (*topics.SENSORS, *topics.TRUTH) else RESULT
+    sensors = (*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH)
+    return SENSOR_SUBSCRIPTION if topic in sensors else RESULT

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from ..cli import json_option, run_tool
-from . import distances
+from . import creep, distances
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -17,6 +17,10 @@ def main(args: Sequence[str] | None = None) -> int:
     studies.add_parser("distances", help=summary, description=distances.__doc__, parents=[json_option()]).set_defaults(
         run=distances.run
     )
+    summary = "the creep curve: three experiments of the paper and what it leaves out"
+    creep_parser = studies.add_parser("creep", help=summary, description=creep.__doc__, parents=[json_option()])
+    creep.add_options(creep_parser)
+    creep_parser.set_defaults(run=creep.run)
     return run_tool(parser, lambda options: int(options.run(options)), args)
 
 
