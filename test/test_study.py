@@ -59,13 +59,24 @@ def test_distances_are_those_of_a_plain_integration(capsys: pytest.CaptureFixtur
 def test_the_table_is_for_people_and_the_file_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["distances", "--json", str(tmp_path / "d.json")]) == 0
     lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 7
     rows = json.loads((tmp_path / "d.json").read_text())
-    for line, row in zip(lines[1:], rows, strict=True):
+    for line, row in zip(lines[1:7], rows, strict=True):
         assert f"{row['distance_m']:.1f}" in line
         assert f"{row['paper_distance_m']:.1f}" in line
     assert main(["distances"]) == 0
     assert capsys.readouterr().out.splitlines() == lines
+
+
+def test_the_savings_are_those_of_the_rows(capsys: pytest.CaptureFixture[str]) -> None:
+    """Of the wet law against the fixed worst case, each beside the paper's headline."""
+    main(["distances"])
+    shown = [line.split() for line in capsys.readouterr().out.splitlines()[-2:]]
+    main(["distances", "--json", "-"])
+    rows = {(row["from_kmh"], row["case"]): row for row in json.loads(capsys.readouterr().out)}
+    for cells, (start, paper) in zip(shown, ((300, ("11.80", "12.41")), (250, ("11.64", "13.76"))), strict=True):
+        wet, worst = rows[start, "wet law"], rows[start, "0.0726"]
+        ours = [f"{100 - 100 * wet[name] / worst[name]:.2f}" for name in ("distance_m", "time_s")]
+        assert cells[3:] == [ours[0], paper[0], ours[1], paper[1]]
 
 
 @pytest.mark.parametrize("args", [["--help"], ["distances", "--help"]])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -37,6 +37,14 @@ class Evaluation(NamedTuple):
     """Filtered law of (s, v) at the newest sample, the uncertainty of mu included."""
     following: BrakingWindow
     """The window to go on with."""
+
+
+class Evaluate(Protocol):
+    """Evaluates a window: `evaluate`, or what stands for it where many estimators run side by side."""
+
+    def __call__(
+        self, config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator
+    ) -> Evaluation: ...
 
 
 def evaluate(config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from .braking_window import BrakingWindow, Evaluation, evaluate
+from .braking_window import BrakingWindow, Evaluate, Evaluation, evaluate
 from .config import Config
 from .em import Search
 from .gaussian import Gaussian
@@ -75,6 +75,7 @@ def estimate(
     law: Gaussian,
     window: BrakingWindow | None,
     knowledge: Knowledge,
+    evaluate: Evaluate = evaluate,
 ) -> Result:
     """Evaluate the window, if there is one, on top of what was known; `law` is the tracker's at `newest`."""
     rail = _aged(config, newest, law, knowledge)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from . import tracker
-from .braking_window import BrakingWindow
+from .braking_window import BrakingWindow, Evaluate, evaluate
 from .config import Config
 from .estimate import Estimate, Knowledge, Result, estimate
 from .gaussian import Gaussian
@@ -57,34 +57,36 @@ def init(config: Config, seed: int) -> State:
     return State(seed)
 
 
-def step(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
+def step(
+    config: Config, state: State, measurement: Measurement, evaluate: Evaluate = evaluate
+) -> tuple[State, Estimate | None]:
     """Take one measurement; every `config.step` accepted ones return an estimate.
 
     What became of the measurement stands in `State.outcome` and is counted in `State.counts`. With `max_lag_s`
     above 0 a measurement waits for late ones to be sorted in, and is judged when its turn comes; should several
-    estimates fall due at once, after a gap, the newest is returned.
+    estimates fall due at once, after a gap, the newest is returned. `evaluate` identifies mu in a window.
     """
     newest = _newest(state)
     if not measurement.is_valid():
         return _counted(state, Outcome.INVALID), None
     estimates: list[Estimate] = []
     if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
-        state, estimates = _take_all(config, replace(state, pending=()), state.pending)
+        state, estimates = _take_all(config, replace(state, pending=()), state.pending, evaluate)
         state = _reset(state)
     pending = list(state.pending)
     insort(pending, measurement, key=lambda waiting: waiting.t_ns)
     due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)
     due = bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns)
     state = replace(state, pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
-    state, later = _take_all(config, state, pending[:due])
+    state, later = _take_all(config, state, pending[:due], evaluate)
     return state, next(reversed(estimates + later), None)
 
 
-def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
+def finish(config: Config, state: State, evaluate: Evaluate = evaluate) -> tuple[State, tuple[Estimate, ...]]:
     """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
-    state, estimates = _take_all(config, replace(state, pending=()), state.pending)
+    state, estimates = _take_all(config, replace(state, pending=()), state.pending, evaluate)
     if state.newest is not None and state.since_estimate:
-        state, last = _estimate(config, state)
+        state, last = _estimate(config, state, evaluate)
         estimates.append(last.estimate)
     return state, tuple(estimates)
 
@@ -104,18 +106,20 @@ def _reset(state: State) -> State:
     return _counted(State(state.seed, counts=state.counts, pending=state.pending, knowledge=knowledge), Outcome.RESET)
 
 
-def _take_all(config: Config, state: State, waiting: Iterable[Measurement]) -> tuple[State, list[Estimate]]:
+def _take_all(
+    config: Config, state: State, waiting: Iterable[Measurement], evaluate: Evaluate
+) -> tuple[State, list[Estimate]]:
     estimates = []
     for measurement in waiting:
-        state, result = _take(config, state, measurement)
+        state, result = _take(config, state, measurement, evaluate)
         estimates += [] if result is None else [result]
     return state, estimates
 
 
-def _take(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
+def _take(config: Config, state: State, measurement: Measurement, evaluate: Evaluate) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
     if state.newest is None or state.law is None:
-        return _accept(config, state, measurement, tracker.meet(measurement), 0.0)
+        return _accept(config, state, measurement, tracker.meet(measurement), 0.0, evaluate)
     if measurement.t_ns <= state.newest.t_ns:
         same = measurement.t_ns == state.newest.t_ns
         return _counted(state, Outcome.DUPLICATE if same else Outcome.LATE), None
@@ -125,13 +129,13 @@ def _take(config: Config, state: State, measurement: Measurement) -> tuple[State
     if tracker.innovation(law, measurement) > config.gate_sigma:
         if state.outliers + 1 < config.max_outliers:
             return _counted(replace(state, outliers=state.outliers + 1), Outcome.OUTLIER), None
-        return _accept(config, _reset(state), measurement, tracker.meet(measurement), 0.0)
+        return _accept(config, _reset(state), measurement, tracker.meet(measurement), 0.0, evaluate)
     law = tracker.correct(law, measurement, _speed_variance(config, measurement))
-    return _accept(config, state, measurement, law, dt_s)
+    return _accept(config, state, measurement, law, dt_s, evaluate)
 
 
 def _accept(
-    config: Config, state: State, measurement: Measurement, law: Gaussian, dt_s: float
+    config: Config, state: State, measurement: Measurement, law: Gaussian, dt_s: float, evaluate: Evaluate
 ) -> tuple[State, Estimate | None]:
     """Let an accepted measurement join or open the window; give an estimate when one is due."""
     brake = config.brake(measurement.brake_pressure_pa)
@@ -155,27 +159,27 @@ def _accept(
         since_estimate=state.since_estimate + 1,
     )
     if brake == 0.0 or law.mean[1] < SLOWEST_MPS:
-        return _release(config, state)
+        return _release(config, state, evaluate)
     if window is None and tracker.is_settled(law, measurement.variance_m2 * dt_s):
         state = replace(state, window=BrakingWindow(law, (sample,)))
     if state.since_estimate < config.step:
         return state, None
-    state, result = _estimate(config, state)
+    state, result = _estimate(config, state, evaluate)
     return state, result.estimate
 
 
-def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
+def _release(config: Config, state: State, evaluate: Evaluate) -> tuple[State, Estimate | None]:
     """Coast, or end a braking with its last, short window."""
     if state.window is None and state.since_estimate < config.step:
         return state, None
-    state, result = _estimate(config, state)
+    state, result = _estimate(config, state, evaluate)
     return replace(state, window=None, law=result.law), result.estimate
 
 
-def _estimate(config: Config, state: State) -> tuple[State, Result]:
+def _estimate(config: Config, state: State, evaluate: Evaluate) -> tuple[State, Result]:
     assert state.newest is not None  # an estimate follows an accepted measurement
     assert state.law is not None
-    result = estimate(config, state.seed, state.newest, state.law, state.window, state.knowledge)
+    result = estimate(config, state.seed, state.newest, state.law, state.window, state.knowledge, evaluate)
     return replace(state, window=result.window, knowledge=result.knowledge, since_estimate=0), result
 
 

@@ -38,7 +38,7 @@ class Motion:
         return basic + self.track.specific_resistance(position_m) if self.track.sections else basic
 
     def advance(
-        self, position_m: Array, speed_mps: Array, dt_s: float | Array, brake: float | Array, mu: float
+        self, position_m: Array, speed_mps: Array, dt_s: float | Array, brake: float | Array, mu: float | Array
     ) -> tuple[Array, Array]:
         """Noise-free step (2)(3): position and speed after `dt_s` under brake B/(M g) and adhesion `mu`."""
         resistance = self.resistance(position_m, speed_mps)

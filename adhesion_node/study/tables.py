@@ -1,0 +1,142 @@
+"""`study tables`: Tables 2 and 3 of Xie et al. 2019 by Monte-Carlo runs, beside a tuned and a naive EKF.
+
+Paper's settings (M = 20, 50 iterations, S = 50, L = 10) at the nominal noise; run r has seed 1000 + r. The error is
+the mean of |mu - true mu| over all estimates while adhesion limits, after the first 30 km/h. `converged_kmh` is the
+speed at which the error, averaged over the runs, first falls below 5 %; `coverage95` the share of estimates within
+1.96 of their own standard deviations. `seconds` is the computing time of the scenario's runs from all starts in one
+process, `ms_per_window` that of a window among the others of its batch. `bound_ratio` is null: there is no bound yet.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cli import DONE, report
+from .accuracy import figures, over_speed
+from .methods import METHODS, STARTS
+from .montecarlo import Chunk, Result, chunks, run_all
+from .published import START_OF_MEAN, TABLES
+
+NOMINAL_SIGMA_M = 0.5
+
+SPEED_STEP_KMH = 20
+"""Width of the speed classes in the printed error over speed."""
+
+
+class Cell(NamedTuple):
+    """All runs of a scenario with one method."""
+
+    scenario: str
+    method: str
+    sigma_m: float
+    runs: list[list[NDArray[np.void]]]
+    """`runs[start][run]`."""
+    seconds: float
+    window_ms: NDArray[np.float64]
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of `study tables`."""
+    parser.add_argument("--runs", type=int, default=200, help="Monte-Carlo runs from each start (default %(default)s)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
+        help="where finished runs are kept, so that a killed study goes on (default %(default)s)",
+    )
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 4-9 and 14-19 into DIR")
+
+
+def cells(wanted: Sequence[Chunk], cache: Path, workers: int) -> list[Cell]:
+    """Run the chunks and put together those that differ in their seeds only."""
+    results: dict[tuple[str, str, float], list[Result]] = {}
+    for result in run_all(wanted, cache, workers):
+        results.setdefault((result.chunk.scenario, result.chunk.method, result.chunk.sigma_m), []).append(result)
+    return [
+        Cell(
+            *key,
+            [[rows for result in some for rows in result.rows[start :: len(STARTS)]] for start in range(len(STARTS))],
+            sum(result.seconds for result in some),
+            np.concatenate([result.window_ms for result in some]),
+        )
+        for key, some in results.items()
+    ]
+
+
+def rows(cell: Cell) -> Iterator[dict[str, Any]]:
+    """A row per start, and the mean over the starts."""
+    of_starts: list[tuple[float | str, list[list[NDArray[np.void]]]]] = [
+        (start, [runs]) for start, runs in zip(STARTS, cell.runs, strict=True)
+    ]
+    for start, runs in [*of_starts, (START_OF_MEAN, cell.runs)]:
+        paper_abs, paper_relative = TABLES[cell.scenario][start].of(cell.method)
+        yield {
+            "scenario": cell.scenario,
+            "method": cell.method,
+            "sigma_m": cell.sigma_m,
+            "start_mu": start,
+            **figures(runs),
+            "bound_ratio": None,
+            "paper_mean_abs_error": paper_abs,
+            "paper_mean_relative_error_percent": paper_relative,
+            "seconds": cell.seconds,
+            "ms_per_window_p50": float(np.percentile(cell.window_ms, 50)),
+            "ms_per_window_p99": float(np.percentile(cell.window_ms, 99)),
+        }
+
+
+def run(options: argparse.Namespace) -> int:
+    """Run what is missing, print the tables, draw the figures."""
+    for name in ("runs", "workers"):
+        if getattr(options, name) < 1:
+            raise ValueError(f"{name} = {getattr(options, name)}: give at least 1")
+    wanted = [
+        chunk
+        for method in METHODS
+        for scenario in TABLES
+        for chunk in chunks(scenario, method, NOMINAL_SIGMA_M, options.runs)
+    ]
+    found = cells(wanted, options.cache, options.workers)
+    table = [row for cell in found for row in rows(cell)]
+    if options.figures:
+        from .curves import draw_all
+
+        draw_all(found, options.figures)
+    report(options.json, table, "\n".join([*_table_lines(table), "", *_speed_lines(found)]))
+    return DONE
+
+
+def _table_lines(table: Sequence[dict[str, Any]]) -> Iterator[str]:
+    yield "mean relative error of mu, %, beside the paper's (its EKF beside ours); spread over the runs"
+    yield (
+        f"{'scenario':>13} {'method':>12} {'start':>6} {'ours':>6} {'paper':>6} {'std':>5} {'5 %':>6} {'95 %':>6}"
+        f" {'abs':>7} {'converged':>9} {'cover':>6} {'bound':>6}"
+    )
+    for row in table:
+        reached = "-" if row["converged_kmh"] is None else f"{row['converged_kmh']:.0f} km/h"
+        yield (
+            f"{row['scenario']:>13} {row['method']:>12} {row['start_mu']:>6} {row['mean_relative_error_percent']:6.2f}"
+            f" {row['paper_mean_relative_error_percent']:6.2f} {row['std_relative_error_percent']:5.2f}"
+            f" {row['p5_relative_error_percent']:6.2f} {row['p95_relative_error_percent']:6.2f}"
+            f" {row['mean_abs_error']:7.4f} {reached:>9} {row['coverage95']:6.3f} {row['lower_bound_holds']:6.3f}"
+        )
+
+
+def _speed_lines(found: Sequence[Cell]) -> Iterator[str]:
+    yield "mean relative error over speed, %, all starts"
+    for cell in found:
+        curve = over_speed([rows for of_start in cell.runs for rows in of_start])
+        classes = np.ceil(curve.speed_kmh / SPEED_STEP_KMH).astype(int) * SPEED_STEP_KMH
+        means = (
+            f"{top}: {curve.relative_error_percent[classes == top].mean():.1f}" for top in np.unique(classes)[::-1]
+        )
+        yield f"{cell.scenario:>13} {cell.method:>12}  below km/h  {'  '.join(means)}"
