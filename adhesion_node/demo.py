@@ -33,12 +33,12 @@ from .core.train import KMH
 from .nodes.atp_monitor import AtpMonitor
 from .nodes.estimator import Estimator
 from .nodes.recorder import Recorder
-from .picture import draw
 from .pipeline import Pipeline
-from .recorded_run import read_run
+from .report.picture import draw
+from .report.run import read_run
+from .report.series import read_status
+from .report.table import table
 from .score import Truth
-from .series import read_status
-from .table import table
 from .topics import ATP_STATUS, POSITION
 
 PATIENCE_S = 10.0

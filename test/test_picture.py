@@ -13,12 +13,12 @@ from matplotlib.image import imread
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 
-from adhesion_node import picture
 from adhesion_node.bag import BagReader, BagWriter, sensors
 from adhesion_node.core.train import Train
 from adhesion_node.nodes import convert
-from adhesion_node.recorded_run import Run, distance_to_target, read_run
-from adhesion_node.table import ROWS, table
+from adhesion_node.report import picture
+from adhesion_node.report.run import Run, distance_to_target, read_run
+from adhesion_node.report.table import ROWS, table
 from adhesion_node.topics import BRAKE_PRESSURE, DIAGNOSTICS, MU, MU_LOWER, STATE, TRUTH_MU, TRUTH_STATE, Topic
 
 S = 10**9

@@ -13,7 +13,7 @@ from std_msgs.msg import Float64
 
 from adhesion_node.bag import BagReader, BagWriter, sensors
 from adhesion_node.nodes import convert
-from adhesion_node.series import Series, read_series, read_status
+from adhesion_node.report.series import Series, read_series, read_status
 from adhesion_node.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE, Topic
 
 S = 10**9

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..core.train import Array
-from ..picture import BLACK, BLUE, GREY, ORANGE
+from ..report.picture import BLACK, BLUE, GREY, ORANGE
 from .creep_runs import BAND, DRY, DRY_PEAK, ENOUGH, WET, WET_PEAK, Trace, rise, swings
 
 POINTS = 1500

@@ -10,9 +10,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from .core.train import CRH3, KMH, Array, Train
-from .reading import ATMOSPHERE_PA
-from .recorded_run import FIXED_MU, Run, distance_to_target
+from ..core.train import CRH3, KMH, Array, Train
+from ..reading import ATMOSPHERE_PA
+from .run import FIXED_MU, Run, distance_to_target
 from .series import Series
 
 SHADES = {"COASTING": "0.93", "BRAKE_LIMITED": "#dbe9f6", "ADHESION_LIMITED": "#fdebd0"}

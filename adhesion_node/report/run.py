@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .bag import BagReader
-from .core import braking
-from .core.train import Array, Train
+from ..bag import BagReader
+from ..core import braking
+from ..core.train import Array, Train
+from ..topics import BRAKE_PRESSURE, DIAGNOSTICS, MU, MU_LOWER, STATE, TRUTH_MU, TRUTH_STATE
 from .series import Series, read_series, read_status
-from .topics import BRAKE_PRESSURE, DIAGNOSTICS, MU, MU_LOWER, STATE, TRUTH_MU, TRUTH_STATE
 
 FIXED_MU = 0.0726
 """The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .core.train import CRH3, KMH, Train
-from .recorded_run import FIXED_MU, Run, distance_to_target
+from ..core.train import CRH3, KMH, Train
+from .run import FIXED_MU, Run, distance_to_target
 
 ROWS = 6
 """Rows at most, evenly spread over the speeds of the braking."""

@@ -1,0 +1,1 @@
+"""What a recording shows: its series, their picture and their table."""
