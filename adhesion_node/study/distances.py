@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..cli import DONE, report
 from ..core import braking
 from ..core.adhesion import WET, AdhesionLaw
 from ..core.train import CRH3, KMH
+from . import identified
+from .montecarlo import add_running_options, chunks, run_all
 
 
 class Published(NamedTuple):
@@ -81,8 +84,24 @@ def savings(table: Sequence[Mapping[str, Any]]) -> list[Saving]:
     return found
 
 
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Options of `study distances`."""
+    parser.add_argument(
+        "--runs", type=int, default=0, help="also by the adhesion identified in so many Monte-Carlo runs (default: 0)"
+    )
+    add_running_options(parser)
+
+
+def by_identified(runs: int, cache: Path, workers: int) -> list[dict[str, Any]]:
+    """Distances by the adhesion that the paper's method identified in the runs of `study tables`."""
+    wanted = [chunk for scenario in identified.BRAKINGS for chunk in chunks(scenario, "particle_em", 0.5, runs)]
+    return list(identified.rows(list(run_all(wanted, cache, workers))))
+
+
 def run(options: argparse.Namespace) -> int:
-    """Print the table and the savings."""
+    """Print the table and the savings, and the distances by the identified adhesion where runs are asked for."""
+    if options.runs < 0:
+        raise ValueError(f"runs = {options.runs}: give at least 0")
     table = rows()
     lines = [f"{'km/h':>12} {'mu':>8} {'m':>8} {'paper':>8} {'%':>6} {'s':>6} {'paper':>6} {'%':>6}"]
     lines += [
@@ -97,5 +116,7 @@ def run(options: argparse.Namespace) -> int:
         f"{ours.time_percent:6.2f} {paper.time_percent:6.2f}"
         for ours, paper in zip(savings(table), PUBLISHED_SAVINGS, strict=True)
     ]
-    report(options.json, table, "\n".join(lines))
+    found = by_identified(options.runs, options.cache, options.workers) if options.runs else []
+    lines += [line for row in found for line in identified.lines(row)]
+    report(options.json, table + found, "\n".join(lines))
     return DONE

@@ -6,6 +6,7 @@ on the number of workers, and a study that was killed goes on with the chunks th
 
 from __future__ import annotations
 
+import argparse
 import hashlib
 import multiprocessing
 import os
@@ -72,6 +73,18 @@ class Result(NamedTuple):
     seconds: float
     """Computing time, in one process."""
     window_ms: NDArray[np.float64]
+
+
+def add_running_options(parser: argparse.ArgumentParser) -> None:
+    """Options of every study that runs chunks."""
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
+        help="where finished runs are kept, so that a killed study goes on (default %(default)s)",
+    )
 
 
 def chunks(scenario: str, method: str, sigma_m: float, runs: int, chunk: int = CHUNK) -> list[Chunk]:

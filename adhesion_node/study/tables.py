@@ -10,7 +10,6 @@ process, `ms_per_window` that of a window among the others of its batch. `bound_
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -21,7 +20,7 @@ from numpy.typing import NDArray
 from ..cli import DONE, report
 from .accuracy import figures, over_speed
 from .methods import METHODS, STARTS
-from .montecarlo import Chunk, Result, chunks, run_all
+from .montecarlo import Chunk, Result, add_running_options, chunks, run_all
 from .published import START_OF_MEAN, TABLES
 
 NOMINAL_SIGMA_M = 0.5
@@ -45,14 +44,7 @@ class Cell(NamedTuple):
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study tables`."""
     parser.add_argument("--runs", type=int, default=200, help="Monte-Carlo runs from each start (default %(default)s)")
-    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
-    parser.add_argument(
-        "--cache",
-        type=Path,
-        metavar="DIR",
-        default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
-        help="where finished runs are kept, so that a killed study goes on (default %(default)s)",
-    )
+    add_running_options(parser)
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 4-9 and 14-19 into DIR")
 
 

@@ -1,0 +1,75 @@
+"""Braking distances by the *identified* adhesion, over Monte-Carlo runs: the paper shows them for the true law only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..core import braking
+from ..core.adhesion import WET
+from ..core.train import CRH3, KMH, Array
+from ..score import CONVERGED_AFTER_MPS
+from .methods import STARTS
+from .montecarlo import Result
+
+BRAKINGS = {"tunnel_entry": (300.0, 100.0), "tunnel_exit": (250.0, 50.0)}
+"""Speeds of the scenarios, km/h."""
+
+WORST = 0.0726
+
+
+def law_of(rows: NDArray[np.void], from_mps: float) -> tuple[Array, Array]:
+    """Speeds, rising, and the adhesion identified there; the first 30 km/h take the first value after them.
+
+    Raises ValueError when there is no estimate after the first 30 km/h.
+    """
+    converged = rows[rows["speed_mps"] < from_mps - CONVERGED_AFTER_MPS]
+    if not converged.size:
+        raise ValueError("run without an estimate after the first 30 km/h of braking")
+    order = np.argsort(converged["speed_mps"])
+    return converged["speed_mps"][order], converged["mu"][order]
+
+
+def distance_and_time(rows: NDArray[np.void], from_kmh: float, to_kmh: float) -> tuple[float, float]:
+    """Braking distance, m, and time, s, by the adhesion that a run identified."""
+    speeds, mu = law_of(rows, from_kmh * KMH)
+
+    def law(speed_mps: Array) -> Array:
+        return np.asarray(np.interp(speed_mps, speeds, mu), dtype=np.float64)
+
+    curve = braking.curve(CRH3, from_kmh * KMH, law, to_kmh * KMH)
+    return float(curve.distance_m[-1]), float(curve.time_s[-1])
+
+
+def rows(results: Sequence[Result]) -> Iterator[dict[str, Any]]:
+    """A row per scenario: distance and time by the identified adhesion, by the true law, and what both save."""
+    for scenario, (from_kmh, to_kmh) in BRAKINGS.items():
+        runs = [rows for result in results if result.chunk.scenario == scenario for rows in result.rows]
+        found = np.array([distance_and_time(run, from_kmh, to_kmh) for run in runs])
+        true, worst = (braking.curve(CRH3, from_kmh * KMH, mu, to_kmh * KMH) for mu in (WET, WORST))
+        row: dict[str, Any] = {"from_kmh": from_kmh, "to_kmh": to_kmh, "case": "identified"}
+        row["runs"] = len(runs) // len(STARTS)
+        for values, name in zip(found.T, ("distance_m", "time_s"), strict=True):
+            fixed = float(getattr(worst, name)[-1])
+            row |= {
+                name: float(values.mean()),
+                f"{name}_p5": float(np.percentile(values, 5)),
+                f"{name}_p95": float(np.percentile(values, 95)),
+                f"{name}_true_law": float(getattr(true, name)[-1]),
+                f"{name}_saved_percent": 100.0 * (1.0 - float(values.mean()) / fixed),
+            }
+        yield row
+
+
+def lines(row: Mapping[str, Any]) -> Iterator[str]:
+    """A row in words."""
+    yield ""
+    yield f"{row['from_kmh']:g} -> {row['to_kmh']:g} km/h by the identified mu, {row['runs']} runs from each start:"
+    for name, unit in (("distance_m", "m"), ("time_s", "s")):
+        yield (
+            f"  {row[name]:.1f} {unit} ({row[f'{name}_p5']:.1f} to {row[f'{name}_p95']:.1f}), by the true law "
+            f"{row[f'{name}_true_law']:.1f}; {row[f'{name}_saved_percent']:.2f} % less than by the fixed {WORST}"
+        )

@@ -1,0 +1,85 @@
+"""Braking distances by the identified adhesion, and the sensitivity table: hand-made runs with known answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adhesion_node.core import braking
+from adhesion_node.core.adhesion import WET
+from adhesion_node.core.train import CRH3, KMH
+from adhesion_node.study import identified, sensitivity
+from adhesion_node.study.__main__ import main
+from adhesion_node.study.methods import STARTS
+from adhesion_node.study.montecarlo import Chunk, Result
+from adhesion_node.study.runs import ROW
+
+
+def a_run(from_kmh: float, to_kmh: float, scale: float) -> np.ndarray:
+    """A run whose estimates are the wet law times `scale`, and nonsense during the first 30 km/h."""
+    speeds = np.linspace(from_kmh, to_kmh, 200) * KMH
+    mu = np.where(speeds > (from_kmh - 30.0) * KMH, 0.001, scale * WET(speeds))
+    rows = zip(speeds, WET(speeds), mu, strict=True)
+    return np.array([(i, speed, true, mu, 0.01, 0.0, True, True) for i, (speed, true, mu) in enumerate(rows)], ROW)
+
+
+def result(scenario: str, runs: Sequence[np.ndarray]) -> Result:
+    chunk = Chunk(scenario, "particle_em", 0.5, 1000, len(runs) // len(STARTS))
+    return Result(chunk, list(runs), 0.0, np.zeros(1))
+
+
+def test_the_true_law_gives_its_own_distance_save_for_the_first_30_kmh() -> None:
+    distance, time = identified.distance_and_time(a_run(250.0, 50.0, 1.0), 250.0, 50.0)
+    # By hand: down to 220 km/h with the adhesion of 220 km/h, from there with the law.
+    first = braking.curve(CRH3, 250 * KMH, float(WET(np.array(220 * KMH))), 220 * KMH)
+    rest = braking.curve(CRH3, 220 * KMH, WET, 50 * KMH)
+    assert distance == pytest.approx(first.distance_m[-1] + rest.distance_m[-1], rel=1e-3)
+    assert time == pytest.approx(first.time_s[-1] + rest.time_s[-1], rel=1e-3)
+
+
+def test_a_run_without_converged_estimates_is_refused() -> None:
+    with pytest.raises(ValueError, match="without an estimate after the first 30 km/h"):
+        identified.distance_and_time(a_run(250.0, 225.0, 1.0), 250.0, 50.0)
+
+
+def test_rows_tell_mean_band_and_saving() -> None:
+    results = [
+        result(name, [a_run(*speeds, scale) for scale in (0.9, 0.95, 1.0, 1.05, 1.1)])
+        for name, speeds in identified.BRAKINGS.items()
+    ]
+    entry, leaving = identified.rows(results)
+    assert (entry["from_kmh"], entry["runs"], leaving["to_kmh"]) == (300.0, 1, 50.0)
+    for row in (entry, leaving):
+        assert row["distance_m_p5"] < row["distance_m"] < row["distance_m_p95"]
+        assert row["distance_m"] == pytest.approx(row["distance_m_true_law"], rel=0.02)
+        fixed = braking.curve(CRH3, row["from_kmh"] * KMH, 0.0726, row["to_kmh"] * KMH)
+        assert row["time_s_saved_percent"] == pytest.approx(100 - 100 * row["time_s"] / fixed.time_s[-1])
+
+
+def test_one_setting_at_a_time_leaves_the_nominal_ones() -> None:
+    nominal = Chunk("tunnel_entry", "particle_em", 0.5, 1000, 3)
+    for setting, value, chunk in sensitivity.variations(3):
+        assert chunk._replace(method="particle_em", **{setting: getattr(nominal, setting)}) == nominal
+        assert getattr(chunk, setting) == value
+
+
+def test_the_sensitivity_table_says_where_the_papers_figure_is_met(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def computed(wanted: Sequence[Chunk], _cache: Path, _workers: int) -> list[Result]:
+        """Errors of 1, 1.5, 10 ... %: rising with the noise."""
+        scales = {0.05: 1.01, 0.1: 1.015}
+        runs = [[a_run(300.0, 100.0, scales.get(chunk.sigma_m, 1.1))[40:]] * len(STARTS) for chunk in wanted]
+        return [Result(chunk, some, 0.0, np.zeros(1)) for chunk, some in zip(wanted, runs, strict=True)]
+
+    monkeypatch.setattr(sensitivity, "run_all", computed)
+    assert main(["sensitivity", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
+    assert "the paper's 1.87 % is met up to sigma = 0.1 m" in capsys.readouterr().out
+    first = json.loads((tmp_path / "table.json").read_text())[0]
+    assert (first["setting"], first["value"], first["method"]) == ("sigma_m", 0.05, "particle_em")
+    assert first["mean_relative_error_percent"] == pytest.approx(1.0)
+    assert main(["sensitivity", "--runs", "0"]) == 2
