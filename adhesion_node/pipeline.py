@@ -84,7 +84,7 @@ class Pipeline:
 def _bytes(prediction: Prediction) -> bytes:
     """Every number of a prediction, little-endian: integers as 8 bytes, floats as doubles."""
     e = prediction.estimate
-    whole = struct.pack("<4q", e.t_ns, e.window, e.iterations, e.converged)
+    whole = struct.pack("<5q", e.t_ns, e.window, e.iterations, e.converged, e.changes)
     real = struct.pack(
         "<9d",
         *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, e.position_std_m, e.speed_std_mps),

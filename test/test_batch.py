@@ -134,7 +134,7 @@ def _numbers(estimates: list[Estimate]) -> list[tuple[float, ...]]:
 
 def test_lockstep_is_the_core_through_start_release_gap_and_end() -> None:
     """Runs of different length and phase; one has no pressure, one waits for late measurements, one is disturbed."""
-    config = Config(iterations=5, window=20, step=6)
+    config = Config(method="particle_em", iterations=5, window=20, step=6)
     braking = ride([(4.0, 0.0), (8.0, 410e3), (2.0, 0.0), (5.0, 300e3)], seed=1)
     streams = [
         braking,
@@ -158,7 +158,7 @@ def test_lockstep_is_the_core_through_start_release_gap_and_end() -> None:
 
 
 def test_a_run_does_not_depend_on_its_company() -> None:
-    config = Config(iterations=5, window=20, step=6)
+    config = Config(method="particle_em", iterations=5, window=20, step=6)
     runs = [lockstep.Run(config, seed, ride([(2.0, 0.0), (5.0, 410e3)], seed=seed)) for seed in (1, 2, 3)]
     assert lockstep.drive(runs)[1] == lockstep.drive(runs[1:2])[0]
 

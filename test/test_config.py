@@ -12,9 +12,9 @@ from adhesion_node.core import Config
 from adhesion_node.core.adhesion import SNOW, WET
 
 
-def test_nominal_is_the_papers_run() -> None:
+def test_nominal_has_the_papers_noise() -> None:
     config = Config()
-    assert (config.window, config.step, config.particles, config.iterations) == (50, 10, 20, 50)
+    assert (config.window, config.particles, config.iterations) == (50, 20, 50)
     assert config.position_noise_m == 0.02
     assert config.speed_noise_mps == pytest.approx(0.02 / 3.6)
     # per second: 0.02^2/0.1 and (0.02/3.6)^2/0.1 = 3.0864e-4

@@ -61,7 +61,8 @@ def other(value: Value) -> Value:
         return value + 1 if value == 1 else value - 1
     if isinstance(value, float):
         return value * 0.999 if value else 1e-3
-    return {"snow": "wet", "track": "map", "": "tunnel 0 1000"}[value]
+    others = {"snow": "wet", "wet": "snow", "rail_condition": "particle_em", "track": "map", "": "tunnel 0 1000"}
+    return others[value]
 
 
 def test_there_is_a_section_for_each_node_with_parameters() -> None:

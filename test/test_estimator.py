@@ -13,7 +13,7 @@ from oracles import drive, ride
 from adhesion_node.core import Config, Estimate, Measurement, Outcome, Regime, State, finish, init, step
 
 FULL = 410e3
-QUICK = Config(window=20, step=5, particles=8, iterations=8)
+QUICK = Config(method="particle_em", window=20, step=5, particles=8, iterations=8)
 """The mechanics do not depend on the accuracy."""
 STOP: list[tuple[float, float | None]] = [(5.0, 0.0), (8.0, FULL)]
 
@@ -225,9 +225,20 @@ def test_what_the_window_knew_of_the_speed_is_not_lost_on_release() -> None:
 
 @pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])
 def test_one_second_of_braking_claims_nothing_whatever_the_start(start_mu: float) -> None:
-    """Ten measurements know mu to 0.2: the low law stays, 0.03 + 8/(130 + 288) = 0.0491 at 80 m/s, and no regime."""
+    """Ten measurements know little: ignorance stays, and its low law pulls, 0.03 + 8/(130 + 288) = 0.0491 at 80 m/s."""
     _, estimates = drive(Config(start_mu=start_mu), ride([(5.0, 0.0), (1.0, FULL)]))
+    _, others = drive(Config(), ride([(5.0, 0.0), (1.0, FULL)]))
     assert estimates[-1].window == 10
+    assert estimates[-1].regime is Regime.COASTING
+    assert estimates[-1].mu == pytest.approx(others[-1].mu, abs=1e-6)
+    assert 0.025 < estimates[-1].mu_std < 0.041
+    assert estimates[-1].mu_lower < 0.03
+
+
+@pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])
+def test_the_papers_method_claims_nothing_after_one_second_either(start_mu: float) -> None:
+    config = Config(method="particle_em", step=10, start_mu=start_mu)
+    _, estimates = drive(config, ride([(5.0, 0.0), (1.0, FULL)]))
     assert estimates[-1].regime is Regime.COASTING
     assert estimates[-1].mu == pytest.approx(0.0491, abs=0.015)
     assert estimates[-1].mu_std == pytest.approx(0.04, rel=0.2)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -16,6 +17,7 @@ from rclpy.parameter import Parameter
 
 from adhesion_node import topics
 from adhesion_node.core import braking
+from adhesion_node.core.adhesion import WET, AdhesionLaw
 from adhesion_node.core.align import PositionSample, PressureSample
 from adhesion_node.core.train import CRH3, GRAVITY
 from adhesion_node.nodes import convert, qos
@@ -134,7 +136,11 @@ def test_every_result_says_the_same_of_one_instant(line: Line) -> None:
     assert last[topics.DECELERATION].accel.covariance[0] == pytest.approx((GRAVITY * estimate.mu_std) ** 2)
     assert last[topics.STATE].pose.pose.position.x == estimate.position_m
     assert last[topics.STATE].twist.twist.linear.x == estimate.speed_mps
-    for topic, mu in ((topics.BRAKING_CURVE, estimate.mu_lower), (topics.BRAKING_CURVE_NOMINAL, estimate.mu)):
+    expectation: list[tuple[topics.Topic, float | AdhesionLaw]] = [
+        (topics.BRAKING_CURVE, estimate.mu_lower),
+        (topics.BRAKING_CURVE_NOMINAL, lambda v: estimate.mu * WET(v) / WET(np.array(estimate.speed_mps))),
+    ]
+    for topic, mu in expectation:
         message = last[topic]
         t_ns, read = convert.curve(message)
         expected = braking.curve(CRH3, estimate.speed_mps, mu)

@@ -11,10 +11,11 @@ from oracles import Linear, dense_information, make_window, ride, rts
 from scipy import stats
 
 from adhesion_node.core import Config, Measurement, tracker
-from adhesion_node.core.braking_window import BrakingWindow, evaluate
+from adhesion_node.core.braking_window import BrakingWindow
 from adhesion_node.core.em import Search
 from adhesion_node.core.gaussian import Gaussian, coast, filter_window, observe
 from adhesion_node.core.motion import Motion
+from adhesion_node.core.paper import evaluate
 from adhesion_node.core.track import LEVEL
 from adhesion_node.core.train import CRH3
 from adhesion_node.core.window import Sample, Window, window_of

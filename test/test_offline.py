@@ -16,6 +16,7 @@ from adhesion_node.bag import BagWriter, deserialize, sensors, serialize
 from adhesion_node.bag.writer import FILE_NAME
 from adhesion_node.core import Config, Estimate, Measurement, finish, init, step
 from adhesion_node.nodes import replay
+from adhesion_node.settings import setup_of
 from adhesion_node.topics import BRAKE_PRESSURE, POSITION, TRUTH_MU, TRUTH_STATE, Topic
 from sim_node import messages
 from sim_node.plant import Truth
@@ -27,10 +28,10 @@ S = 10**9
 START_NS = 1_700_000_000 * S
 """Stamp of the scenario's begin."""
 
-FAST = {"iterations": 3, "particles": 10}
+FAST = {"method": "particle_em", "step": 10, "iterations": 3, "particles": 10}
 """EM that is quick rather than good."""
 
-FAST_CONFIG = Config(iterations=3, particles=10)
+FAST_CONFIG = setup_of(FAST).config
 FAST_SETTINGS = [f"--set={name}={value}" for name, value in FAST.items()]
 
 KEYS = {"measurements", "accepted", "dropped", "windows", "mu_final", "mu_lower_final", "regime_final", "digest"}
@@ -188,7 +189,7 @@ def test_the_seed_changes_the_result(bag: Path, offline: Offline) -> None:
 
 
 def test_a_setting_is_used(bag: Path, offline: Offline) -> None:
-    config = Config(iterations=3, particles=10, window=40)
+    config = setup_of({**FAST, "window": 40}).config
     shorter = offline(bag, "--set", "window=40").result
     assert shorter["mu_final"] == straight(samples(), config)[-1].mu != straight(samples(), FAST_CONFIG)[-1].mu
     rougher = offline(bag, "--set", "window=40", "--set", "train.resistance_c0=5.79").result
@@ -199,6 +200,8 @@ def test_a_setting_is_used(bag: Path, offline: Offline) -> None:
 PARAMS = """
 {name}:
   ros__parameters:
+    method: particle_em
+    step: 10
     iterations: 3
     particles: 10
     confidence: 0.9
@@ -353,7 +356,7 @@ def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offl
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--set", "windw=40"], "setting 'windw=40': write NAME=VALUE with one of seed, frame, window"),
+        (["--set", "windw=40"], "setting 'windw=40': write NAME=VALUE with one of seed, frame, method"),
         (["--set", "window=forty"], "setting window = 'forty': give a value of type int"),
         (["--set", "window=2"], "window = 2: give a value from 3 to 10000"),
         (["--set", "window=10"], "step = 10: choose less than the window, 10"),

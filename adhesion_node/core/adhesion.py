@@ -44,6 +44,11 @@ class SpeedLaw:
         speed_kmh = np.maximum(speed_mps, 0.0) / KMH
         return self.scale * (self.floor + self.gain_kmh / (self.offset_kmh + speed_kmh))
 
+    def slope(self, speed_mps: Array) -> Array:
+        """Derivative with respect to the speed, s/m."""
+        speed_kmh = np.maximum(speed_mps, 0.0) / KMH
+        return -self.scale * self.gain_kmh / (self.offset_kmh + speed_kmh) ** 2 / KMH
+
 
 DRY = SpeedLaw(0.06, 46.6, 260.0)
 WET = SpeedLaw(0.04, 13.7, 120.0)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import math
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
-import numpy as np
-
+from .adhesion import SpeedLaw
 from .config import Config
-from .em import Identified, ParticleSmoother, Search, identify
-from .gaussian import Gaussian, filter_window
-from .rail import kept_of_start
-from .window import Sample, window_of
+from .gaussian import Gaussian
+from .hypothesis import Hypothesis
+from .outcome import Regime
+from .rail import Rail
+from .window import Sample
 
 
 class BrakingWindow(NamedTuple):
@@ -19,49 +18,36 @@ class BrakingWindow(NamedTuple):
 
     prior: Gaussian
     samples: tuple[Sample, ...]
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """Joint laws with the rail condition at the first sample; empty until such a window is evaluated."""
 
     def extended(self, sample: Sample) -> BrakingWindow:
         """The window with one more sample."""
         return self._replace(samples=(*self.samples, sample))
 
+    def spent(self, config: Config) -> int:
+        """Samples to leave behind, so that L more fill the window again; 0 while it still grows."""
+        spent = len(self.samples) - config.window + config.step
+        return spent if spent >= config.step else 0
 
-class Evaluation(NamedTuple):
-    """What a window says."""
 
-    identified: Identified
-    std: float
-    """Standard deviation of mu from this window alone, from the observed information."""
-    kept: float
-    """Share of the EM's start that is left in mu."""
+class Verdict(NamedTuple):
+    """What a method makes of a window."""
+
+    regime: Regime
+    rail: Rail
     law: Gaussian
-    """Filtered law of (s, v) at the newest sample, the uncertainty of mu included."""
+    """Of (s, v) at the newest sample."""
     following: BrakingWindow
     """The window to go on with."""
-
-
-class Evaluate(Protocol):
-    """Evaluates a window: `evaluate`, or what stands for it where many estimators run side by side."""
-
-    def __call__(
-        self, config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator
-    ) -> Evaluation: ...
-
-
-def evaluate(config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:
-    """Identify mu in the window by EM and filter the state with the result.
-
-    A full window moves on so far that L more measurements fill it again. The filtered law at its new first sample
-    holds nothing of the samples behind it, so the overlap is not counted twice.
-    """
-    motion, arrays = config.motion, window_of(window.samples)
-    identified = identify(ParticleSmoother(config.particles), motion, window.prior, arrays, search, rng)
-    filtered = filter_window(motion, window.prior, arrays, identified.mu)
-    std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
-    kept = kept_of_start(filtered.information, identified.weight, identified.iterations)
-    spread = filtered.sensitivity * min(std, config.unknown_std)
-    law = filtered.laws[-1]
-    following = window
-    spent = len(window.samples) - config.window + config.step
-    if spent >= config.step:
-        following = BrakingWindow(filtered.laws[spent - 1], window.samples[spent:])
-    return Evaluation(identified, std, kept, Gaussian(law.mean, law.covariance + np.outer(spread, spread)), following)
+    mu: float
+    """Adhesion for the next window to start from (12)."""
+    iterations: int
+    converged: bool
+    log_likelihood: float
+    shape: SpeedLaw | None = None
+    """How the adhesion goes on as the train slows down; None where a method says nothing of it."""
+    ess: float = 0.0
+    """Smallest effective sample size in the window; 0 where no particles were used."""
+    changed: bool = False
+    """Whether the rail has changed within the window."""

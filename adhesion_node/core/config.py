@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from .adhesion import LAWS, SpeedLaw
@@ -13,16 +14,34 @@ from .train import CRH3, KMH, Train
 
 @dataclass(frozen=True, slots=True)
 class Config:
-    """Settings of the estimator; `Config()` is the paper's method at the nominal noise.
+    """Settings of the estimator; `Config()` is the default method at the nominal noise.
 
     Raises ValueError naming the setting, its value and its range.
     """
 
     train: Train = CRH3
     track: Track = LEVEL
+    method: str = setting(
+        "rail_condition",
+        "rail_condition: a factor on the speed law, by a Gaussian smoother; particle_em: constant mu, the paper's",
+        choices=("rail_condition", "particle_em"),
+    )
+    law: str = setting(
+        "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))
+    )
+    law_probability: float = setting(
+        0.9, "Probability of that shape; else that of low_adhesion, or no dependence on speed", low=0.0, high=1.0
+    )
+    rail_drift: float = setting(
+        0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0
+    )
+    change_threshold: float = setting(
+        4.0, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
+    )
+    tail_dof: float = setting(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
     window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
-    step: int = setting(10, "Measurements between two windows, L; less than the window", low=1, high=10_000)
-    particles: int = setting(20, "Particles, M", low=2, high=100_000)
+    step: int = setting(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
+    particles: int = setting(20, "Particles, M, of particle_em", low=2, high=100_000)
     iterations: int = setting(50, "EM iterations at most", low=1, high=10_000)
     tolerance: float = setting(1e-7, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
     start_mu: float = setting(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
@@ -50,6 +69,12 @@ class Config:
         0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
     )
     pressure_age_s: float = setting(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
+    grade_std: float = setting(
+        0.0, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
+    )
+    mass_std: float = setting(0.0, "Standard deviation of the mass, relative", "", 0.0, 1.0)
+    brake_std: float = setting(0.0, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
+    rotating_mass_std: float = setting(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
     low_adhesion: str = setting(
         "snow", "Adhesion law to fall back to where nothing is known", choices=tuple(sorted(LAWS))
     )
@@ -74,9 +99,20 @@ class Config:
             raise ValueError(f"step = {self.step}: choose less than the window, {self.window}")
 
     @property
+    def speed_law(self) -> SpeedLaw:
+        """The law that the rail condition scales."""
+        return LAWS[self.law]
+
+    @property
     def low_law(self) -> SpeedLaw:
         """The low-adhesion law."""
         return LAWS[self.low_adhesion]
+
+    @property
+    def brake_error(self) -> float:
+        """Standard deviation of the most that the brake can use, B/(M g), relative."""
+        rotating = self.rotating_mass_std / (1.0 + self.train.rotating_mass_fraction)
+        return math.hypot(self.mass_std, self.brake_std, rotating)
 
     @property
     def motion(self) -> Motion:

@@ -5,21 +5,20 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
-from .braking_window import BrakingWindow, Evaluate, Evaluation, evaluate
+from .adhesion import SpeedLaw
+from .braking_window import BrakingWindow, Verdict
+from .condition import evaluate_condition
 from .config import Config
 from .em import Search
 from .gaussian import Gaussian
 from .measurement import Measurement
 from .outcome import Regime
-from .rail import Finding, Rail, age, ignorance, learn, learn_bound
+from .paper import Evaluate, evaluate, judge
+from .rail import Rail, age, ignorance
 
 LOWEST_NET_ADHESION = -0.05
 """Where the brake pressure is not measured, traction may be at work: the net force may point forward."""
-
-UNDECIDED = 0.5
-"""Share of the EM's start in its result above which a window has seen too little to tell what limits the motion."""
 
 
 class Estimate(NamedTuple):
@@ -41,7 +40,11 @@ class Estimate(NamedTuple):
     converged: bool = True
     log_likelihood: float = 0.0
     ess: float = 0.0
-    """Smallest effective sample size in the window."""
+    """Smallest effective sample size in the window; 0 where no particles were used."""
+    changes: int = 0
+    """Changes of the rail found so far."""
+    shape: SpeedLaw | None = None
+    """How mu goes on, up to a factor, as the train slows down; None: nothing is known of it."""
 
 
 class Knowledge(NamedTuple):
@@ -51,6 +54,8 @@ class Knowledge(NamedTuple):
     """Windows evaluated; numbers their random streams."""
     mu: float | None = None
     """Adhesion that the last window gave, the next one's start (12)."""
+    changes: int = 0
+    """Changes of the rail found."""
     rail: Rail | None = None
     t_ns: int = 0
     position_m: float = 0.0
@@ -82,26 +87,17 @@ def estimate(
     if window is None or len(window.samples) < 2:
         return _result(newest, law, window, knowledge, rail, Regime.COASTING)
     unmeasured = newest.brake_pressure_pa is None
-    search = Search(
-        start=config.start_mu if knowledge.mu is None else knowledge.mu,
-        iterations=config.iterations,
-        tolerance=config.tolerance,
-        lowest=LOWEST_NET_ADHESION if unmeasured else 0.0,
-    )
-    evaluation = evaluate(config, window, search, np.random.default_rng([seed, knowledge.windows]))
-    regime, rail = _judge(config, evaluation, rail, search.start, unmeasured)
-    knowledge = knowledge._replace(windows=knowledge.windows + 1, mu=evaluation.identified.mu)
-    result = _result(newest, evaluation.law, evaluation.following, knowledge, rail, regime)
-    identified = evaluation.identified
-    return result._replace(
-        estimate=result.estimate._replace(
-            window=len(window.samples),
-            iterations=identified.iterations,
-            converged=identified.converged,
-            log_likelihood=identified.log_likelihood,
-            ess=identified.ess,
-        )
-    )
+    lowest = LOWEST_NET_ADHESION if unmeasured else 0.0
+    if config.method == "particle_em":
+        start = config.start_mu if knowledge.mu is None else knowledge.mu
+        search = Search(start, config.iterations, config.tolerance, lowest)
+        evaluation = evaluate(config, window, search, np.random.default_rng([seed, knowledge.windows]))
+        verdict = judge(config, evaluation, rail, start, unmeasured)
+    else:
+        verdict = evaluate_condition(config, window, rail, config.start_mu if knowledge.mu is None else None, lowest)
+        if unmeasured and verdict.rail.mu <= 2.0 * verdict.rail.std:
+            verdict = verdict._replace(regime=Regime.COASTING, rail=rail)
+    return _judged(newest, window, knowledge, verdict)
 
 
 def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowledge) -> Rail:
@@ -114,18 +110,21 @@ def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowled
     return age(knowledge.rail, nothing, elapsed + travelled)
 
 
-def _judge(config: Config, evaluation: Evaluation, before: Rail, start: float, unmeasured: bool) -> tuple[Regime, Rail]:
-    """What the window shows: no brake, the brake's limit, or the adhesion."""
-    limit = evaluation.identified.limit
-    finding = Finding(evaluation.identified.mu, evaluation.std, min(start, limit), evaluation.kept)
-    learnt = learn(before, finding, float(ndtri(config.confidence)))
-    if unmeasured and learnt.mu <= 2.0 * learnt.std:
-        return Regime.COASTING, before
-    if finding.kept > UNDECIDED:
-        return Regime.COASTING, learnt
-    if learnt.mu + learnt.std < limit:
-        return Regime.ADHESION_LIMITED, learnt
-    return Regime.BRAKE_LIMITED, learn_bound(before, learnt)
+def _judged(newest: Measurement, window: BrakingWindow, knowledge: Knowledge, verdict: Verdict) -> Result:
+    knowledge = knowledge._replace(
+        windows=knowledge.windows + 1, mu=verdict.mu, changes=knowledge.changes + verdict.changed
+    )
+    result = _result(newest, verdict.law, verdict.following, knowledge, verdict.rail, verdict.regime)
+    return result._replace(
+        estimate=result.estimate._replace(
+            window=len(window.samples),
+            iterations=verdict.iterations,
+            converged=verdict.converged,
+            log_likelihood=verdict.log_likelihood,
+            ess=verdict.ess,
+            shape=verdict.shape,
+        )
+    )
 
 
 def _result(
@@ -148,5 +147,6 @@ def _result(
         speed_mps=max(speed, 0.0),
         position_std_m=law.position_std,
         speed_std_mps=law.speed_std,
+        changes=knowledge.changes,
     )
     return Result(estimate, known, law, window)

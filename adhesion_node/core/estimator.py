@@ -14,12 +14,13 @@ from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 from . import tracker
-from .braking_window import BrakingWindow, Evaluate, evaluate
+from .braking_window import BrakingWindow
 from .config import Config
 from .estimate import Estimate, Knowledge, Result, estimate
 from .gaussian import Gaussian
 from .measurement import Measurement
 from .outcome import Outcome
+from .paper import Evaluate, evaluate
 from .window import Sample
 
 SLOWEST_MPS = 3.0

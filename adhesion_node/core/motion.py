@@ -52,7 +52,7 @@ class Motion:
 
     def jacobian(self, speed_mps: float, dt_s: float, brake_limits: bool) -> Array:
         """Derivative of the step with respect to (s, v), shape (2, 2), the track's profile held fixed."""
-        slope = 3.6e-3 * (self.train.resistance_c1 + 2.0 * self.train.resistance_c2 * 3.6 * speed_mps)
+        slope = float(self.train.resistance_slope(np.asarray(speed_mps)))
         if brake_limits:  # M (1 + rho) a = B + R
             slope /= 1.0 + self.train.rotating_mass_fraction
         kept = 1.0 - dt_s * GRAVITY * slope

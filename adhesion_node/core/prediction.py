@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
+import numpy as np
+from scipy.special import ndtri
+
 from . import braking
+from .adhesion import AdhesionLaw
 from .braking import BrakingCurve
 from .config import Config
 from .estimate import Estimate
+from .train import Train
 
 
 class Prediction(NamedTuple):
@@ -23,18 +29,30 @@ class Prediction(NamedTuple):
 def predict(config: Config, estimate: Estimate) -> Prediction:
     """Braking curves from the estimate's speed on the least favourable resistance of the track ahead.
 
-    Adhesion is held at its present value: on the published laws it only rises while the train slows down.
+    The safe curve holds the bound at its present value: on the published laws adhesion only rises while the train
+    slows down. Its brake is that of the configured confidence. The nominal curve follows the identified law.
     """
     resistance = config.track.least_resistance(estimate.position_m)
+    weakest = max(1.0 - float(ndtri(config.confidence)) * config.brake_error, 0.0)
+    cautious = replace(config.train, rigging_efficiency=max(config.train.rigging_efficiency * weakest, 1e-3))
     return Prediction(
         estimate,
-        _curve(config, estimate.speed_mps, estimate.mu_lower, resistance),
-        _curve(config, estimate.speed_mps, estimate.mu, resistance),
+        _curve(cautious, estimate.speed_mps, estimate.mu_lower, resistance),
+        _curve(config.train, estimate.speed_mps, _expected(estimate), resistance),
     )
 
 
-def _curve(config: Config, speed_mps: float, mu: float, resistance: float) -> BrakingCurve | None:
+def _expected(estimate: Estimate) -> float | AdhesionLaw:
+    """Adhesion from here on: the identified law through the estimate, or the present value."""
+    shape = estimate.shape
+    if shape is None:
+        return max(estimate.mu, 0.0)
+    now = float(shape(np.asarray(estimate.speed_mps)))
+    return replace(shape, scale=shape.scale * max(estimate.mu, 1e-6) / now)
+
+
+def _curve(train: Train, speed_mps: float, mu: float | AdhesionLaw, resistance: float) -> BrakingCurve | None:
     try:
-        return braking.curve(config.train, speed_mps, max(mu, 0.0), grade=resistance)
+        return braking.curve(train, speed_mps, mu, grade=resistance)
     except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
         return None

@@ -80,6 +80,10 @@ class Train:
         c0, c1, c2 = 1e-3 * self.resistance_c0, 3.6e-3 * self.resistance_c1, 12.96e-3 * self.resistance_c2
         return c0 + speed_mps * (c1 + c2 * speed_mps)
 
+    def resistance_slope(self, speed_mps: Array) -> Array:
+        """Derivative of `specific_resistance` with respect to the speed, s/m."""
+        return 3.6e-3 * (self.resistance_c1 + 7.2 * self.resistance_c2 * speed_mps)
+
     def basic_resistance(self, speed_mps: Array) -> Array:
         """Basic running resistance R1, N (6).
 

@@ -16,9 +16,10 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from ..core import Config, Estimate, Measurement, State, finish, init, step
-from ..core.braking_window import BrakingWindow, Evaluate, Evaluation
+from ..core.braking_window import BrakingWindow
 from ..core.em import Search
 from ..core.gaussian import Gaussian
+from ..core.paper import Evaluate, Evaluation
 from ..core.rail import kept_of_start
 from ..core.window import Window, window_of
 from . import batch
@@ -29,7 +30,7 @@ Taken = TypeVar("Taken")
 
 
 class Due(NamedTuple):
-    """A window to evaluate: the arguments of `core.braking_window.evaluate`."""
+    """A window to evaluate: the arguments of `core.paper.evaluate`."""
 
     window: BrakingWindow
     search: Search
@@ -71,7 +72,7 @@ def drive(runs: Sequence[Run], window_ms: list[float] | None = None) -> list[lis
 
 
 def evaluate_all(config: Config, dues: Sequence[Due]) -> list[Evaluation]:
-    """`core.braking_window.evaluate` of many windows; those of equal length go together."""
+    """`core.paper.evaluate` of many windows; those of equal length go together."""
     windows = [window_of(due.window.samples) for due in dues]
     groups: dict[int, list[int]] = defaultdict(list)
     for index, window in enumerate(windows):

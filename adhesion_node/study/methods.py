@@ -43,7 +43,10 @@ Method = Callable[[Config, Sequence[Lane]], Outcome]
 def particle_em(config: Config, lanes: Sequence[Lane]) -> Outcome:
     """The paper's method, all lanes in lockstep."""
     started, ticks = time.perf_counter(), list[float]()
-    runs = [Run(replace(config, start_mu=lane.start_mu), lane.seed, lane.simulated.measurements) for lane in lanes]
+    runs = [
+        Run(replace(config, method="particle_em", start_mu=lane.start_mu), lane.seed, lane.simulated.measurements)
+        for lane in lanes
+    ]
     estimates = drive(runs, ticks)
     rows = [rows_of(config, lane.simulated.truth, found) for lane, found in zip(lanes, estimates, strict=True)]
     return Outcome(rows, time.perf_counter() - started, ticks)

@@ -1,0 +1,185 @@
+"""The default method for one window: the rail condition kappa in mu(v) = kappa law(v), and the changes of the rail.
+
+The window's prior is the joint law of (s, v, kappa) that the measurements behind it left, so nothing is counted
+twice: what the window finds is its answer, and only what leaves it becomes prior.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.special import expit, ndtri
+
+from .braking_window import BrakingWindow, Verdict
+from .changes import Change, change
+from .config import Config
+from .gaussian import Gaussian
+from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
+from .outcome import Regime
+from .rail import Rail, learn_bound
+from .smoother import Search, Smoothed, posterior, smooth
+from .train import Array
+from .window import Window, window_of
+from .window_model import Belief, Model, Problem
+
+UNDECIDED = 0.5
+"""Share of ignorance's standard deviation above which a window has seen too little to tell what limits the motion."""
+
+EDGE = 5
+"""Steps at either end of a window in which a change of the rail is not looked for."""
+
+PLAUSIBLE = 0.005
+"""Probability from which a hypothesis may lower the bound."""
+
+CLEAR = 2.0
+"""Standard deviations by which kappa must stay below the brake's limit for a step to tell of it."""
+
+
+class Found(NamedTuple):
+    """What a window says under one hypothesis."""
+
+    before: Hypothesis
+    """As it stood at the window's first sample."""
+    problem: Problem
+    smoothed: Smoothed
+    now: Hypothesis
+    """As it stands at the newest one."""
+
+
+def evaluate_condition(
+    config: Config, window: BrakingWindow, before: Rail, start: float | None, lowest: float
+) -> Verdict:
+    """Identify the rail condition; where the rail has changed within the window, from the change on.
+
+    `before` is the rail as it was known, which a new braking begins with; `start` the adhesion to start from.
+    """
+    if not window.hypotheses:
+        window = _opened(config, with_rail(window.prior, before), window)
+    arrays = window_of(window.samples)
+    found = list[Found]()
+    for hypothesis in window.hypotheses:
+        near = found[0].smoothed.trajectory if found else None
+        found.append(_find(config, arrays, hypothesis, (start, lowest), near))
+    leading = max(found, key=lambda each: each.now.log_weight)
+    suspected = _suspected(config, leading)
+    changed = suspected is not None and suspected.log_odds >= config.change_threshold
+    if suspected is not None and changed:
+        following = _opened(config, suspected.belief, window._replace(samples=window.samples[-1:]))
+        law, now, suspected = following.prior, following.hypotheses, None
+    else:
+        following = _following(config, window, found)
+        law, now = _state(leading.now.belief), tuple(each.now for each in found)
+    regime, rail = _judge(config, now, suspected, before, window.samples[-1].brake)
+    return Verdict(
+        regime=regime,
+        rail=rail,
+        law=law,
+        following=following,
+        mu=leading.now.mu,
+        shape=leading.now.law,
+        iterations=leading.smoothed.iterations,
+        converged=leading.smoothed.converged,
+        log_likelihood=leading.now.log_weight,
+        changed=changed,
+    )
+
+
+def _opened(config: Config, belief: Belief, window: BrakingWindow) -> BrakingWindow:
+    """The window with all hypotheses, from the law of (s, v, mu) at its first sample."""
+    shapes = hypotheses(config.speed_law, config.low_law, config.law_probability, belief)
+    return BrakingWindow(_state(belief), window.samples, shapes)
+
+
+def _state(belief: Belief) -> Gaussian:
+    return Gaussian(belief.mean[:2], belief.covariance[:2, :2])
+
+
+def _find(
+    config: Config, arrays: Window, before: Hypothesis, search: tuple[float | None, float], near: Array | None
+) -> Found:
+    start, lowest = search
+    problem = Problem(Model(config.motion, before.law, config.tail_dof), arrays, before.belief)
+    _, speed, kappa = before.belief.mean
+    scale = float(before.law(speed))
+    smoothed = smooth(
+        problem,
+        Search(
+            start=kappa if start is None else start / scale,
+            lowest=lowest / scale,
+            tolerance=config.tolerance / scale,
+            iterations=config.iterations,
+        ),
+        near,
+    )
+    # Where the brake limits, this is the law of the adhesion that it uses.
+    now = posterior(problem, smoothed, -math.inf)
+    return Found(before, problem, smoothed, Hypothesis(before.law, now.belief, before.log_weight + now.log_evidence))
+
+
+def _suspected(config: Config, leading: Found) -> Change | None:
+    """A change of the rail within the window, its law that of (s, v, mu); None while the window is too short."""
+    candidates = np.arange(EDGE, leading.problem.window.steps - EDGE + 1, dtype=np.intp)
+    if candidates.size == 0:
+        return None
+    law = leading.before.law
+    jump_std = config.unknown_std / float(law(leading.before.belief.mean[1]))
+    found = change(leading.problem, leading.smoothed, candidates, jump_std)
+    return found._replace(belief=scaled(found.belief, float(law(found.belief.mean[1]))))
+
+
+def _judge(
+    config: Config, now: Sequence[Hypothesis], suspected: Change | None, before: Rail, limit: float
+) -> tuple[Regime, Rail]:
+    """Regime and rail at the newest sample, over all hypotheses; `limit` is the most that the brake can use.
+
+    The bound holds under every hypothesis that is plausible; a change that is suspected, not found, lowers it too.
+    """
+    weights, mus = probabilities(now), np.array([each.mu for each in now])
+    variances = np.array([each.variance for each in now]) + config.grade_std**2
+    mu = max(float(weights @ mus), 0.0)
+    std = math.sqrt(float(weights @ (variances + (mus - mu) ** 2)))
+    limit_std = config.brake_error * limit
+    used = variances + np.where(mus < limit, 0.0, limit_std**2)
+    lower = _lower(config, np.minimum(mus, limit)[weights >= PLAUSIBLE], used[weights >= PLAUSIBLE])
+    doubt = 0.0 if suspected is None else float(expit(suspected.log_odds - config.change_threshold))
+    doubtful = suspected is not None and doubt > 1.0 - config.confidence
+    if suspected is not None and doubtful:
+        then = suspected.belief
+        lower = min(lower, _lower(config, then.mean[2], then.covariance[2, 2] + config.grade_std**2))
+    found = Rail(mu, std, min(lower, mu))
+    if std > UNDECIDED * config.unknown_std:
+        return Regime.COASTING, found
+    if mu + math.hypot(std, limit_std) < limit:
+        return Regime.ADHESION_LIMITED, found
+    seen = found._replace(mu=min(mu, limit))
+    return Regime.BRAKE_LIMITED, seen if doubtful else learn_bound(before, seen)
+
+
+def _lower(config: Config, mus: Array, variances: Array) -> float:
+    """Lower bound at the configured confidence under any of these laws of mu; not below 0."""
+    return max(float(np.min(mus - float(ndtri(config.confidence)) * np.sqrt(variances))), 0.0)
+
+
+def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) -> BrakingWindow:
+    """The window moved on, each hypothesis with the law that the samples left behind give."""
+    spent = window.spent(config)
+    if not spent:
+        return window
+    gone = window_of(window.samples[: spent + 1])
+    drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
+    passed = []
+    for each in found:
+        margin = CLEAR * math.sqrt(each.now.belief.covariance[2, 2])
+        left = posterior(replace(each.problem, window=gone), each.smoothed, margin)
+        weight = each.before.log_weight + left.log_evidence
+        passed.append(Hypothesis(each.before.law, drifted(left.belief, drift), weight))
+    kept = tuple(
+        hypothesis._replace(log_weight=math.log(probability))
+        for hypothesis, probability in zip(passed, probabilities(passed), strict=True)
+        if probability >= NEGLIGIBLE
+    )
+    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept)

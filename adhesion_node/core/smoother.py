@@ -1,0 +1,123 @@
+"""Gaussian smoother of a window and its EM for the rail condition kappa.
+
+E-step: all states of the window at once, as one banded system. M-step: kappa. For a linear Gaussian model EM moves
+kappa by score/complete information in every iteration; divided by the observed information instead (Louis 1982) the
+step ends where EM would converge to. Both informations fall out of the bordered system, so an iteration here is one
+solve, and it repeats only because the motion is a little nonlinear, because the brake's limit bends it, and because
+heavy-tailed measurements are weighted anew (EM weights of Student's t).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from .train import GRAVITY, Array
+from .window_model import Belief, Problem
+
+SAME_WEIGHT = 1e-2
+"""Change of a measurement's weight below which it counts as settled."""
+
+AT_LIMIT = 1e-3
+"""Relative width of the interval in which kappa is known to end at the brake's limit."""
+
+
+class Search(NamedTuple):
+    """Where the search for kappa starts, and when it stops."""
+
+    start: float
+    lowest: float
+    tolerance: float
+    """Change of kappa below which it has converged."""
+    iterations: int
+
+
+class Smoothed(NamedTuple):
+    """A smoothed window."""
+
+    trajectory: Array
+    """Position, m, and speed, m/s, at the K + 1 times, shape (K + 1, 2)."""
+    kappa: float
+    weights: Array
+    """Of the K positions, shape (K,)."""
+    iterations: int
+    converged: bool
+
+
+class Posterior(NamedTuple):
+    """What a window leaves: the joint law of its last state and kappa, and the evidence for its speed law."""
+
+    belief: Belief
+    log_evidence: float
+    """ln p(y), up to a term that all speed laws share."""
+
+
+def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoothed:
+    """Iterate E- and M-step to the most probable trajectory and kappa, from the trajectory `near` if there is one.
+
+    The search begins where adhesion limits: beyond the brake's limit nothing would pull kappa back. Where it ends at
+    that limit, Newton's steps leap to and fro across it; then the interval between them is halved.
+    """
+    trajectory, kappa = _guess(problem, search.start)
+    trajectory = trajectory if near is None else near
+    weights = problem.model.weights(np.zeros(problem.window.steps) if near is None else problem.squared(near))
+    low, high = search.lowest, math.inf
+    for iteration in range(1, search.iterations + 1):
+        steps = problem.linearise(trajectory, kappa)
+        moved, change = problem.normal(steps, trajectory, kappa, weights).step()
+        limits = kappa + float(np.min(steps.headroom)), kappa + float(np.max(steps.headroom))
+        if change > 0.0:
+            low = max(low, kappa)
+        elif kappa > limits[0]:
+            high = min(high, kappa)
+        following = max(kappa + change, search.lowest)
+        if max(kappa, following) > limits[0] and not low <= following <= high:
+            following = 0.5 * (max(low, min(limits[0], high)) + min(high, max(limits[1], low)))
+        trajectory, change, kappa = trajectory + moved, following - kappa, following
+        before, weights = weights, problem.model.weights(problem.squared(trajectory))
+        settled = abs(change) <= search.tolerance or high - low <= AT_LIMIT * kappa
+        if settled and float(np.max(np.abs(weights - before))) <= SAME_WEIGHT:
+            return Smoothed(trajectory, kappa, weights, iteration, True)
+    return Smoothed(trajectory, kappa, weights, search.iterations, False)
+
+
+def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
+    """Joint law of the last state and kappa, and evidence, of a window or the beginning of one.
+
+    `smoothed` may be of a longer window: then it is where the beginning is linearised and weighted, with hindsight,
+    but the measurements behind the beginning do not enter the law. `margin` as in `Problem.normal`.
+    """
+    count, kappa = problem.window.steps, smoothed.kappa
+    trajectory, weights = smoothed.trajectory[: count + 1], smoothed.weights[:count]
+    steps = problem.linearise(trajectory, kappa)
+    normal = problem.normal(steps, trajectory, kappa, weights, margin)
+    moved, change = normal.step()
+    mean = np.array([*(trajectory[-1] + moved[-1]), kappa + change])
+    deviation = np.array([*trajectory[0], kappa]) - problem.prior.mean
+    ps, pv = problem.certainty
+    misfit = 0.5 * float(
+        ps @ steps.position_error**2 + pv @ steps.speed_error**2 + deviation @ problem.precision @ deviation
+    )
+    misfit += problem.model.loss(problem.squared(trajectory))
+    misfit -= 0.5 * (float(normal.states @ moved.ravel()) + normal.kappa * change)
+    spread = normal.factor.log_determinant - float(np.linalg.slogdet(problem.precision)[1])
+    return Posterior(Belief(mean, normal.factor.law_at_end()), -misfit - 0.5 * spread)
+
+
+def _guess(problem: Problem, kappa: float) -> tuple[Array, float]:
+    """A trajectory of constant deceleration from the prior's mean, at a kappa that some step can use."""
+    motion, window = problem.model.motion, problem.window
+    position, speed = problem.prior.mean[:2]
+    law = float(problem.model.law(np.asarray(speed)))
+    resistance = motion.resistance(np.asarray(position), np.asarray(speed))
+    limit = motion.train.used_adhesion(np.inf, window.brake, resistance)
+    kappa = min(kappa, 0.98 * float(np.max(limit)) / law)
+    trajectory = np.empty((window.steps + 1, 2))
+    trajectory[0] = position, speed
+    lost = GRAVITY * window.dt_s * (np.minimum(kappa * law, limit) + resistance)
+    trajectory[1:, 1] = speed - np.cumsum(lost)
+    travelled = 0.5 * window.dt_s * (trajectory[:-1, 1] + trajectory[1:, 1])
+    trajectory[1:, 0] = position + np.cumsum(travelled)
+    return trajectory, kappa
