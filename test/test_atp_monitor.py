@@ -19,7 +19,7 @@ from rosgraph_msgs.msg import Clock
 
 from adhesion_node import topics
 from adhesion_node.core.braking import BrakingCurve
-from adhesion_node.core.supervision import StampedCurve
+from adhesion_node.core.supervision import Level, StampedCurve
 from adhesion_node.nodes import convert, qos
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.reading import stamp_ns
@@ -31,12 +31,20 @@ REFUSED = "/atp_test_refused"
 START_S = 1000.0
 SETTINGS = {
     "target_position_m": 5000,  # an integer on purpose
-    "target_speed_kmh": 36.0,
-    "reaction_time_s": 2.0,
+    "target_speed_kmh": 0.0,
+    "emergency_build_up_s": 2.0,
+    "service_build_up_s": 3.0,
+    "service_deceleration_mps2": 5.0,
+    "acceleration_mps2": 0.0,
+    "speed_margin_mps": 0.0,
+    "position_margin_m": 10.0,
     "valid_for_s": 2.0,
     "check_rate_hz": 2.0,
+    "clock_timeout_s": 3600.0,  # the tests' clock stands between their steps
     "use_sim_time": True,
 }
+# 40 m/s to a stand at 0.8 m/s^2: 1000 m; 2 s of build-up at 40 m/s: 80 m; 10 m of position margin.
+NEEDED_M = 1000.0 + 80.0 + 10.0
 
 
 def constant_curve(first_mps: float, deceleration_mps2: float) -> BrakingCurve:
@@ -125,32 +133,92 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
 
 @pytest.mark.parametrize(
     ("margin_m", "level", "diagnostic"),
-    [
+    [  # T_bs = 3 s, T_warning = 2 s, T_driver = 4 s, T_indication = 9 s: 120, 80, 160, 360 m at 40 m/s
         (1000.0, "NORMAL", DiagnosticStatus.OK),
-        (200.0, "WARNING", DiagnosticStatus.WARN),
+        (400.0, "INDICATION", DiagnosticStatus.OK),
+        (250.0, "OVERSPEED", DiagnosticStatus.WARN),
+        (150.0, "WARNING", DiagnosticStatus.WARN),
         (50.0, "SERVICE_BRAKE", DiagnosticStatus.ERROR),
         (-50.0, "EMERGENCY_BRAKE", DiagnosticStatus.ERROR),
     ],
 )
 def test_the_level_follows_the_margin(line: Line, margin_m: float, level: str, diagnostic: bytes) -> None:
     line.send_curve(curve())
-    # 40 to 10 m/s at 0.8 m/s^2: 937.5 m; 2 s of reaction at 40 m/s: 80 m.
-    status = line.send_state(state(5000.0 - 937.5 - 80.0 - margin_m))
+    line.send_state(state(0.0))  # ends the emergency of the time without a curve
+    status = line.send_state(state(5000.0 - NEEDED_M - margin_m))
     assert (status.name, status.level) == ("atp_monitor/supervision", diagnostic)
     told = values(status)
     assert told["level"] == level
     assert float(told["margin_m"]) == pytest.approx(margin_m, abs=1.0)
-    assert float(told["braking_distance_m"]) == pytest.approx(937.5, abs=1.0)
-    assert (told["target_position_m"], told["target_speed_kmh"]) == ("5000.000", "36.000")
+    assert float(told["braking_distance_m"]) == pytest.approx(1000.0, abs=1.0)
+    assert (told["target_position_m"], told["target_speed_mps"]) == ("5000.000", "0.000")
+    assert float(told["distance_to_target_m"]) == pytest.approx(NEEDED_M + margin_m, abs=0.01)
     assert (told["curve_age_s"], told["state_age_s"]) == ("0.000", "0.000")
-    assert stamp_ns(line.heard[-1].header) == t_ns() + 1  # the watchdog has spoken at this time
+    limits = [float(told[f"{name}_mps"]) for name in ("indication", "permitted", "warning", "sbi", "ebi")]
+    assert limits == sorted(limits)
+    assert sum(limit < 40.0 for limit in limits) == [name.name for name in Level].index(level)
+    assert stamp_ns(line.heard[-1].header) == t_ns() + 2  # watchdog and first state have spoken at this time
+
+
+def test_an_intervention_holds_until_the_permitted_speed_is_kept(line: Line) -> None:
+    line.send_curve(curve())
+    levels = [values(line.send_state(state(5000.0 - NEEDED_M - margin)))["level"] for margin in (900, -50, 250, 300)]
+    assert levels == ["NORMAL", "EMERGENCY_BRAKE", "EMERGENCY_BRAKE", "INDICATION"]
+
+
+def test_a_clock_that_stands_still_is_an_emergency(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    quick = {**SETTINGS, "clock_timeout_s": 0.1, "check_rate_hz": 20.0}
+    overrides = [Parameter(name, value=value) for name, value in quick.items()]
+    monitor = AtpMonitor(context=context, namespace=NAMESPACE, parameter_overrides=overrides)
+    heard: list[DiagnosticArray] = []
+    driver = Node("driver", context=context, namespace=NAMESPACE)
+    qos.subscribe(driver, topics.ATP_STATUS, heard.append, qos.RESULT)
+    executor.add_node(monitor)
+    executor.add_node(driver)
+    # No /clock at all, so that no timer of the ROS clock ever fires.
+    spin_until(executor, lambda: len(heard) >= 2)
+    assert monitor.get_clock().now().nanoseconds == 0
+    (status,) = heard[-1].status
+    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
+    assert "the clock has stood still for" in status.message
+
+
+def test_a_clock_that_stops_after_the_last_judgement_is_seen(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    quick = {**SETTINGS, "clock_timeout_s": 0.5, "check_rate_hz": 10.0}
+    overrides = [Parameter(name, value=value) for name, value in quick.items()]
+    monitor = AtpMonitor(context=context, namespace=NAMESPACE, parameter_overrides=overrides)
+    driver = Node("driver", context=context, namespace=NAMESPACE)
+    executor.add_node(monitor)
+    executor.add_node(driver)
+    made = Line(executor, spin_until, monitor, driver)
+    made.next_status(lambda: made.set_time(START_S))
+    made.set_time(START_S + 0.05)  # less than a tick of the watchdog: nothing judges at this time
+    told: list[str] = []
+
+    def stands() -> bool:
+        told[:] = [status.message for message in made.heard for status in message.status]
+        return "the clock has stood still" in told[-1]
+
+    spin_until(executor, stands)
+
+
+def test_the_clock_moving_again_ends_the_emergency_of_its_standing(line: Line) -> None:
+    line.send_curve(curve())
+    line.monitor._clock_timeout_s = -1.0  # as if it had stood for long
+    assert "stood still" in line.send_state(state(0.0)).message
+    line.monitor._clock_timeout_s = 3600.0
+    assert values(line.send_state(state(0.0)))["level"] == "NORMAL"
 
 
 def test_without_a_curve_the_train_must_stop(line: Line) -> None:
     status = line.send_state(state(0.0))
     assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
     assert "braking curve: none received yet" in status.message
-    assert "margin_m" not in values(status)
+    assert not {"margin_m", "permitted_mps"} & set(values(status))
 
 
 def test_the_watchdog_speaks_in_silence_and_says_what_has_expired(line: Line) -> None:
@@ -162,7 +230,7 @@ def test_the_watchdog_speaks_in_silence_and_says_what_has_expired(line: Line) ->
     assert len(line.heard) == 2
     status = line.next_status(lambda: line.set_time(START_S + 1.2))
     assert values(status)["level"] == "NORMAL"
-    assert float(values(status)["margin_m"]) == pytest.approx(5000.0 - 40.0 * 1.2 - 937.5 - 80.0, abs=1.0)
+    assert float(values(status)["margin_m"]) == pytest.approx(5000.0 - 40.0 * 1.2 - NEEDED_M, abs=1.0)
     line.next_status(lambda: line.set_time(START_S + 1.7))
     status = line.next_status(lambda: line.set_time(START_S + 2.3))
     assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
@@ -218,9 +286,9 @@ def test_a_curve_from_before_the_monitor_started_is_used(
     spin_until(executor, lambda: isinstance(monitor._curve, StampedCurve) and monitor._curve.t_ns == now_ns)
 
 
-def test_margins_in_the_wrong_order_are_refused(context: Context) -> None:
-    overrides = [Parameter("warning_margin_m", value=10.0)]
-    with pytest.raises(ValueError, match=r"warning_margin_m = 10\.0: give at least service_margin_m = 100\.0"):
+def test_times_in_the_wrong_order_are_refused(context: Context) -> None:
+    overrides = [Parameter("driver_time_s", value=1.0)]
+    with pytest.raises(ValueError, match=r"driver_time_s = 1\.0: give at least warning_time_s = 2\.0"):
         AtpMonitor(context=context, namespace=REFUSED, parameter_overrides=overrides)
 
 

@@ -1,22 +1,23 @@
-"""Supervision of a target: how much distance is left before the brakes must be on, and what follows from it.
+"""Supervision of a target: the present speed against the limits of `etcs`, and what has to be done.
 
-    margin = target - (position now + reaction distance + braking distance)
+The statuses are those of SUBSET-026-3, section 3.13.10, with the intervention told apart by brake. Whatever is
+missing, refused, old or not covered by the curve counts as the worst case: no distance is left.
 
-    position now       the last position, moved on at the last speed for as long as the state is old
-    reaction distance  speed x reaction time: the train runs on until the brakes are built up
-    braking distance   along the braking curve from the present speed down to the target speed
-
-Whatever is missing, refused, old or not covered by the curve counts as the worst case.
+Simplified: an intervention, the emergency brake's too, ends where the permitted speed is kept again (as with
+Q_NVEMRRLS = 1), and from the indication there is a way back to normal.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from enum import Enum, IntEnum
 from typing import NamedTuple
 
-from .braking import BrakingCurve, distance_to
+import numpy as np
+
+from . import etcs
+from .braking import BrakingCurve
+from .etcs_config import SupervisionConfig
 from .train import KMH
 
 MAX_EXCESS_MPS = 10 * KMH
@@ -38,16 +39,22 @@ class Severity(IntEnum):
 
 
 class Level(Enum):
-    """What the driver or the brake has to do: the message for people and how bad that is."""
+    """What the driver or the brake has to do: the message for people and how bad that is. The order is that of need."""
 
     NORMAL = ("nothing to do", Severity.OK)
-    WARNING = ("the braking point is near: be ready to brake", Severity.WARN)
-    SERVICE_BRAKE = ("the braking point is reached: service brake", Severity.ERROR)
-    EMERGENCY_BRAKE = ("no distance is left: emergency brake", Severity.ERROR)
+    INDICATION = ("a braking point is near: be ready to brake", Severity.OK)
+    OVERSPEED = ("above the permitted speed: brake", Severity.WARN)
+    WARNING = ("shortly before an intervention: brake now, traction off", Severity.WARN)
+    SERVICE_BRAKE = ("service brake intervention", Severity.ERROR)
+    EMERGENCY_BRAKE = ("emergency brake intervention", Severity.ERROR)
 
     def __init__(self, message: str, severity: Severity) -> None:
         self.message = message
         self.severity = severity
+
+
+LEVELS = tuple(Level)
+"""From the least to the most urgent."""
 
 
 class TrainState(NamedTuple):
@@ -71,114 +78,108 @@ class Unavailable(NamedTuple):
     why: str
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
-    """The target and the margins before it. Raises ValueError naming the value that is out of range."""
+class Reading(NamedTuple):
+    """The train against the limits: speeds in m/s, distances in m."""
 
-    target_position_m: float = 6000.0
-    target_speed_kmh: float = 100.0
-    warning_margin_m: float = 300.0
-    service_margin_m: float = 100.0
-    reaction_time_s: float = 1.5
-    """From the decision until the brakes are built up."""
-    valid_for_s: float = 2.0
-    """Age up to which a curve and a state are used."""
-
-    def __post_init__(self) -> None:
-        if not math.isfinite(self.target_position_m):
-            raise ValueError(f"target_position_m = {self.target_position_m!r}: give a finite position")
-        for name in ("target_speed_kmh", "service_margin_m", "reaction_time_s", "valid_for_s"):
-            value = getattr(self, name)
-            if not 0 <= value < math.inf:
-                raise ValueError(f"{name} = {value!r}: give a finite number of at least 0")
-        if not self.service_margin_m <= self.warning_margin_m < math.inf:
-            least = f"service_margin_m = {self.service_margin_m!r}"
-            raise ValueError(f"warning_margin_m = {self.warning_margin_m!r}: give at least {least}")
-
-    @property
-    def target_speed_mps(self) -> float:
-        """The target speed in m/s."""
-        return self.target_speed_kmh * KMH
+    distance_to_target_m: float
+    """From the estimated front end, negative beyond the target."""
+    margin_m: float
+    """How far the train may go on at its speed until the emergency brake intervenes."""
+    braking_distance_m: float
+    """Along the braking curve to the target speed, brakes built up."""
+    permitted_mps: float
+    warning_mps: float
+    sbi_mps: float
+    ebi_mps: float
+    indication_mps: float
 
 
 @dataclass(frozen=True, slots=True)
 class Decision:
-    """The level, its reason, and the numbers behind it as far as they are known (metres, seconds)."""
+    """The level, its reason, and the numbers behind it as far as they are known."""
 
     level: Level
     message: str
     severity: Severity
-    margin_m: float | None = None
-    braking_distance_m: float | None = None
-    reaction_distance_m: float | None = None
+    reading: Reading | None = None
     curve_age_s: float | None = None
     state_age_s: float | None = None
 
 
 def decide(
-    target: Target, now_ns: int, state: TrainState | Unavailable, braking: StampedCurve | Unavailable
+    config: SupervisionConfig,
+    now_ns: int,
+    state: TrainState | Unavailable,
+    braking: StampedCurve | Unavailable,
+    previous: Level = Level.NORMAL,
 ) -> Decision:
-    """Decide on the level at time `now_ns`.
+    """Decide on the level at time `now_ns`, which `previous` was decided before.
 
-    A train at or below the target speed is NORMAL wherever it is, as long as state and curve are good. A speed
-    above the curve's first one is braked at the curve's weakest deceleration down to it; one that lies more than
-    10 km/h above is not covered, which is unsafe like a missing curve.
+    A state that is old is moved on at its speed. A speed that lies more than 10 km/h above the curve's first one is
+    not covered, which is unsafe like a missing curve.
     """
     ages = {"state_age_s": _age_s(state, now_ns), "curve_age_s": _age_s(braking, now_ns)}
     if isinstance(state, Unavailable):
-        return _unsafe(f"state: {state.why}", ages)
+        return unsafe(f"state: {state.why}", **ages)
     if isinstance(braking, Unavailable):
-        return _unsafe(f"braking curve: {braking.why}", ages)
+        return unsafe(f"braking curve: {braking.why}", **ages)
     for what, stamped in (("state", state), ("braking curve", braking)):
-        late = _out_of_date(stamped, now_ns, target.valid_for_s)
+        late = _out_of_date(stamped, now_ns, config.valid_for_s)
         if late:
-            return _unsafe(f"{what} {late}", ages)
-    uncovered = _uncovered(braking.curve, state.speed_mps, target.target_speed_mps)
+            return unsafe(f"{what} {late}", **ages)
+    uncovered = _uncovered(braking.curve, state.speed_mps, config.target_speed_mps)
     if uncovered:
-        return _unsafe(f"braking curve {uncovered}", ages)
-    return _measure(target, now_ns, state, braking.curve, ages)
+        return unsafe(f"braking curve {uncovered}", **ages)
+    travelled = state.speed_mps * max(now_ns - state.t_ns, 0) / NS_PER_S
+    reading = read(config, braking.curve, state.position_m + travelled, state.speed_mps)
+    level = held(previous, measured(reading, state.speed_mps))
+    return Decision(level, level.message, level.severity, reading, ages["curve_age_s"], ages["state_age_s"])
 
 
-def _measure(
-    target: Target, now_ns: int, state: TrainState, braking: BrakingCurve, ages: dict[str, float | None]
-) -> Decision:
-    speed, wanted = state.speed_mps, target.target_speed_mps
-    travelled = speed * max(now_ns - state.t_ns, 0) / NS_PER_S
-    reaction = speed * target.reaction_time_s
-    distance = braking_distance(braking, speed, wanted)
-    margin = target.target_position_m - (state.position_m + travelled + reaction + distance)
-    level = Level.NORMAL if speed <= wanted else _level(target, margin)
-    return Decision(level, level.message, level.severity, margin, distance, reaction, **ages)
+def read(config: SupervisionConfig, braking: BrakingCurve, position_m: float, speed_mps: float) -> Reading:
+    """Hold a train at a place, m, with a speed, m/s, against the limits."""
+    distance = config.target_position_m - position_m
+    safe_distance = np.array([distance - config.position_margin_m])
+    speed = np.array([max(speed_mps, 0.0)])
+    limits = etcs.speeds(config, braking, safe_distance)
+    needed = etcs.distances(config, braking, speed)
+    braked = etcs.distance_between(braking, speed, config.target_speed_mps)
+    return Reading(
+        distance_to_target_m=distance,
+        margin_m=float(safe_distance[0] - needed.ebi[0]),
+        braking_distance_m=max(float(braked[0]), 0.0),
+        permitted_mps=float(limits.permitted[0]),
+        warning_mps=float(limits.warning[0]),
+        sbi_mps=float(limits.sbi[0]),
+        ebi_mps=float(limits.ebi[0]),
+        indication_mps=float(limits.indication[0]),
+    )
 
 
-def _level(target: Target, margin_m: float) -> Level:
-    if margin_m <= 0:
-        return Level.EMERGENCY_BRAKE
-    if margin_m <= target.service_margin_m:
-        return Level.SERVICE_BRAKE
-    return Level.WARNING if margin_m <= target.warning_margin_m else Level.NORMAL
+def measured(reading: Reading, speed_mps: float) -> Level:
+    """Return the level of a speed: that of the highest limit it exceeds."""
+    limits = (reading.indication_mps, reading.permitted_mps, reading.warning_mps, reading.sbi_mps, reading.ebi_mps)
+    return LEVELS[sum(speed_mps > limit for limit in limits)]
 
 
-def braking_distance(braking: BrakingCurve, speed_mps: float, target_mps: float) -> float:
-    """Distance, m, along the curve from one speed to another; 0 when already at or below the target speed."""
-    if speed_mps <= target_mps:
-        return 0.0
-    return _along(braking, target_mps) - _along(braking, speed_mps)
+def held(previous: Level, now: Level) -> Level:
+    """Keep a level above INDICATION until the permitted speed is kept again (SUBSET-026-3, 3.13.10, table 10)."""
+    if LEVELS.index(now) <= LEVELS.index(Level.INDICATION):
+        return now
+    return max(previous, now, key=LEVELS.index)
 
 
-def _along(braking: BrakingCurve, speed_mps: float) -> float:
-    """Place on the curve, m, where the train has a speed; before its start (negative) when faster than its first."""
-    first = float(braking.speed_mps[0])
-    if speed_mps <= first:
-        return distance_to(braking, speed_mps)
-    return (first**2 - speed_mps**2) / (2 * float(braking.deceleration_mps2.min()))
+def unsafe(why: str, curve_age_s: float | None = None, state_age_s: float | None = None) -> Decision:
+    """Decide on the emergency brake because something is missing that a safe distance would need."""
+    message = f"no safe distance is known, emergency brake: {why}"
+    return Decision(Level.EMERGENCY_BRAKE, message, Severity.STALE, None, curve_age_s, state_age_s)
 
 
 def _uncovered(braking: BrakingCurve, speed_mps: float, target_mps: float) -> str:
     first, last = float(braking.speed_mps[0]), float(braking.speed_mps[-1])
     if speed_mps > max(first, target_mps) + MAX_EXCESS_MPS:
         return f"begins at {first / KMH:.1f} km/h but the train runs at {speed_mps / KMH:.1f} km/h"
-    if speed_mps > target_mps and last > target_mps + SPEED_TOLERANCE_MPS:
+    if last > target_mps + SPEED_TOLERANCE_MPS:
         return f"ends at {last / KMH:.1f} km/h, above the target speed {target_mps / KMH:.1f} km/h: make it longer"
     return ""
 
@@ -194,7 +195,3 @@ def _out_of_date(stamped: TrainState | StampedCurve, now_ns: int, valid_for_s: f
 
 def _age_s(stamped: TrainState | StampedCurve | Unavailable, now_ns: int) -> float | None:
     return None if isinstance(stamped, Unavailable) else (now_ns - stamped.t_ns) / NS_PER_S
-
-
-def _unsafe(why: str, ages: dict[str, float | None]) -> Decision:
-    return Decision(Level.EMERGENCY_BRAKE, f"no safe distance is known, emergency brake: {why}", Severity.STALE, **ages)

@@ -1,66 +1,79 @@
-"""The ATP monitor: compares the braking curve with a target and says what has to be done.
+"""The ATP monitor: supervises a target with the braking curve and says what has to be done.
 
     adhesion/state, adhesion/braking_curve  ->  atp/status
 
-It judges at each state; a watchdog on the ROS clock judges when no state comes, because silence is no message.
+It judges at each state. Two watchdogs judge when no state comes, because silence is no message: one on the ROS clock,
+and one on the machine's own for the case that the ROS clock stands still.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from adhesion_node import reading, topics
+from adhesion_node.core.etcs_config import SupervisionConfig
+from adhesion_node.core.setting import settings_of
 from adhesion_node.core.supervision import (
+    NS_PER_S,
     Decision,
     Level,
     Severity,
     StampedCurve,
-    Target,
     TrainState,
     Unavailable,
     decide,
+    unsafe,
 )
 
 from . import convert, qos, runtime
-from .params import Spec, declare
-
-_DEFAULTS = Target()
+from .params import Spec, declare, spec_of
 
 PARAMETERS = (
-    Spec("target_position_m", _DEFAULTS.target_position_m, "place of the target along the track", "m", -1e7, 1e7),
-    Spec("target_speed_kmh", _DEFAULTS.target_speed_kmh, "speed allowed at the target", "km/h", 0.0, 500.0),
-    Spec("warning_margin_m", _DEFAULTS.warning_margin_m, "margin that warns", "m", 0.0, 1e5),
-    Spec("service_margin_m", _DEFAULTS.service_margin_m, "margin that calls for the service brake", "m", 0.0, 1e5),
-    Spec("reaction_time_s", _DEFAULTS.reaction_time_s, "time until the brakes are built up", "s", 0.0, 60.0),
-    Spec("valid_for_s", _DEFAULTS.valid_for_s, "age up to which a curve and a state are used", "s", 0.01, 3600.0),
-    Spec("check_rate_hz", 5.0, "rate of the watchdog on the ROS clock", "Hz", 0.1, 100.0),
+    *map(spec_of, settings_of(SupervisionConfig)),
+    Spec("check_rate_hz", 5.0, "Rate of the watchdogs", "Hz", 0.1, 100.0),
+    Spec(
+        "clock_timeout_s",
+        2.0,
+        "Time by the machine's clock for which the ROS clock may stand still before that is an emergency",
+        "s",
+        0.1,
+        3600.0,
+    ),
 )
 
 _SILENCE = "none received yet; is the estimator running, are topic names and QoS right?"
 
 
 class AtpMonitor(Node):
-    """Says NORMAL, WARNING, SERVICE_BRAKE or EMERGENCY_BRAKE from the distance left before a target."""
+    """Says NORMAL, INDICATION, OVERSPEED, WARNING, SERVICE_BRAKE or EMERGENCY_BRAKE of a train before a target.
+
+    The limits follow from the braking curve in the manner of ETCS. Whatever is missing, old or not understood is an
+    EMERGENCY_BRAKE.
+    """
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("atp_monitor", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, PARAMETERS)
-        check_rate_hz = values.pop("check_rate_hz")
-        self._target = Target(**values)
+        period_s = 1.0 / values.pop("check_rate_hz")
+        self._clock_timeout_s: float = values.pop("clock_timeout_s")
+        self._config = SupervisionConfig(**values)
         self._state: TrainState | Unavailable = Unavailable(_SILENCE)
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
         self._judged = False
-        self._now_ns = self._stamp_ns = 0
+        self._now_ns = self._stamp_ns = self._seen_ns = 0
         self._level: Level | None = None
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._moved_ns = self._steady.now().nanoseconds
         self._status = qos.advertise(self, topics.ATP_STATUS, qos.RESULT)
         qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve, qos.LATCHED)
         qos.subscribe(self, topics.STATE, self._on_state, qos.RESULT)
-        self.create_timer(1.0 / check_rate_hz, self._on_watchdog)
+        self.create_timer(period_s, self._on_watchdog)
+        self.create_timer(period_s, self._on_steady_watchdog, clock=self._steady)
 
     def _on_curve(self, message: Any) -> None:
         try:
@@ -80,28 +93,42 @@ class AtpMonitor(Node):
             self._judge()
         self._judged = False
 
+    def _on_steady_watchdog(self) -> None:
+        if self._clock_stands_s() > self._clock_timeout_s:
+            self._judge()
+
+    def _clock_stands_s(self) -> float:
+        """How long, by the machine's own clock, the ROS clock has been seen at the same time."""
+        now_ns, steady_ns = self.get_clock().now().nanoseconds, self._steady.now().nanoseconds
+        if now_ns != self._seen_ns:
+            self._seen_ns, self._moved_ns = now_ns, steady_ns
+        return (steady_ns - self._moved_ns) / NS_PER_S
+
     def _judge(self) -> None:
+        stands_s = self._clock_stands_s()
         now_ns = self.get_clock().now().nanoseconds
-        decision = decide(self._target, now_ns, self._state, self._curve)
         # Two judgements may see the same simulated clock; their stamps still increase.
         self._stamp_ns = self._stamp_ns + 1 if now_ns == self._now_ns else now_ns
         self._now_ns = now_ns
-        self._status.publish(status_message(self._stamp_ns, self._target, decision))
+        if stands_s > self._clock_timeout_s:
+            decision = unsafe(f"the clock has stood still for {stands_s:.3g} s; is /clock published?")
+        else:
+            decision = decide(self._config, now_ns, self._state, self._curve, self._level or Level.NORMAL)
+        self._status.publish(status_message(self._stamp_ns, self._config, decision))
         self._judged = True
         if decision.level is not self._level:
             self._level = decision.level
             _log(self, decision)
 
 
-def status_message(t_ns: int, target: Target, decision: Decision) -> DiagnosticArray:
+def status_message(t_ns: int, config: SupervisionConfig, decision: Decision) -> DiagnosticArray:
     """Build the status: level and every number behind it; a number that is not known has no key."""
     numbers = {
-        "margin_m": decision.margin_m,
-        "braking_distance_m": decision.braking_distance_m,
-        "reaction_distance_m": decision.reaction_distance_m,
+        "target_position_m": config.target_position_m,
+        "target_speed_mps": config.target_speed_mps,
         "curve_age_s": decision.curve_age_s,
         "state_age_s": decision.state_age_s,
-        **{field.name: getattr(target, field.name) for field in fields(target)},
+        **({} if decision.reading is None else decision.reading._asdict()),
     }
     status = DiagnosticStatus(
         level=bytes([decision.severity]),
@@ -114,7 +141,8 @@ def status_message(t_ns: int, target: Target, decision: Decision) -> DiagnosticA
 
 
 def _log(node: Node, decision: Decision) -> None:
-    margin = "" if decision.margin_m is None else f" (margin {decision.margin_m:.0f} m)"
+    known = decision.reading
+    margin = "" if known is None else f" ({known.margin_m:.0f} m before the emergency brake)"
     text = f"{decision.level.name}: {decision.message}{margin}"
     if decision.severity is Severity.OK:
         node.get_logger().info(text)
