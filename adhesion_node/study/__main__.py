@@ -6,12 +6,13 @@ import argparse
 from collections.abc import Sequence
 
 from ..cli import json_option, run_tool
-from . import creep, distances, sensitivity, tables, tune_ekf
+from . import creep, distances, intervention, sensitivity, tables, tune_ekf
 
 STUDIES = {
     "distances": (distances, "braking distances and times beside the published ones"),
     "tables": (tables, "Tables 2 and 3: accuracy over Monte-Carlo runs, beside two Kalman filters"),
     "sensitivity": (sensitivity, "the same against position noise, window, step and particles"),
+    "intervention": (intervention, "where the ATP monitor brakes by the identified adhesion and by fixed values"),
     "creep": (creep, "the creep curve: three experiments of the paper and what it leaves out"),
     "tune-ekf": (tune_ekf, "the search behind the tuned Kalman filter of the tables"),
 }
