@@ -9,6 +9,7 @@ from conftest import ROOT
 
 from adhesion_node import topics
 from adhesion_node.core.setting import Setting
+from adhesion_node.nodes import atp_monitor
 from adhesion_node.settings import SETTINGS
 from adhesion_node.study import distances
 
@@ -29,15 +30,15 @@ def parameter_row(setting: Setting) -> str:
     return f"| `{setting.name}` | {default} | {setting.unit} | {allowed} | {setting.description} |"
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=lambda setting: setting.name)
-def test_every_parameter_stands_in_the_readme(setting: Setting) -> None:
-    assert parameter_row(setting) in README, f"add to the parameter table:\n{parameter_row(setting)}"
+TABLES = {"## Parameters of the estimator": SETTINGS, "### Parameters of the ATP monitor": atp_monitor.SETTINGS}
 
 
-def test_the_readme_has_no_parameter_that_is_gone() -> None:
-    section = README.split("## Parameters of the estimator")[1].split("\n## ")[0]
-    named = re.findall(r"^\| `([^`]+)` \|", section, flags=re.MULTILINE)
-    assert named == [setting.name for setting in SETTINGS]
+@pytest.mark.parametrize("heading", TABLES)
+def test_the_parameter_table_is_that_of_the_code(heading: str) -> None:
+    section = README.split(f"\n{heading}\n")[1].split("\n##")[0]
+    rows = re.findall(r"^\| `.+\|$", section, flags=re.MULTILINE)
+    expected = [parameter_row(setting) for setting in TABLES[heading]]
+    assert rows == expected, "the table must read:\n" + "\n".join(expected)
 
 
 @pytest.mark.parametrize("topic", [*topics.SENSORS, *topics.TRUTH, *topics.RESULTS, topics.ATP_STATUS])

@@ -9,6 +9,7 @@ and one on the machine's own for the case that the ROS clock stands still.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, fields
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -17,7 +18,7 @@ from rclpy.node import Node
 
 from adhesion_node import reading, topics
 from adhesion_node.core.etcs_config import SupervisionConfig
-from adhesion_node.core.setting import settings_of
+from adhesion_node.core.setting import setting, settings_of
 from adhesion_node.core.supervision import (
     NS_PER_S,
     Decision,
@@ -31,20 +32,21 @@ from adhesion_node.core.supervision import (
 )
 
 from . import convert, qos, runtime
-from .params import Spec, declare, spec_of
+from .params import declare, spec_of
 
-PARAMETERS = (
-    *map(spec_of, settings_of(SupervisionConfig)),
-    Spec("check_rate_hz", 5.0, "Rate of the watchdogs", "Hz", 0.1, 100.0),
-    Spec(
-        "clock_timeout_s",
-        2.0,
-        "Time by the machine's clock for which the ROS clock may stand still before that is an emergency",
-        "s",
-        0.1,
-        3600.0,
-    ),
-)
+
+@dataclass(frozen=True, slots=True)
+class Watchdogs:
+    """How soon silence is noticed."""
+
+    check_rate_hz: float = setting(5.0, "Rate of the watchdogs", "Hz", 0.1, 100.0)
+    clock_timeout_s: float = setting(
+        2.0, "Time by the machine's clock for which the ROS clock may stand still", "s", 0.1, 3600.0
+    )
+
+
+SETTINGS = (*settings_of(SupervisionConfig), *settings_of(Watchdogs))
+PARAMETERS = tuple(map(spec_of, SETTINGS))
 
 _SILENCE = "none received yet; is the estimator running, are topic names and QoS right?"
 
@@ -59,8 +61,8 @@ class AtpMonitor(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("atp_monitor", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, PARAMETERS)
-        period_s = 1.0 / values.pop("check_rate_hz")
-        self._clock_timeout_s: float = values.pop("clock_timeout_s")
+        watchdogs = Watchdogs(**{item.name: values.pop(item.name) for item in fields(Watchdogs)})
+        self._clock_timeout_s = watchdogs.clock_timeout_s
         self._config = SupervisionConfig(**values)
         self._state: TrainState | Unavailable = Unavailable(_SILENCE)
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
@@ -72,6 +74,7 @@ class AtpMonitor(Node):
         self._status = qos.advertise(self, topics.ATP_STATUS, qos.RESULT)
         qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve, qos.LATCHED)
         qos.subscribe(self, topics.STATE, self._on_state, qos.RESULT)
+        period_s = 1.0 / watchdogs.check_rate_hz
         self.create_timer(period_s, self._on_watchdog)
         self.create_timer(period_s, self._on_steady_watchdog, clock=self._steady)
 
