@@ -50,6 +50,7 @@ setup(
         "numpy>=1.26,<3",
         "scipy>=1.11,<2",
         "matplotlib>=3.8,<4",
+        "argcomplete>=3,<4",
         "mcap>=1.5,<2",
         "lz4>=4.3,<5",
         "zstandard>=0.22,<1",

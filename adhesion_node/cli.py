@@ -1,14 +1,18 @@
-"""What the command line tools share: --json, exit codes, errors in one line, progress on standard error."""
+"""What the command line tools share: --help, --json, completion, exit codes, errors in one line, progress."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
+
+import argcomplete
 
 Item = TypeVar("Item")
 
@@ -17,6 +21,22 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 
 PROGRESS_S = 1.0
 """Time between two signs of life."""
+
+
+def help_texts(purpose: str, *examples: str, more: str = "") -> dict[str, Any]:
+    r"""Return what makes --help readable, for a parser: the purpose by paragraphs, `more` as it stands, examples last.
+
+    >>> help_texts("Does it.", "tool FILE")["epilog"]
+    'examples:\n  tool FILE'
+    """
+    width = shutil.get_terminal_size().columns - 2
+    paragraphs = [textwrap.fill(" ".join(part.split()), width) for part in purpose.split("\n\n")]
+    shown = "\n".join(["examples:", *(f"  {example}" for example in examples)]) if examples else ""
+    return {
+        "description": "\n\n".join(paragraphs),
+        "epilog": "\n\n".join(filter(None, (more, shown))),
+        "formatter_class": argparse.RawDescriptionHelpFormatter,
+    }
 
 
 def json_option() -> argparse.ArgumentParser:
@@ -34,8 +54,9 @@ def run_tool(
     """Parse the command line, do the work and return the exit code.
 
     A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback.
-    Bad usage ends the program with 2 (SystemExit).
+    Bad usage ends the program with 2 (SystemExit). Asked by a shell, it says how the command line may go on and ends.
     """
+    argcomplete.autocomplete(parser)
     options = parser.parse_args(args)
     try:
         return work(options)

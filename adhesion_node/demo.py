@@ -27,7 +27,7 @@ from sim_node.scenario import SCENARIOS
 
 from . import offline
 from .bag import BagReader, select
-from .cli import DONE, FAILED, json_option, report, run_tool
+from .cli import DONE, FAILED, help_texts, json_option, report, run_tool
 from .core import Config, Estimate
 from .core.train import KMH
 from .nodes.atp_monitor import AtpMonitor
@@ -41,6 +41,8 @@ from .report.table import table
 from .score import Truth
 from .topics import ATP_STATUS, POSITION
 
+EXAMPLES = ("demo", "demo --scenario low_adhesion_patch --seed 3 --output my_demo", "demo --json - > result.json")
+
 PATIENCE_S = 10.0
 """Longest wait for a message between two nodes of the process."""
 
@@ -53,7 +55,7 @@ SHOWN_EVERY_S = 5.0
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo."""
-    parser = argparse.ArgumentParser("demo", description=__doc__, parents=[json_option()])
+    parser = argparse.ArgumentParser("demo", parents=[json_option()], **help_texts(__doc__, *EXAMPLES))
     parser.add_argument("--scenario", default="tunnel_entry", choices=tuple(SCENARIOS), help="what happens")
     parser.add_argument("--seed", type=int, default=1, help="seed of the noise (default: 1)")
     parser.add_argument(

@@ -11,10 +11,16 @@ from typing import Any
 
 from . import csv_rows, topics
 from .bag import BagWriter, sensors
-from .cli import DONE, FAILED, json_option, progress, report, run_tool
+from .cli import DONE, FAILED, help_texts, json_option, progress, report, run_tool
 from .csv_rows import Format, Refusal, Row
 
-EPILOG = """\
+EXAMPLES = (
+    "import_csv log.csv --output my_run",
+    "import_csv log.csv --output my_run --time t --time-unit ms --position km --position-unit km",
+    "import_csv log.csv --output my_run --pressure bc_bar --pressure-unit bar --pressure-kind gauge",
+)
+
+OUTCOME = """\
 Exit code 0: every row was good. 1: some rows were refused, each with a line on standard error; the others are in
 the recording. 2: nothing was written (bad usage, missing column, no good row).
 A time without zone is UTC. Equal logs give equal recordings, byte by byte."""
@@ -120,11 +126,7 @@ def _form(options: argparse.Namespace) -> Format:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        "import_csv",
-        description=__doc__,
-        epilog=EPILOG,
-        parents=[json_option()],
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        "import_csv", parents=[json_option()], **help_texts(__doc__, *EXAMPLES, more=OUTCOME)
     )
     parser.add_argument("file", metavar="FILE", help="the log: a header line, then one row per time")
     parser.add_argument("--output", metavar="DIR", required=True, help="the recording, a new directory")

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from .bag import BagReader, BagWriter
-from .cli import DONE, json_option, progress, report, run_tool
+from .cli import DONE, help_texts, json_option, progress, report, run_tool
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -48,7 +48,9 @@ def _work(options: argparse.Namespace) -> int:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("recover", description=__doc__, parents=[json_option()])
+    parser = argparse.ArgumentParser(
+        "recover", parents=[json_option()], **help_texts(__doc__, "recover broken_run --output whole_run")
+    )
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory or an .mcap file")
     parser.add_argument("--output", metavar="DIR", required=True, help="the new recording, a new directory")
     return parser

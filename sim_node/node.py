@@ -55,6 +55,11 @@ PARAMETERS = (
     Spec("speed_std_mps", _NOISE.speed_std_mps, "noise of the speed; 0 = no odometer", "m/s", 0.0, 10.0),
 )
 
+EXAMPLES = (
+    "simulator --ros-args -p scenario:=tunnel_exit -p seed:=2",
+    "simulator --ros-args -p real_time_factor:=10.0 -p wait_for:=1",
+)
+
 
 class Simulator(Node):
     """Simulates a braking train: publishes its sensors, the truth and /clock until the scenario ends.
@@ -171,4 +176,4 @@ def _log(node: Node, text: str) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the simulator until its scenario ends or a signal comes."""
-    return runtime.run(Simulator, args)
+    return runtime.run(Simulator, args, PARAMETERS, EXAMPLES)

@@ -44,6 +44,8 @@ PARAMETERS = (
     Spec("force_std_n", _NOISE.force_std_n, "noise of the traction force", "N", 0.0, 1e6),
 )
 
+EXAMPLES = ("slip_simulator --ros-args -p scenario:=creep_dry -p wait_for:=1",)
+
 OUTPUTS = (topics.CLOCK, topics.TRUTH_MU, topics.SPEED, topics.TRACTION_FORCE, topics.WHEEL_SPEED)
 """What the node publishes, in the order of publishing."""
 
@@ -138,4 +140,4 @@ def traction_force(t_ns: int, force_n: float) -> WrenchStamped:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the slip simulator until its scenario ends or a signal comes."""
-    return runtime.run(SlipSimulator, args, PARAMETERS)
+    return runtime.run(SlipSimulator, args, PARAMETERS, EXAMPLES)

@@ -24,6 +24,7 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "numpy": ("numpy", "python3-numpy"),
     "scipy": ("scipy", "python3-scipy"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
+    "argcomplete": ("argcomplete", "python3-argcomplete"),
     "rosbags": ("rosbags", "python3-rosbags-pip"),
     "ruamel": ("ruamel.yaml", "python3-rosbags-pip"),
     "mcap": ("mcap", "mcap-ros2-support"),

@@ -48,14 +48,18 @@ class Watchdogs:
 SETTINGS = (*settings_of(SupervisionConfig), *settings_of(Watchdogs))
 PARAMETERS = tuple(map(spec_of, SETTINGS))
 
+EXAMPLES = (
+    "atp_monitor --ros-args -p target_position_m:=6000.0 -p target_speed_kmh:=100.0",
+    "atp_monitor --ros-args -p target_position_m:=8200.0 -p target_speed_kmh:=0.0 -p use_sim_time:=true",
+)
+
 _SILENCE = "none received yet; is the estimator running, are topic names and QoS right?"
 
 
 class AtpMonitor(Node):
-    """Says NORMAL, INDICATION, OVERSPEED, WARNING, SERVICE_BRAKE or EMERGENCY_BRAKE of a train before a target.
+    """Supervises a target by the braking curve in the manner of ETCS, from NORMAL to EMERGENCY_BRAKE.
 
-    The limits follow from the braking curve in the manner of ETCS. Whatever is missing, old or not understood is an
-    EMERGENCY_BRAKE.
+    Whatever is missing, old or not understood is an EMERGENCY_BRAKE.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -157,4 +161,4 @@ def _log(node: Node, decision: Decision) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
-    return runtime.run(AtpMonitor, args, PARAMETERS)
+    return runtime.run(AtpMonitor, args, PARAMETERS, EXAMPLES)

@@ -33,6 +33,8 @@ REPORT_EVERY = 10
 
 PARAMETERS = tuple(map(spec_of, (FRAME_ID, *settings_of(Vehicle), *settings_of(CreepConfig))))
 
+EXAMPLES = ("creep_estimator", "creep_estimator --ros-args -p axles:=4 -p wheel_radius_m:=0.46")
+
 OUTPUTS = (*topics.CREEP_RESULTS, topics.DIAGNOSTICS)
 
 
@@ -138,4 +140,4 @@ def _build(kind: type[Any], values: dict[str, Any]) -> Any:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
-    return runtime.run(CreepEstimator, args, PARAMETERS)
+    return runtime.run(CreepEstimator, args, PARAMETERS, EXAMPLES)

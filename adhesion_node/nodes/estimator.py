@@ -26,6 +26,12 @@ from .params import declare, spec_of
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
 
+EXAMPLES = (
+    "estimator",
+    "estimator --ros-args -p train.mass_kg:=450000.0 -p track:='tunnel 3000 9000'",
+    "estimator --ros-args --params-file my_train.yaml -r __ns:=/train1",
+)
+
 
 OUTPUTS = {
     topics.MU: qos.RESULT,
@@ -134,4 +140,4 @@ class Estimator(Node):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
-    return runtime.run(Estimator, args, PARAMETERS)
+    return runtime.run(Estimator, args, PARAMETERS, EXAMPLES)

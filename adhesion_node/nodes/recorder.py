@@ -17,9 +17,11 @@ from rosgraph_msgs.msg import Clock
 
 from .. import topics
 from ..bag import BagWriter, deserialize, serialize
-from ..cli import run_tool
+from ..cli import help_texts, run_tool
 from . import runtime
 from .qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
+
+EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
 FLUSH_S = 0.5
 """A killed recorder loses what came since the last flush, or the one before while /clock stands still."""
@@ -140,7 +142,9 @@ class Recorder(Node):
 def main(args: Sequence[str] | None = None) -> int:
     """Run `recorder --output DIR [--ros-args ...]` until a signal."""
     own, ros = runtime.split_ros_arguments(sys.argv[1:] if args is None else args)
-    parser = argparse.ArgumentParser("recorder", description=__doc__, usage="%(prog)s --output DIR [--ros-args ...]")
+    parser = argparse.ArgumentParser(
+        "recorder", usage="%(prog)s --output DIR [--ros-args ...]", **help_texts(__doc__, *EXAMPLES)
+    )
     parser.add_argument("--output", metavar="DIR", required=True, help="the recording, a new directory")
     return run_tool(parser, lambda options: runtime.run(lambda: Recorder(Path(options.output)), ros), own)
 

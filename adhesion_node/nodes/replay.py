@@ -8,7 +8,14 @@ from collections.abc import Sequence
 from functools import partial
 
 from ..bag import BagReader, parse_remap, select
-from ..cli import DONE, FAILED, json_option, report, run_tool
+from ..cli import DONE, FAILED, help_texts, json_option, report, run_tool
+
+EXAMPLES = (
+    "replay my_run --offline",
+    "replay my_run --offline --set start_mu=0.12 --json result.json",
+    "replay my_run --rate 5",
+    "replay their_run --offline --remap /gnss/along_track:=position",
+)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -69,7 +76,10 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        "replay", description=__doc__, parents=[json_option()], usage="%(prog)s BAG [options] [--ros-args ...]"
+        "replay",
+        parents=[json_option()],
+        usage="%(prog)s BAG [options] [--ros-args ...]",
+        **help_texts(__doc__, *EXAMPLES),
     )
     add = parser.add_argument
     add("bag", metavar="BAG", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")

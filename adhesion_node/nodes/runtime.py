@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import inspect
+import os
 import signal
 import sys
 import time
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
+import argcomplete
 import rclpy
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -23,6 +25,7 @@ from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import ok, try_shutdown
 
+from ..cli import help_texts
 from .params import Spec
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -72,19 +75,24 @@ def stop_on_signals() -> Iterator[StopRequest]:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
 
 
-def run(make_node: Callable[[], Node], args: Sequence[str] | None = None, parameters: Sequence[Spec] = ()) -> int:
+def run(
+    make_node: Callable[[], Node],
+    args: Sequence[str] | None = None,
+    parameters: Sequence[Spec] = (),
+    examples: Sequence[str] = (),
+) -> int:
     """Run one node as a program and return its exit code: 0 after a clean stop, 1 failed, 2 bad input.
 
     `args` are ROS arguments alone, without the program's name (None: those of the command line); anything else
-    is refused, a forgotten --ros-args for one. --help shows the docstring of `make_node` and `parameters`; both
-    end the program, as argparse does. A ValueError, OSError or rclpy error at start is one line on
-    stderr and code 2; an OSError later, a full disk for one, is one line and code 1. The node ends on SIGINT
-    or SIGTERM or when it sets its attribute `finished`; then its method `close`, if it has one, may publish a
-    last time.
+    is refused, a forgotten --ros-args for one. --help shows the first paragraph of the docstring of `make_node`,
+    `parameters` and `examples`; both end the program, as argparse does. A ValueError, OSError or rclpy error at
+    start is one line on stderr and code 2; an OSError later, a full disk for one, is one line and code 1. The node
+    ends on SIGINT or SIGTERM or when it sets its attribute `finished`; then its method `close`, if it has one, may
+    publish a last time.
     """
     with stop_on_signals() as stop:
         own, ros = split_ros_arguments(sys.argv[1:] if args is None else args)
-        _parser(make_node, parameters).parse_args(own)
+        _parser(make_node, parameters, examples).parse_args(own)
         try:
             return _start_and_spin(make_node, ros, stop)
         finally:
@@ -107,14 +115,23 @@ def split_ros_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, ros
 
 
-def _parser(make_node: Callable[[], Node], parameters: Sequence[Spec]) -> argparse.ArgumentParser:
+def _parser(
+    make_node: Callable[[], Node], parameters: Sequence[Spec], examples: Sequence[str]
+) -> argparse.ArgumentParser:
+    """Return the parser of a node's own arguments; asked by a shell, it answers for those of ROS too and ends."""
+    purpose, _, _ = (inspect.getdoc(make_node) or "").partition("\n\n")
     described = [f"  {spec.name} (default {spec.default}): {spec.description}; {spec.allowed()}" for spec in parameters]
-    return argparse.ArgumentParser(
-        description=inspect.getdoc(make_node),
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+    listed = "\n".join(["parameters:", *described]) if described else ""
+    parser = argparse.ArgumentParser(
         usage="%(prog)s [--help] [--ros-args -p NAME:=VALUE ... --params-file FILE -r FROM:=TO ...]",
-        epilog="\n".join(["parameters:", *described]) if described else None,
+        **help_texts(purpose, *examples, more=listed),
     )
+    if "_ARGCOMPLETE" in os.environ:
+        parser.add_argument("--ros-args", action="store_true")
+        parser.add_argument("-p", "--param", action="append", choices=[f"{spec.name}:=" for spec in parameters])
+        parser.add_argument("--params-file", action="append")
+        argcomplete.autocomplete(parser)
+    return parser
 
 
 def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopRequest) -> int:

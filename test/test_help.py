@@ -1,0 +1,65 @@
+"""--help and completion of every program, as a newcomer and a shell ask for them."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from test_package import console_scripts
+
+from adhesion_node.study.__main__ import STUDIES
+
+
+@pytest.mark.parametrize(
+    ("program", "args"),
+    [*((program, ()) for program in sorted(console_scripts())), *(("study", (name,)) for name in STUDIES)],
+)
+def test_help_says_the_purpose_and_gives_examples(
+    program: str, args: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", [f"/usr/bin/{program}", *args, "--help"])
+    with pytest.raises(SystemExit) as ended:
+        importlib.import_module(console_scripts()[program]).main()
+    shown, errors = capsys.readouterr()
+    assert (ended.value.code, errors) == (0, "")
+    called = " ".join((program, *args))
+    usage, purpose = shown.split("\n\n")[:2]
+    assert usage.startswith(f"usage: {called}")
+    assert purpose.endswith(".")
+    examples = shown.split("\nexamples:\n")[1].splitlines()
+    assert examples
+    assert all(line.startswith(f"  {called}") for line in examples)
+
+
+def complete(program: str, line: str, folder: Path) -> set[str]:
+    """Return what a shell would offer behind `line`."""
+    asked = {
+        "_ARGCOMPLETE": "1",
+        "_ARGCOMPLETE_STDOUT_FILENAME": str(folder / "answer"),
+        "_ARGCOMPLETE_IFS": "\n",
+        "COMP_LINE": line,
+        "COMP_POINT": str(len(line)),
+    }
+    code = f"from {console_scripts()[program]} import main; main()"
+    subprocess.run([sys.executable, "-c", code], env={**os.environ, **asked}, check=True, timeout=60.0)
+    return {word.strip() for word in (folder / "answer").read_text().splitlines()}
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("study ", set(STUDIES)),
+        ("demo --scenario tunnel_e", {"tunnel_entry", "tunnel_exit"}),
+        ("replay my_run --off", {"--offline"}),
+        ("atp_monitor --ros-args -p target_", {"target_position_m:=", "target_speed_kmh:="}),
+        ("simulator --params", {"--params-file"}),
+    ],
+)
+def test_a_shell_completes_what_a_program_takes(line: str, expected: set[str], tmp_path: Path) -> None:
+    offered = complete(line.split(maxsplit=1)[0], line, tmp_path)
+    assert offered >= expected
+    assert all(word.startswith(line.rsplit(" ", 1)[1]) for word in offered)
