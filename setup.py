@@ -62,6 +62,7 @@ setup(
         "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],
         "test": ["pytest>=8,<10", "mcap-ros2-support>=0.5.5,<1"],
         "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
+        "docs": ["rosdoc2>=0.2.1,<0.3"],
         # colcon drives `setup.py develop`, which setuptools 80 removed.
         "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
     },

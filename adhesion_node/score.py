@@ -37,7 +37,7 @@ class Truth:
 
 
 def mean_relative_error_percent(config: Config, truth: Truth, estimates: Iterable[Estimate]) -> float | None:
-    """Mean of |mu - true mu|/true mu in % over all estimates while adhesion limits, after the first 30 km/h.
+    """Mean of abs(mu - true mu)/true mu in % over all estimates while adhesion limits, after the first 30 km/h.
 
     Every estimate counts, whatever regime it claims. None where there is no truth to compare with.
     """

@@ -9,7 +9,7 @@ from conftest import ROOT
 
 from adhesion_node import topics
 from adhesion_node.core.setting import Setting
-from adhesion_node.nodes import atp_monitor
+from adhesion_node.nodes import atp_monitor, estimator, qos
 from adhesion_node.settings import SETTINGS
 from adhesion_node.study import distances
 
@@ -46,6 +46,15 @@ def test_every_topic_stands_in_the_readme(topic: topics.Topic) -> None:
     package, _, name = topic.type.split("/")
     rows = [line for line in README.splitlines() if line.startswith("| ") and f"`{topic.name}`" in line]
     assert any(name in row and package in row for row in rows)
+
+
+@pytest.mark.parametrize("topic", estimator.OUTPUTS)
+def test_the_readme_names_the_quality_of_service(topic: topics.Topic) -> None:
+    section = README.split("\n## Topics\n")[1].split("\n## ")[0]
+    (row,) = (
+        line for line in section.splitlines() if line.startswith("| ") and f"`{topic.name}`" in line.split("|")[1]
+    )
+    assert row.split(" | ")[2] == ("latched" if estimator.OUTPUTS[topic] is qos.LATCHED else "result")
 
 
 @pytest.mark.parametrize("row", distances.rows(), ids=lambda row: f"{row['from_kmh']}-{row['case']}")

@@ -136,7 +136,7 @@ def covariance(sums: Sums, theta: Array) -> Array:
 
 
 def forgetting_factor(error: Array, gain: float, most: float, least: float) -> Array:
-    """Forgetting factor eta = max(eta_max - K_p |error|, eta_min) of an error of mu (13).
+    """Forgetting factor eta = max(eta_max - K_p abs(error), eta_min) of an error of mu (13).
 
     >>> [float(forgetting_factor(np.array(e), 0.1, 1.0, 0.971)) for e in (0.0, 0.1, -1.0)]
     [1.0, 0.99, 0.971]

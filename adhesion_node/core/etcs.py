@@ -1,5 +1,7 @@
 """Supervision limits before a target, from the braking curve, in the manner of ETCS: SUBSET-026-3, section 3.13.9.
 
+::
+
     d_EBI(v) = d_EBD(V_bec) - D_bec       the emergency brake intervenes: build-up, then along the EBD to the target
     d_SBI(v) = d_EBI(v) - v T_bs          the service brake intervenes, time enough to spare the emergency brake
     d_W(v)   = d_SBI(v) - v T_warning     warning, and the traction is cut off

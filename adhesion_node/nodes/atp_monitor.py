@@ -1,5 +1,7 @@
 """The ATP monitor: supervises a target with the braking curve and says what has to be done.
 
+::
+
     adhesion/state, adhesion/braking_curve  ->  atp/status
 
 It judges at each state. Two watchdogs judge when no state comes, because silence is no message: one on the ROS clock,

@@ -1,5 +1,7 @@
 """The creep estimator: wheel speeds, train speed and traction force in, the peak of the creep curve out.
 
+::
+
     wheel_speed, speed, traction_force  ->  creep/mu_max, creep/lambda_m, /diagnostics
 
 Nothing is published on creep/* while the data cannot tell the peak; /diagnostics says why. Every message goes through

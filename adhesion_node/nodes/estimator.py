@@ -1,5 +1,7 @@
 """The estimator: position and brake pressure in, adhesion with its bound and the braking curves out.
 
+::
+
     position, brake_pressure, speed  ->  adhesion/*, /diagnostics
 
 Every message goes through `Pipeline`, as in an offline replay; stamps drive the work, no timer does.

@@ -1,8 +1,8 @@
 """`study tables`: Tables 2 and 3 of Xie et al. 2019 by Monte-Carlo runs, beside a tuned and a naive EKF.
 
 Paper's settings (M = 20, 50 iterations, S = 50, L = 10) at the nominal noise; run r has seed 1000 + r. The error is
-the mean of |mu - true mu| over all estimates while adhesion limits, after the first 30 km/h. `converged_kmh` is the
-speed at which the error, averaged over the runs, first falls below 5 %; `coverage95` the share of estimates within
+the mean of abs(mu - true mu) over all estimates while adhesion limits, after the first 30 km/h. `converged_kmh` is
+the speed at which the error, averaged over the runs, first falls below 5 %; `coverage95` the share of estimates within
 1.96 of their own standard deviations. `seconds` is the computing time of the scenario's runs from all starts in one
 process, `ms_per_window` that of a window among the others of its batch. `bound_ratio` is null: there is no bound yet.
 """
