@@ -30,6 +30,9 @@ from .identified import BRAKINGS, WORST
 SPEEDS_KMH = {"tunnel_entry": (280, 250, 200, 150), "tunnel_exit": (230, 200, 150, 100)}
 """Speeds at which the limits are looked at."""
 
+EARLIER = {"sbi": "SBI", "warning": "W", "permitted": "P", "indication": "I"}
+"""The limits that are met before the emergency intervention, as ETCS abbreviates them."""
+
 SLIPPERY_MPS2 = 0.7
 """Default of A_NVMAXREDADH2 and 3, the largest deceleration on rail declared slippery (SUBSET-026-3, A.3.2)."""
 
@@ -111,15 +114,14 @@ def lines(table: list[dict[str, Any]]) -> Iterator[str]:
     These times do not depend on the adhesion, so they are the same in every case before a target speed.
     """
     cases = list(dict.fromkeys(row["case"] for row in table))
-    earlier = etcs.Limits._fields[1:]
     for scenario, (_, target_kmh) in BRAKINGS.items():
         yield f"{scenario}: emergency brake intervention, m before {target_kmh:g} km/h; the others so much earlier"
-        yield "  km/h" + "".join(f"{name:>14}" for name in cases) + "".join(f"{name:>11}" for name in earlier)
+        yield "  km/h" + "".join(f"{name:>14}" for name in cases) + "".join(f"{name:>6}" for name in EARLIER.values())
         for speed in SPEEDS_KMH[scenario]:
             here = [row for row in table if (row["scenario"], row["speed_kmh"]) == (scenario, speed)]
             ebi = "".join(f"{_meters(row['ebi_m']):>14}" for row in here)
             first = here[0]
-            yield f"{speed:6d}{ebi}" + "".join(f"{first[f'{name}_m'] - first['ebi_m']:11.0f}" for name in earlier)
+            yield f"{speed:6d}{ebi}" + "".join(f"{first[f'{name}_m'] - first['ebi_m']:6.0f}" for name in EARLIER)
 
 
 def _meters(value: float | None) -> str:
