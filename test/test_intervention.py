@@ -8,6 +8,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from matplotlib.image import imread
 
 from adhesion_node.core import braking
 from adhesion_node.core.adhesion import WET
@@ -70,17 +71,27 @@ def test_the_command_prints_the_table_and_writes_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(intervention, "predictions", lambda bag, seed: SAID)
-    assert main(["intervention", "--json", str(tmp_path / "table.json")]) == 0
+    options = ["--json", str(tmp_path / "table.json"), "--figure", str(tmp_path / "limits.png")]
+    assert main(["intervention", *options]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
     assert len(table) == 2 * 4 * 6
     for row in table:
         if row["ebi_m"] is not None:
             assert row["ebi_m"] < row["sbi_m"] < row["warning_m"] < row["permitted_m"] < row["indication_m"]
+    assert imread(tmp_path / "limits.png").shape[:2] == (528, 990)
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 2 * (2 + 4)
     assert printed[2].split()[3] == "no"  # curve
     # 280 km/h: T_bs = 2 s, T_warning = 2 s, T_driver = 4 s, T_indication = 9 s
     assert printed[2].split()[-4:] == ["156", "311", "467", "1167"]
+
+
+def test_without_a_curve_there_is_no_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(intervention, "predictions", lambda bag, seed: SAID[:1])
+    assert main(["intervention", "--figure", str(tmp_path / "limits.png")]) == 2
+    assert "there is no braking curve at 200 km/h" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

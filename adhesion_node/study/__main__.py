@@ -21,7 +21,7 @@ STUDIES = {
     "intervention": (
         intervention,
         "where the ATP monitor brakes by the identified adhesion and by fixed values",
-        "--json table.json",
+        "--json table.json --figure limits.png",
     ),
     "creep": (
         creep,

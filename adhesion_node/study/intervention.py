@@ -25,6 +25,7 @@ from ..core.prediction import Prediction
 from ..core.train import CRH3, GRAVITY, KMH
 from ..pipeline import Pipeline
 from ..score import Truth
+from . import intervention_figure
 from .identified import BRAKINGS, WORST
 
 SPEEDS_KMH = {"tunnel_entry": (280, 250, 200, 150), "tunnel_exit": (230, 200, 150, 100)}
@@ -46,6 +47,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--kwet", type=float, default=0.8, help="K_wet_rst, a datum of each train; 0.8 is an example (default: 0.8)"
     )
     parser.add_argument("--seed", type=int, default=1, help="seed of the particle filter (default: 1)")
+    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the limits at 200 km/h of tunnel_entry")
 
 
 def run(options: argparse.Namespace) -> int:
@@ -54,9 +56,22 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"kwet = {options.kwet}: give a factor above 0 up to 1")
     table: list[dict[str, Any]] = []
     for scenario in BRAKINGS:
-        table += rows(scenario, predictions(options.bags / scenario, options.seed), options.kwet)
+        said = predictions(options.bags / scenario, options.seed)
+        table += rows(scenario, said, options.kwet)
+        if scenario == "tunnel_entry" and options.figure is not None:
+            _draw(said, options.figure)
     report(options.json, table, "\n".join(lines(table)))
     return DONE
+
+
+def _draw(said: list[Prediction], path: Path) -> None:
+    """Draw the limits of the braking curve on the lower bound at 200 km/h."""
+    last = _last(said, 200.0 * KMH)
+    if last is None or last.safe is None:
+        raise ValueError(f"figure = {path}: there is no braking curve at 200 km/h to draw")
+    fixed = braking.curve(CRH3, last.estimate.speed_mps, WORST)
+    title = f"Supervision limits by the lower bound of adhesion {last.estimate.mu_lower:.4f}"
+    intervention_figure.draw(SupervisionConfig(), last.safe, fixed, title, path)
 
 
 def predictions(bag: Path, seed: int) -> list[Prediction]:
@@ -86,7 +101,7 @@ def _cases(
     said: list[Prediction], speed_mps: float, kwet: float
 ) -> dict[str, tuple[float | None, BrakingCurve | None]]:
     """Adhesion and braking curve of each case at a speed; adhesion of a fixed deceleration is that over g."""
-    last = next((one for one in reversed(said) if one.estimate.speed_mps >= speed_mps), None)
+    last = _last(said, speed_mps)
     fixed = {
         f"fixed {WORST}": WORST,
         f"K_wet {kwet:g}": kwet * CRH3.specific_brake(CRH3.full_pressure_pa),
@@ -98,6 +113,11 @@ def _cases(
         "mu_lower": (last and last.estimate.mu_lower, last and last.safe),
         **{name: (mu, braking.curve(CRH3, speed_mps, mu)) for name, mu in fixed.items()},
     }
+
+
+def _last(said: list[Prediction], speed_mps: float) -> Prediction | None:
+    """Return the last prediction from a speed that covers the given one."""
+    return next((one for one in reversed(said) if one.estimate.speed_mps >= speed_mps), None)
 
 
 def _limits(config: SupervisionConfig, curve: BrakingCurve | None, speed_mps: float) -> dict[str, float | None]:
