@@ -260,6 +260,7 @@ def test_smoother_with_a_step_far_beyond_the_noise() -> None:
     smoothed = particle_smoother(quiet, particles, _window(), 0.07)
     assert smoothed.kernel.sum(axis=1) == pytest.approx(np.ones((8, 10)))
     assert smoothed.marginal.sum(axis=1) == pytest.approx(np.ones(9))
+    assert smoothed.pairwise.sum(axis=2) == pytest.approx(smoothed.marginal[:-1])
 
 
 def test_same_generator_same_particles() -> None:

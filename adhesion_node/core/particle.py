@@ -17,6 +17,12 @@ from .motion import Motion, measurement_log_density
 from .train import Array
 from .window import Observation, Window
 
+LEAST_EXPONENT = -300.0
+"""Weights below exp of this are no part of any sum, but arithmetic with denormal numbers is slow."""
+
+SMALLEST_TOTAL = 1e-100
+"""Column sums of the kernel below this have lost digits."""
+
 
 class Particles(NamedTuple):
     """The filter's particles and log weights up to a constant per time, each of shape (K + 1, N)."""
@@ -31,12 +37,18 @@ class Particles(NamedTuple):
 
 
 class Smoothed(NamedTuple):
-    """Smoothed weights of the filter's particles."""
+    """Smoothed weights of the filter's particles, and what the backward kernel is made of."""
 
     marginal: Array
     """w_t|S, shape (K + 1, N)."""
-    kernel: Array
-    """Backward kernel p(x_t = i | x_t+1 = j, y), shape (K, N, N): columns sum to one."""
+    before: Array
+    after: Array
+    """ln w_t^i p(x_t+1^j | x_t^i) up to a constant per step is before[t, :, i] . after[t, :, j]; (K, 4, N) each."""
+
+    @property
+    def kernel(self) -> Array:
+        """Backward kernel p(x_t = i | x_t+1 = j, y), shape (K, N, N): columns sum to one."""
+        return _columns(self.before.transpose(0, 2, 1) @ self.after)
 
     @property
     def pairwise(self) -> Array:
@@ -82,39 +94,54 @@ def particle_filter(
 
 
 def particle_smoother(motion: Motion, particles: Particles, window: Window, mu: float) -> Smoothed:
-    """Marginal and pairwise smoothing weights (27) of the filter's particles.
+    """Marginal smoothing weights of the filter's particles, the sums over j of the pairwise ones (27).
 
-    The backward kernel is normalised in logarithms, so a step that no particle explains well is still a law.
+    The backward kernel is formed one step at a time, so that it stays in the processor's cache. A step that no
+    particle explains well is normalised in logarithms: it is still a law.
     """
-    kernel = _log_kernel(motion, particles, window, mu)
-    kernel -= kernel.max(axis=1, keepdims=True)
-    np.exp(kernel, out=kernel)
-    kernel /= kernel.sum(axis=1, keepdims=True)
+    before, after = _exponent(motion, particles, window, mu)
     marginal = np.empty_like(particles.log_weights)
     marginal[-1], _ = _normalised(particles.log_weights[-1])
+    count = marginal.shape[1]
+    kernel, total, ones = np.empty((count, count)), np.empty(count), np.ones(count)
+    least = np.full_like(kernel, LEAST_EXPONENT)  # against an array the maximum takes half the time
     for k in range(window.steps - 1, -1, -1):
-        marginal[k] = kernel[k] @ marginal[k + 1]
-    return Smoothed(marginal, kernel)
+        np.matmul(before[k].T, after[k], out=kernel)
+        np.maximum(kernel, least, out=kernel)
+        np.exp(kernel, out=kernel)
+        np.matmul(ones, kernel, out=total)
+        if total.min() < SMALLEST_TOTAL:
+            kernel, total[:] = _columns(before[k].T @ after[k]), 1.0
+        marginal[k] = kernel @ (marginal[k + 1] / total)
+    return Smoothed(marginal, before, after)
 
 
-def _log_kernel(motion: Motion, particles: Particles, window: Window, mu: float) -> Array:
-    """ln w_t^i p(x_t+1^j | x_t^i) up to a term of j, which cancels in the normalisation; shape (K, N, N).
+def _exponent(motion: Motion, particles: Particles, window: Window, mu: float) -> tuple[Array, Array]:
+    """Factors a and b, (K, 4, N) each, of ln w_t^i p(x_t+1^j | x_t^i) = a^i . b^j, which they keep at most 0.
 
-    -(x - m)^2/2q = x m/q - m^2/2q - x^2/2q with m the step of i and x = x_t+1^j: without the last term this is one
-    product of matrices (N, 3) and (3, N). Counted from the middle of the cloud, it keeps all its digits.
+    With m the step of i and x = x_t+1^j in standard deviations, -(x - m)^2/2 = m x - m^2/2 - x^2/2. Counted from
+    the middle of the cloud it keeps all its digits.
     """
-    position, speed = particles.position_m[1:], particles.speed_mps[1:]
-    middle_s, middle_v = position.mean(axis=1, keepdims=True), speed.mean(axis=1, keepdims=True)
-    step_s, step_v = motion.advance(
+    before, after = np.ones((2, window.steps, 4, particles.position_m.shape[1]))
+    before[:, 0], before[:, 1] = motion.advance(
         particles.position_m[:-1], particles.speed_mps[:-1], window.dt_s[:, None], window.brake[:, None], mu
     )
-    step_s, step_v = step_s - middle_s, step_v - middle_v
-    var_s, var_v = motion.noise(window.dt_s[:, None])
-    scaled_s, scaled_v = step_s / var_s, step_v / var_v
-    own = particles.log_weights[:-1] - 0.5 * (step_s * scaled_s + step_v * scaled_v)
-    before = np.stack([scaled_s, scaled_v, own], axis=2)
-    after = np.stack([position - middle_s, speed - middle_v, np.ones_like(speed)], axis=1)
-    return np.asarray(before @ after, dtype=np.float64)
+    after[:, 0], after[:, 1] = particles.position_m[1:], particles.speed_mps[1:]
+    middle = after[:, :2].mean(axis=2, keepdims=True)
+    spread = np.sqrt(np.stack(motion.noise(window.dt_s), axis=1))[:, :, None]
+    for states in (before[:, :2], after[:, :2]):
+        np.subtract(states, middle, out=states)
+        np.divide(states, spread, out=states)
+    log_weights = particles.log_weights[:-1] - particles.log_weights[:-1].max(axis=1, keepdims=True)
+    before[:, 2] = log_weights - 0.5 * np.einsum("kcn,kcn->kn", before[:, :2], before[:, :2])
+    after[:, 3] = -0.5 * np.einsum("kcn,kcn->kn", after[:, :2], after[:, :2])
+    return before, after
+
+
+def _columns(exponent: Array) -> Array:
+    """exp of matrices, their columns normalised to sum to one, however far below 0 they are."""
+    kernel = np.exp(exponent - exponent.max(axis=-2, keepdims=True))
+    return np.asarray(kernel / kernel.sum(axis=-2, keepdims=True))
 
 
 def pairwise_errors(motion: Motion, particles: Particles, window: Window, mu: float) -> tuple[Array, Array]:
