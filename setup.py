@@ -18,6 +18,7 @@ PROGRAMS = {
     "recover": "adhesion_node.recover",
     "demo": "adhesion_node.demo",
     "study": "adhesion_node.study.__main__",
+    "bench": "adhesion_node.bench.__main__",
 }
 
 
@@ -63,6 +64,8 @@ setup(
         "test": ["pytest>=8,<10", "mcap-ros2-support>=0.5.5,<1"],
         "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
+        # What `bench` measures against; particles wants numpy below 2.
+        "bench": ["filterpy>=1.4.5,<3", "particles>=0.4,<0.5", "threadpoolctl>=3.2,<4"],
         # colcon drives `setup.py develop`, which setuptools 80 removed.
         "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
     },

@@ -31,6 +31,8 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "lz4": ("lz4", "mcap-ros2-support"),
     "zstandard": ("zstandard", "mcap-ros2-support"),
 }
+PEERS = {"filterpy", "particles"}
+"""What `bench` measures against: an extra, imported only by files of its own."""
 
 
 @cache
@@ -110,7 +112,7 @@ def test_a_console_script_has_its_main(name: str) -> None:
 
 def test_the_executables_of_the_design_are_there() -> None:
     nodes = {"simulator", "slip_simulator", "estimator", "creep_estimator", "atp_monitor"}
-    tools = {"recorder", "replay", "recover", "import_csv", "demo", "study"}
+    tools = {"recorder", "replay", "recover", "import_csv", "demo", "study", "bench"}
     assert set(console_scripts()) == nodes | tools
 
 
@@ -119,11 +121,20 @@ def test_what_is_imported_is_declared() -> None:
     ros_packages = {name for name in imported() if ROS.fullmatch(name)}
     assert ros_packages <= depends
     required = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in setup_arguments()["install_requires"]}
-    for name in imported() - ros_packages:
+    for name in imported() - ros_packages - PEERS:
         distribution, rosdep_key = FROM_PYPI[name]
         assert distribution in required
         assert rosdep_key in depends
     assert not any(ROS.fullmatch(name) for name in required), "ROS is no PyPI requirement; it stands in the extra `ros`"
+
+
+def test_only_bench_imports_its_peers() -> None:
+    extra = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in setup_arguments()["extras_require"]["bench"]}
+    assert extra >= PEERS
+    named = re.compile(rf"^\s*(from|import) ({'|'.join(PEERS)})\b", re.MULTILINE)
+    importing = {path for path in sources() if named.search(path.read_text(encoding="utf-8"))}
+    assert {path.name for path in importing} == {f"{peer}_smoother.py" for peer in PEERS}
+    assert {path.parent.name for path in importing} == {"bench"}
 
 
 def test_the_quick_start_is_two_commands() -> None:

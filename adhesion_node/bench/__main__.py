@@ -1,0 +1,130 @@
+"""`bench`: speed, ours beside its peers in one run; prints versions and settings with the times."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import platform
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import nullcontext
+from importlib import import_module
+from importlib.metadata import version
+from importlib.util import find_spec
+from typing import Any
+
+from ..cli import DONE, json_option, report, run_tool
+from . import gaussian, particle, step
+
+PEERS = ("filterpy", "particles", "threadpoolctl")
+"""Of the extra `bench`."""
+
+PARTICLE_STEPS, PARTICLES = 100, 200
+GAUSSIAN_STEPS = 50
+
+Options = argparse.Namespace
+Section = Mapping[str, Any]
+
+
+def _particle(options: Options) -> Section:
+    rows = particle.compare(PARTICLE_STEPS, PARTICLES, options.rounds, options.seed)
+    return {"settings": {"steps": PARTICLE_STEPS, "particles": PARTICLES}, "rows": rows}
+
+
+def _gaussian(options: Options) -> Section:
+    return {
+        "settings": {"steps": GAUSSIAN_STEPS},
+        "rows": gaussian.compare(GAUSSIAN_STEPS, options.rounds, options.seed),
+    }
+
+
+def _step(options: Options) -> Section:
+    rows = [step.latency(rate_hz, options.journeys, options.seed) for rate_hz in (10.0, 100.0)]
+    return {"settings": {"window": step.CONFIG.window, "step": step.CONFIG.step}, "rows": rows}
+
+
+def _memory(options: Options) -> Section:
+    return {"settings": {"rate_hz": 10.0}, "rows": [step.memory(options.minutes, 10.0, options.seed)]}
+
+
+BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], str]] = {
+    "particle": (_particle, PEERS[1:], "particle E and M step of one window"),
+    "gaussian": (_gaussian, (PEERS[0], PEERS[2]), "Gaussian update of one window, EM converged"),
+    "step": (_step, (), "a sample through the estimator in steady braking"),
+    "memory": (_memory, (), "resident memory over a long journey"),
+}
+"""What runs it, the peers it needs, and its title."""
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the benchmarks and print their tables."""
+    parser = argparse.ArgumentParser("bench", description=__doc__, parents=[json_option()])
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
+    parser.add_argument("--rounds", type=int, default=50, help="calls of each contender (default %(default)s)")
+    parser.add_argument("--journeys", type=int, default=5, help="brakings for the latency (default %(default)s)")
+    parser.add_argument(
+        "--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)"
+    )
+    parser.add_argument("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
+    return run_tool(parser, _run, args)
+
+
+def _run(options: Options) -> int:
+    _check(options)
+    names = options.names or list(BENCHMARKS)
+    _require([peer for name in names for peer in BENCHMARKS[name][1]])
+    # All on one thread: the arrays are too small for more, which would only make the times depend on the neighbours.
+    limited = import_module("threadpoolctl").threadpool_limits(1) if find_spec("threadpoolctl") else nullcontext()
+    with limited:
+        sections = {name: dict(BENCHMARKS[name][0](options)) for name in names}
+    result = {"versions": versions(), "seed": options.seed, **sections}
+    report(options.json, result, "\n".join(_lines(result)))
+    return DONE
+
+
+def _check(options: Options) -> None:
+    for name in options.names:
+        if name not in BENCHMARKS:
+            raise ValueError(f"benchmark {name!r}: choose of {', '.join(BENCHMARKS)}")
+    for name in ("rounds", "journeys", "minutes"):
+        value = getattr(options, name)
+        if not value > 0 or value == float("inf"):
+            raise ValueError(f"{name} = {value}: give a number above 0")
+    if options.seed < 0:
+        raise ValueError(f"seed = {options.seed}: give an integer of at least 0")
+
+
+def _require(peers: Sequence[str]) -> None:
+    missing = sorted({peer for peer in peers if find_spec(peer) is None})
+    if missing:
+        raise ValueError(f"{', '.join(missing)} not installed: pip install 'adhesion_node[bench]'")
+
+
+def versions() -> dict[str, str]:
+    """Versions of what is timed and of what it runs on."""
+    installed = {name: version(name) for name in ("numpy", "scipy", *PEERS) if find_spec(name)}
+    return {"python": platform.python_version(), **installed, "cores": str(os.cpu_count())}
+
+
+def _lines(result: Mapping[str, Any]) -> Iterator[str]:
+    yield ", ".join(f"{name} {value}" for name, value in result["versions"].items())
+    for name, (_, _, title) in BENCHMARKS.items():
+        if name in result:
+            settings = ", ".join(f"{key} {value}" for key, value in result[name]["settings"].items())
+            yield f"\n{title} ({settings})"
+            yield from _table(result[name]["rows"])
+
+
+def _table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """Columns as wide as their widest cell."""
+    cells = [list(rows[0]), *([_cell(value) for value in row.values()] for row in rows)]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    for line in cells:
+        yield "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
+
+
+def _cell(value: Any) -> str:
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,93 @@
+"""The window through `filterpy` (R. Labbe): its Kalman filter and RTS smoother, step by step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from filterpy.kalman import KalmanFilter
+
+from ..core.em import expectation, maximise
+from ..core.gaussian import Gaussian
+from ..core.motion import Motion
+from ..core.particle import Particles, Smoothed
+from ..core.train import Array
+from ..core.window import Window
+
+SPEED_STEP_MPS = 1e-3
+
+
+class Laws(NamedTuple):
+    """Smoothed laws of the K + 1 states of a window."""
+
+    mean: Array
+    """Shape (K + 1, 2)."""
+    covariance: Array
+    """Shape (K + 1, 2, 2)."""
+
+
+class Found(NamedTuple):
+    """Where EM ends."""
+
+    mu: float
+    speed_mps: Array
+    iterations: int
+
+
+def rts_window(motion: Motion, window: Window, prior: Gaussian, mu: float) -> Laws:
+    """Smooth the deviations from the noise-free run, which are linear: `rts_smoother` knows no input."""
+    path = _noise_free(motion, window, prior.mean, mu)
+    steps = _jacobians(motion, window, path, mu)
+    noise = [np.diag(variances) for variances in np.stack(motion.noise(window.dt_s), axis=1)]
+    kalman = KalmanFilter(dim_x=2, dim_z=1)
+    kalman.P, kalman.H = prior.covariance, np.array([[1.0, 0.0]])
+    mean, covariance, _, _ = kalman.batch_filter(
+        window.position_m - path[1:, 0], Fs=steps, Qs=noise, Rs=[np.array([[r]]) for r in window.variance_m2]
+    )
+    # In front stands the prior; its own step and noise are never used.
+    mean, covariance, _, _ = kalman.rts_smoother(
+        np.concatenate([np.zeros((1, 2, 1)), mean]),
+        np.concatenate([prior.covariance[None], covariance]),
+        Fs=[steps[0], *steps],
+        Qs=[noise[0], *noise],
+    )
+    return Laws(path + mean[:, :, 0], covariance)
+
+
+def em(motion: Motion, window: Window, prior: Gaussian, start: float, iterations: int, tolerance: float) -> Found:
+    """EM with `rts_window` as its E-step; stops when mu moves no more than the tolerance."""
+    mu, moved, done, laws = start, np.inf, 0, Laws(np.empty(0), np.empty(0))
+    while done < iterations and moved > tolerance:
+        laws = rts_window(motion, window, prior, mu)
+        mu, before = _maximised(motion, window, laws), mu
+        moved, done = abs(mu - before), done + 1
+    return Found(mu, laws.mean[:, 1], done)
+
+
+def _maximised(motion: Motion, window: Window, laws: Laws) -> float:
+    """M-step; of laws this narrow the means are enough: one particle."""
+    position, speed = laws.mean.T[:, :, None]
+    weights, nothing = np.ones_like(position), np.empty((0, 0, 0))
+    particles = Particles(position, speed, 0.0 * weights, 0.0, 1.0)
+    return maximise(expectation(motion, particles, Smoothed(weights, nothing, nothing), window), 0.0)
+
+
+def _noise_free(motion: Motion, window: Window, start: Array, mu: float) -> Array:
+    path = np.empty((window.steps + 1, 2))
+    path[0] = start
+    for k in range(window.steps):
+        path[k + 1] = motion.advance(path[k, 0], path[k, 1], window.dt_s[k], window.brake[k], mu)
+    return path
+
+
+def _jacobians(motion: Motion, window: Window, path: Array, mu: float) -> Array:
+    """By central differences, all steps at once, shape (K, 2, 2)."""
+    position, speed = path[:-1].T
+    low, high = (
+        np.stack(motion.advance(position, speed + change, window.dt_s, window.brake, mu))
+        for change in (-SPEED_STEP_MPS, SPEED_STEP_MPS)
+    )
+    steps = np.zeros((window.steps, 2, 2))
+    steps[:, 0, 0] = 1.0
+    steps[:, :, 1] = (high - low).T / (2.0 * SPEED_STEP_MPS)
+    return steps

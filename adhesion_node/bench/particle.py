@@ -1,0 +1,85 @@
+"""Particle E and M step of one window: ours, with exact pairwise smoothing, beside the package `particles`.
+
+All use the same model, window, number of particles and M-step. The peers draw trajectories where ours has weights;
+that all of them smooth to the same speeds, within their Monte-Carlo error, is part of the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.em import expectation, maximise
+from ..core.particle import Particles, Smoothed, particle_filter, particle_smoother
+from ..core.train import Array
+from .scene import MU, Scene, braking_window
+from .timing import Contender, Timed, figures, interleave
+
+OURS, MCMC, EXACT = "ours, exact", "particles, MCMC O(N)", "particles, exact O(N^2)"
+
+SLOW = 10
+"""The slowest takes part in every so many rounds."""
+
+
+class Result(NamedTuple):
+    """What an E and M step gives."""
+
+    mu: float
+    speed_mps: Array
+    """Smoothed means, shape (K + 1,)."""
+
+
+def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, Any]]:
+    """Rows of the table for windows of so many steps and so many particles."""
+    from . import particles_smoother  # the peer is an extra
+
+    rng = np.random.default_rng(seed)
+    scene = braking_window(steps, rng)
+    contenders = (
+        Contender(OURS, partial(_ours, scene, count, rng), rounds),
+        Contender(MCMC, partial(_sampled, scene, count, particles_smoother.mcmc), rounds),
+        Contender(EXACT, partial(_sampled, scene, count, particles_smoother.exact), math.ceil(rounds / SLOW)),
+    )
+    timed = interleave(contenders)
+    return [{"method": name, **_row(timed[name], timed[OURS])} for name in timed]
+
+
+def _ours(scene: Scene, count: int, rng: np.random.Generator) -> Result:
+    particles = particle_filter(*scene, MU, count, rng)
+    smoothed = particle_smoother(scene.motion, particles, scene.window, MU)
+    return _maximised(scene, particles, smoothed.marginal)
+
+
+def _sampled(scene: Scene, count: int, smoother: Callable[[Scene, float, int], Array]) -> Result:
+    position, speed = np.moveaxis(smoother(scene, MU, count), 2, 0)
+    flat = np.zeros_like(position)
+    return _maximised(scene, Particles(position, speed, flat, 0.0, 0.0), np.full_like(flat, 1.0 / count))
+
+
+def _maximised(scene: Scene, particles: Particles, marginal: Array) -> Result:
+    nothing = np.empty((0, 0, 0))
+    expected = expectation(scene.motion, particles, Smoothed(marginal, nothing, nothing), scene.window)
+    return Result(maximise(expected, 0.0), np.einsum("kn,kn->k", marginal, particles.speed_mps))
+
+
+def _row(timed: Timed[Result], ours: Timed[Result]) -> dict[str, Any]:
+    """Times, their ratio to ours, and how far the smoothed speeds are from ours, averaged over the calls."""
+    (mean, error), (our_mean, our_error) = _mean_speed(timed.results), _mean_speed(ours.results)
+    return {
+        **figures(timed.seconds),
+        "ratio": float(np.median(timed.seconds) / np.median(ours.seconds)),
+        "mu": float(np.mean([result.mu for result in timed.results])),
+        "mu_std": float(np.std([result.mu for result in timed.results])),
+        "differs_mps": float(np.sqrt(np.mean((mean - our_mean) ** 2))),
+        "monte_carlo_error_mps": float(np.sqrt(np.mean(error**2 + our_error**2))),
+    }
+
+
+def _mean_speed(results: Sequence[Result]) -> tuple[Array, Array]:
+    """Mean over the calls and its standard error, each (K + 1,)."""
+    speeds = np.array([result.speed_mps for result in results])
+    return speeds.mean(axis=0), speeds.std(axis=0) / math.sqrt(len(speeds))

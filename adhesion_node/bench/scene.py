@@ -1,0 +1,81 @@
+"""What the benchmarks run on: a window of braking for the smoothers, and a long journey for the estimator.
+
+Drawn from the estimator's own model, which all contenders share.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.adhesion import WET
+from ..core.align import PositionSample, PressureSample
+from ..core.config import Config
+from ..core.gaussian import Gaussian
+from ..core.motion import Motion
+from ..core.train import GRAVITY, KMH, Train
+from ..core.window import Window
+
+SIGMA_M = 0.5
+MU = 0.0726
+"""Adhesion in the window."""
+
+FASTEST_MPS, SLOWEST_MPS = 300 * KMH, 140 * KMH
+"""Between these speeds the journey brakes, on a wet rail, always limited by the adhesion."""
+
+CRUISE_S = 20.0
+ACCELERATION_MPS2 = 1.0
+
+
+class Scene(NamedTuple):
+    """A window of braking and what its smoothers are given."""
+
+    motion: Motion
+    prior: Gaussian
+    window: Window
+
+
+def braking_window(steps: int, rng: np.random.Generator) -> Scene:
+    """So many steps of 0.1 s at the nominal noise, behind a prior as earlier windows leave it."""
+    motion = Config().motion
+    full = np.ones(steps)
+    dt, brake = 0.1 * full, motion.train.specific_brake(motion.train.full_pressure_pa) * full
+    prior = Gaussian(np.array([0.0, FASTEST_MPS]), np.array([[0.015, 0.002], [0.002, 0.0017]]))
+    noise = np.sqrt(np.stack(motion.noise(dt))) * rng.standard_normal((2, steps))
+    state, positions = prior.draw(1, rng)[0], np.empty(steps)
+    for k in range(steps):
+        state = np.stack(motion.advance(state[0], state[1], dt[k], brake[k], MU)) + noise[:, k]
+        positions[k] = state[0]
+    measured = positions + SIGMA_M * rng.standard_normal(steps)
+    return Scene(motion, prior, Window(dt, brake, measured, SIGMA_M**2 * full, 0.0 * full, math.inf * full))
+
+
+def journey(rate_hz: float, rng: np.random.Generator) -> Iterator[tuple[PressureSample, PositionSample]]:
+    """What the sensors give at each time while the train cruises, brakes and accelerates, over and over."""
+    train, period_s, position = Config().train, 1.0 / rate_hz, 0.0
+    for k, (braked, speed, change) in enumerate(_speeds(train, period_s)):
+        t_ns = round(k * period_s * 1e9)
+        yield (
+            PressureSample(t_ns, train.full_pressure_pa if braked else 0.0),
+            PositionSample(t_ns, position + SIGMA_M * float(rng.standard_normal()), SIGMA_M**2),
+        )
+        position += period_s * (speed + 0.5 * period_s * change)
+
+
+def _speeds(train: Train, period_s: float) -> Iterator[tuple[bool, float, float]]:
+    """Whether the train is braked, its speed, m/s, and the acceleration, m/s^2, from each time on."""
+    speed = FASTEST_MPS
+    while True:
+        for _ in range(round(CRUISE_S / period_s)):
+            yield False, speed, 0.0
+        while speed > SLOWEST_MPS:
+            resistance = float(train.specific_resistance(np.asarray(speed)))
+            slowing = GRAVITY * (float(WET(np.asarray(speed))) + resistance)
+            yield True, speed, -slowing
+            speed -= period_s * slowing
+        while speed < FASTEST_MPS:
+            yield False, speed, ACCELERATION_MPS2
+            speed += period_s * ACCELERATION_MPS2

@@ -1,0 +1,81 @@
+"""`step` on the way that live node and replay share: latency in steady braking, headroom at 100 Hz, memory."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..cli import progress
+from ..core.align import PositionSample, PressureSample
+from ..core.config import Config
+from ..pipeline import Pipeline
+from .scene import journey
+from .timing import figures
+
+CONFIG = replace(Config(), window=50, step=5)
+
+STEADY_S = 5.0
+"""After the brake is applied: a full window at 10 Hz."""
+
+FILLED_SHARE = 0.2
+"""Part of a long run after which everything that is to be allocated has been."""
+
+
+def latency(rate_hz: float, rounds: int, seed: int) -> dict[str, Any]:
+    """What a sample takes in steady braking, and how many of them a second of CPU would bear."""
+    seconds: list[float] = []
+    for turn in range(rounds):
+        rng = np.random.default_rng([seed, turn])
+        seconds += _braking_seconds(journey(rate_hz, rng))
+    per_second = 1.0 / float(np.mean(seconds))
+    return {"rate_hz": rate_hz, **figures(seconds), "samples_per_second": per_second, "headroom": per_second / rate_hz}
+
+
+def _braking_seconds(samples: Iterable[tuple[PressureSample, PositionSample]]) -> list[float]:
+    """Seconds that each sample of the first braking takes, from `STEADY_S` on to its end."""
+    pipeline, steady_ns, seconds = Pipeline(CONFIG, seed=1), None, list[float]()
+    for pressure, position in samples:
+        braked = pressure.pressure_pa > 0.0
+        if braked and steady_ns is None:
+            steady_ns = pressure.t_ns + round(STEADY_S * 1e9)
+        if steady_ns is not None and not braked:
+            break
+        started = time.perf_counter()
+        pipeline.push(pressure)
+        pipeline.push(position)
+        took = time.perf_counter() - started
+        if steady_ns is not None and pressure.t_ns >= steady_ns:
+            seconds.append(took)
+    return seconds
+
+
+def memory(minutes: float, rate_hz: float, seed: int) -> dict[str, Any]:
+    """Resident memory over a long journey of cruising and braking."""
+    total = round(60.0 * minutes * rate_hz)
+    pipeline, filled_mb = Pipeline(CONFIG, seed=1), 0.0
+    samples = islice(journey(rate_hz, np.random.default_rng(seed)), total)
+    for count, pair in enumerate(progress(samples, "samples", total)):
+        if count == int(FILLED_SHARE * total):
+            filled_mb = resident_mb()
+        for sample in pair:
+            pipeline.push(sample)
+    end_mb = resident_mb()
+    return {
+        "minutes": minutes,
+        "windows": pipeline.windows,
+        "filled_mb": filled_mb,
+        "end_mb": end_mb,
+        "growth_mb": end_mb - filled_mb,
+    }
+
+
+def resident_mb() -> float:
+    """Resident memory of this process as Linux tells it, MB."""
+    status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines())
+    return float(status["VmRSS"].split()[0]) / 1024.0

@@ -1,0 +1,51 @@
+"""Timing side by side: after a warm-up the contenders take turns, so that whatever else the machine does hits all."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Generic, NamedTuple, TypeVar
+
+import numpy as np
+
+from ..cli import progress
+
+Result = TypeVar("Result")
+
+
+class Contender(NamedTuple, Generic[Result]):
+    """Something to time: `run` is called in so many rounds, spread over all of them."""
+
+    name: str
+    run: Callable[[], Result]
+    rounds: int
+
+
+class Timed(NamedTuple, Generic[Result]):
+    """What the calls of a contender took, s, and returned."""
+
+    seconds: list[float]
+    results: list[Result]
+
+
+def interleave(contenders: Sequence[Contender[Result]]) -> dict[str, Timed[Result]]:
+    """Call every contender once to warm up, then in turns; the results by name."""
+    for contender in contenders:
+        contender.run()
+    timed: dict[str, Timed[Result]] = {contender.name: Timed([], []) for contender in contenders}
+    rounds = max(contender.rounds for contender in contenders)
+    for turn in progress(range(rounds), "rounds", rounds):
+        for name, run, wanted in contenders:
+            if turn % (rounds // wanted) == 0:
+                started = time.perf_counter()
+                result = run()
+                timed[name].seconds.append(time.perf_counter() - started)
+                timed[name].results.append(result)
+    return timed
+
+
+def figures(seconds: Iterable[float]) -> dict[str, Any]:
+    """Number, median, 99th percentile and maximum, in ms."""
+    ms = 1e3 * np.array(list(seconds))
+    p50, p99 = np.percentile(ms, (50, 99))
+    return {"calls": ms.size, "median_ms": float(p50), "p99_ms": float(p99), "max_ms": float(ms.max())}
