@@ -34,7 +34,7 @@ class Found(NamedTuple):
     iterations: int
 
 
-def rts_window(motion: Motion, window: Window, prior: Gaussian, mu: float) -> Laws:
+def rts_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Laws:
     """Smooth the deviations from the noise-free run, which are linear: `rts_smoother` knows no input."""
     path = _noise_free(motion, window, prior.mean, mu)
     steps = _jacobians(motion, window, path, mu)
@@ -54,11 +54,11 @@ def rts_window(motion: Motion, window: Window, prior: Gaussian, mu: float) -> La
     return Laws(path + mean[:, :, 0], covariance)
 
 
-def em(motion: Motion, window: Window, prior: Gaussian, start: float, iterations: int, tolerance: float) -> Found:
+def em(motion: Motion, prior: Gaussian, window: Window, start: float, iterations: int, tolerance: float) -> Found:
     """EM with `rts_window` as its E-step; stops when mu moves no more than the tolerance."""
     mu, moved, done, laws = start, np.inf, 0, Laws(np.empty(0), np.empty(0))
     while done < iterations and moved > tolerance:
-        laws = rts_window(motion, window, prior, mu)
+        laws = rts_window(motion, prior, window, mu)
         mu, before = _maximised(motion, window, laws), mu
         moved, done = abs(mu - before), done + 1
     return Found(mu, laws.mean[:, 1], done)

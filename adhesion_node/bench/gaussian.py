@@ -21,7 +21,7 @@ def compare(steps: int, rounds: int, seed: int) -> list[dict[str, Any]]:
     from . import filterpy_smoother  # the peer is an extra
 
     motion, prior, window = braking_window(steps, np.random.default_rng(seed))
-    em = partial(filterpy_smoother.em, motion, window, prior, START_MU, ITERATIONS, TOLERANCE)
+    em = partial(filterpy_smoother.em, motion, prior, window, START_MU, ITERATIONS, TOLERANCE)
     timed = interleave([Contender(PEER, em, rounds)])
     return [
         {"method": name, **figures(runs.seconds), "mu": runs.results[0].mu, "iterations": runs.results[0].iterations}

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,32 +27,44 @@ FILLED_SHARE = 0.2
 """Part of a long run after which everything that is to be allocated has been."""
 
 
+class Took(NamedTuple):
+    """Seconds that a sample took, by the clock and of the processor."""
+
+    wall: float
+    cpu: float
+
+
 def latency(rate_hz: float, rounds: int, seed: int) -> dict[str, Any]:
     """What a sample takes in steady braking, and how many of them a second of CPU would bear."""
-    seconds: list[float] = []
-    for turn in range(rounds):
-        rng = np.random.default_rng([seed, turn])
-        seconds += _braking_seconds(journey(rate_hz, rng))
-    per_second = 1.0 / float(np.mean(seconds))
-    return {"rate_hz": rate_hz, **figures(seconds), "samples_per_second": per_second, "headroom": per_second / rate_hz}
+    journeys = (journey(rate_hz, np.random.default_rng([seed, turn])) for turn in range(rounds))
+    took = [sample for samples in journeys for sample in _in_steady_braking(samples)]
+    cpu = [sample.cpu for sample in took]
+    per_second = 1.0 / float(np.mean(cpu))
+    return {
+        "rate_hz": rate_hz,
+        **figures([sample.wall for sample in took]),
+        "cpu_p99_ms": figures(cpu)["p99_ms"],
+        "samples_per_cpu_second": per_second,
+        "headroom": per_second / rate_hz,
+    }
 
 
-def _braking_seconds(samples: Iterable[tuple[PressureSample, PositionSample]]) -> list[float]:
-    """Seconds that each sample of the first braking takes, from `STEADY_S` on to its end."""
-    pipeline, steady_ns, seconds = Pipeline(CONFIG, seed=1), None, list[float]()
+def _in_steady_braking(samples: Iterable[tuple[PressureSample, PositionSample]]) -> list[Took]:
+    """What each sample of the first braking takes, from `STEADY_S` on to its end."""
+    pipeline, steady_ns, took = Pipeline(CONFIG, seed=1), None, list[Took]()
     for pressure, position in samples:
         braked = pressure.pressure_pa > 0.0
         if braked and steady_ns is None:
             steady_ns = pressure.t_ns + round(STEADY_S * 1e9)
         if steady_ns is not None and not braked:
             break
-        started = time.perf_counter()
+        wall, cpu = time.perf_counter(), time.process_time()
         pipeline.push(pressure)
         pipeline.push(position)
-        took = time.perf_counter() - started
+        cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
         if steady_ns is not None and pressure.t_ns >= steady_ns:
-            seconds.append(took)
-    return seconds
+            took.append(Took(wall, cpu))
+    return took
 
 
 def memory(minutes: float, rate_hz: float, seed: int) -> dict[str, Any]:

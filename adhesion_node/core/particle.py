@@ -21,7 +21,7 @@ LEAST_EXPONENT = -300.0
 """Weights below exp of this are no part of any sum, but arithmetic with denormal numbers is slow."""
 
 SMALLEST_TOTAL = 1e-100
-"""Column sums of the kernel below this have lost digits."""
+"""Column sums of the kernel below this have lost digits; they are formed again, counted from their maximum."""
 
 
 class Particles(NamedTuple):

@@ -10,14 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.motion import Motion
+from ..core.particle import LEAST_EXPONENT, SMALLEST_TOTAL
 from ..core.train import GRAVITY, Array
 from .batch_particles import Draws, Windows, normalised, particle_filter
-
-LEAST_EXPONENT = -300.0
-"""Weights below exp of this are no part of any sum, but arithmetic with denormal numbers is slow."""
-
-SMALLEST_TOTAL = 1e-100
-"""Column sums of the kernel below this have lost digits; they are formed again, counted from their maximum."""
 
 
 class Expectations(NamedTuple):
