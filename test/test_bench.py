@@ -84,6 +84,7 @@ def test_rts_of_filterpy_is_the_exact_smoother() -> None:
     model = Linear(c0=0.79, c1=0.05)
     prior = Gaussian(np.array([100.0, 80.0]), np.array([[0.09, 0.01], [0.01, 0.04]]))
     window = make_window(model, prior, 0.07, np.random.default_rng(3))
+    window = replace(window, dt_s=np.linspace(0.05, 0.2, window.steps))
     exact = rts(model, prior, window, 0.06)
     laws = peer("filterpy").rts_window(model.motion, prior, window, 0.06)
     np.testing.assert_allclose(laws.mean, exact.mean, rtol=1e-9)
