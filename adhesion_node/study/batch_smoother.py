@@ -44,6 +44,7 @@ def _smooth(motion: Motion, windows: Windows, mu: Array, particles: tuple[Array,
     _, runs, count = marginal.shape
     before, after = np.ones((runs, count, 4)), np.ones((runs, 4, count))
     kernel, total, ones = np.empty((runs, count, count)), np.empty((runs, 1, count)), np.ones((1, count))
+    least = np.full_like(kernel, LEAST_EXPONENT)
     for k in range(len(windows.dt_s) - 1, -1, -1):
         var_s, var_v = motion.noise(windows.dt_s[k])
         step_s, step_v = motion.advance(position[k], speed[k], windows.dt_s[k], windows.brake[k], mu)
@@ -57,7 +58,7 @@ def _smooth(motion: Motion, windows: Windows, mu: Array, particles: tuple[Array,
         after[:, 0], after[:, 1] = next_s, next_v
         after[:, 3] = (-0.5 / var_s) * next_s**2 - (0.5 / var_v) * next_v**2
         np.matmul(before, after, out=kernel)
-        np.maximum(kernel, LEAST_EXPONENT, out=kernel)
+        np.maximum(kernel, least, out=kernel)
         np.exp(kernel, out=kernel)
         np.matmul(ones, kernel, out=total)
         if total.min() < SMALLEST_TOTAL:
