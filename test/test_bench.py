@@ -37,12 +37,12 @@ def test_contenders_take_turns_after_a_warm_up() -> None:
     calls: list[str] = []
 
     def called(name: str) -> Contender[None]:
-        return Contender(name, lambda: calls.append(name), {"a": 6, "b": 6, "slow": 2}[name])
+        return Contender(name, lambda: calls.append(name), {"a": 7, "b": 7, "slow": 2}[name])
 
     timed = interleave([called("a"), called("b"), called("slow")])
     assert calls[:3] == ["a", "b", "slow"]
-    assert calls[3:] == ["a", "b", "slow", "a", "b", "a", "b"] * 2
-    assert {name: len(runs.seconds) for name, runs in timed.items()} == {"a": 6, "b": 6, "slow": 2}
+    assert calls[3:] == ["a", "b", "slow", *["a", "b"] * 3, "a", "b", "slow", *["a", "b"] * 2]
+    assert {name: len(runs.seconds) for name, runs in timed.items()} == {"a": 7, "b": 7, "slow": 2}
     assert all(seconds >= 0.0 for runs in timed.values() for seconds in runs.seconds)
 
 

@@ -36,7 +36,7 @@ def interleave(contenders: Sequence[Contender[Result]]) -> dict[str, Timed[Resul
     rounds = max(contender.rounds for contender in contenders)
     for turn in progress(range(rounds), "rounds", rounds):
         for name, run, wanted in contenders:
-            if turn % (rounds // wanted) == 0:
+            if turn * wanted % rounds < wanted:
                 started = time.perf_counter()
                 result = run()
                 timed[name].seconds.append(time.perf_counter() - started)
