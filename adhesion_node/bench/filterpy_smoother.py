@@ -13,6 +13,7 @@ from ..core.motion import Motion
 from ..core.particle import Particles, Smoothed
 from ..core.train import Array
 from ..core.window import Window
+from .scene import Update
 
 SPEED_STEP_MPS = 1e-3
 
@@ -24,14 +25,6 @@ class Laws(NamedTuple):
     """Shape (K + 1, 2)."""
     covariance: Array
     """Shape (K + 1, 2, 2)."""
-
-
-class Found(NamedTuple):
-    """Where EM ends."""
-
-    mu: float
-    speed_mps: Array
-    iterations: int
 
 
 def rts_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Laws:
@@ -54,14 +47,14 @@ def rts_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> La
     return Laws(path + mean[:, :, 0], covariance)
 
 
-def em(motion: Motion, prior: Gaussian, window: Window, start: float, iterations: int, tolerance: float) -> Found:
+def em(motion: Motion, prior: Gaussian, window: Window, start: float, iterations: int, tolerance: float) -> Update:
     """EM with `rts_window` as its E-step; stops when mu moves no more than the tolerance."""
     mu, moved, done, laws = start, np.inf, 0, Laws(np.empty(0), np.empty(0))
     while done < iterations and moved > tolerance:
         laws = rts_window(motion, prior, window, mu)
         mu, before = _maximised(motion, window, laws), mu
         moved, done = abs(mu - before), done + 1
-    return Found(mu, laws.mean[:, 1], done)
+    return Update(mu, laws.mean[:, 1], done)
 
 
 def _maximised(motion: Motion, window: Window, laws: Laws) -> float:

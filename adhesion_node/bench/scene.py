@@ -16,7 +16,7 @@ from ..core.align import PositionSample, PressureSample
 from ..core.config import Config
 from ..core.gaussian import Gaussian
 from ..core.motion import Motion
-from ..core.train import GRAVITY, KMH, Train
+from ..core.train import GRAVITY, KMH, Array, Train
 from ..core.window import Window
 
 SIGMA_M = 0.5
@@ -36,6 +36,15 @@ class Scene(NamedTuple):
     motion: Motion
     prior: Gaussian
     window: Window
+
+
+class Update(NamedTuple):
+    """What the Gaussian update of a window finds."""
+
+    mu: float
+    speed_mps: Array
+    """Smoothed means, shape (K + 1,)."""
+    iterations: int
 
 
 def braking_window(steps: int, rng: np.random.Generator) -> Scene:
