@@ -20,8 +20,8 @@ def main(args: Sequence[str] | None = None) -> int:
 def recover(source: Path, output: Path) -> dict[str, Any]:
     """Copy every readable message, unchanged and in the order of log time, into a new recording.
 
-    Returns the summary: messages by topic and a sentence for each loss. Raises ValueError, and leaves nothing
-    behind, when the source is unreadable or the output exists.
+    Returns the summary: messages by topic, lost ones as far as the metadata tells, and a sentence for each loss.
+    Raises ValueError, and leaves nothing behind, when the source is unreadable or the output exists.
     """
     with BagReader(source) as reader:
         writer = BagWriter(output)
@@ -34,7 +34,12 @@ def recover(source: Path, output: Path) -> dict[str, Any]:
         except BaseException:
             writer.discard()
             raise
-        return {"complete": reader.complete, "damage": list(reader.damage), "messages": writer.counts}
+        return {
+            "complete": reader.complete,
+            "damage": list(reader.damage),
+            "messages": writer.counts,
+            "lost": reader.lost,
+        }
 
 
 def _work(options: argparse.Namespace) -> int:

@@ -34,7 +34,7 @@ from adhesion_node.bag import (
     serialize,
     typestore,
 )
-from adhesion_node.bag.writer import FILE_NAME
+from adhesion_node.bag.writer import file_name
 from adhesion_node.topics import BRAKE_PRESSURE, BRAKING_CURVE, CLOCK, MU, POSITION, RECORDED, WHEEL_SPEED
 
 S = 10**9
@@ -146,7 +146,7 @@ def test_rosbags_reads_it(every_topic: tuple[Path, dict[str, Any]]) -> None:
 
 def test_mcap_with_its_own_ros2_decoder_reads_it(every_topic: tuple[Path, dict[str, Any]]) -> None:
     path, messages = every_topic
-    with (path / FILE_NAME).open("rb") as stream:
+    with (path / file_name(0)).open("rb") as stream:
         reader = make_reader(stream, decoder_factories=[DecoderFactory()])
         assert reader.get_header().profile == "ros2"
         read = {channel.topic: (message, decoded) for _, channel, message, decoded in reader.iter_decoded_messages()}
@@ -295,10 +295,10 @@ def child_environment() -> dict[str, str]:
 
 def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path) -> None:
     written = write_steps(tmp_path / "bag", 1500)
-    whole = (tmp_path / "bag" / FILE_NAME).read_bytes()
+    whole = (tmp_path / "bag" / file_name(0)).read_bytes()
     cut = tmp_path / "cut.mcap"
     lengths: list[int] = []
-    summary = index_of(tmp_path / "bag" / FILE_NAME)
+    summary = index_of(tmp_path / "bag" / file_name(0))
     for size in np.linspace(summary.chunk_indexes[1].chunk_start_offset, len(whole) - 1, 60).astype(int).tolist():
         cut.write_bytes(whole[:size])
         with BagReader(cut) as reader:
@@ -323,7 +323,7 @@ def index_of(file: Path) -> Summary:
 
 def test_a_damaged_chunk_is_left_out_and_reported(tmp_path: Path) -> None:
     written = write_steps(tmp_path / "bag", 1500)
-    file = tmp_path / "bag" / FILE_NAME
+    file = tmp_path / "bag" / file_name(0)
     data = bytearray(file.read_bytes())
     data[index_of(file).chunk_indexes[2].chunk_start_offset + 200] ^= 0xFF
     file.write_bytes(data)
@@ -372,7 +372,7 @@ def test_broken_metadata_does_not_matter(tmp_path: Path) -> None:
 def test_a_missing_file_of_a_split_recording_is_reported(tmp_path: Path) -> None:
     written = write_steps(tmp_path / "bag", 3)
     metadata = tmp_path / "bag" / "metadata.yaml"
-    metadata.write_text(metadata.read_text().replace(f"- {FILE_NAME}\n", f"- {FILE_NAME}\n  - bag_1.mcap\n"))
+    metadata.write_text(metadata.read_text().replace(f"- {file_name(0)}\n", f"- {file_name(0)}\n  - bag_1.mcap\n"))
     with BagReader(tmp_path / "bag") as reader:
         assert list(reader.messages()) == written
         assert not reader.complete
@@ -383,8 +383,8 @@ def test_split_recordings_are_merged(tmp_path: Path) -> None:
     one, two = write_steps(tmp_path / "one", 300), write_steps(tmp_path / "two", 300, first=200)
     both = tmp_path / "both"
     both.mkdir()
-    (tmp_path / "one" / FILE_NAME).rename(both / "x_9.mcap")
-    (tmp_path / "two" / FILE_NAME).rename(both / "x_10.mcap")
+    (tmp_path / "one" / file_name(0)).rename(both / "x_9.mcap")
+    (tmp_path / "two" / file_name(0)).rename(both / "x_10.mcap")
     with BagReader(both) as reader:
         assert list(reader.messages()) == sorted([*one, *two], key=lambda record: record.log_ns)
 

@@ -23,7 +23,6 @@ from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
 from adhesion_node.bag import BagReader
-from adhesion_node.bag.writer import FILE_NAME
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise, message_class
 from adhesion_node.nodes.recorder import Recorder
@@ -195,12 +194,12 @@ def talking(context: Context, executor: SingleThreadedExecutor) -> tuple[Publish
 
 
 @contextmanager
-def recording_process(path: Path) -> Iterator[subprocess.Popen[str]]:
+def recording_process(path: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
     """Run the program; it does not outlive a test that fails."""
     private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
     environment = {name: value for name, value in os.environ.items() if name not in private}
     code = "import sys; from adhesion_node.nodes.recorder import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, "--output", str(path)]
+    command = [sys.executable, "-c", code, "--output", str(path), *arguments]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -211,24 +210,12 @@ def recording_process(path: Path) -> Iterator[subprocess.Popen[str]]:
 
 
 def has_messages(bag: Path) -> bool:
-    """Tell whether a recording in progress has been flushed with messages in it: they are the bulk of its size."""
-    file = bag / FILE_NAME
-    return file.exists() and file.stat().st_size > 1000
-
-
-def test_a_killed_recorder_loses_a_second_at_most(
-    tmp_path: Path, talking: tuple[Publisher, list[int]], executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    _, sent = talking
-    with recording_process(tmp_path / "bag") as process:
-        spin_until(executor, lambda: len(sent) >= 300 and has_messages(tmp_path / "bag"), 20.0)
-        process.kill()
-        killed_at = len(sent)
-    with BagReader(tmp_path / "bag") as reader:
-        assert not reader.complete
-        stamps = [record.message.header.stamp.nanosec for record in reader.messages()]
-    assert stamps == list(range(stamps[0], stamps[0] + len(stamps)))
-    assert stamps[-1] >= killed_at - 150, "a second of 100 messages and the way through a loaded machine"
+    """Tell whether a recording in progress has messages on the disk."""
+    try:
+        with BagReader(bag) as reader:
+            return bool(reader.counts)
+    except ValueError:
+        return False
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -11,8 +11,8 @@ from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import Reader
 
 from adhesion_node import recover
-from adhesion_node.bag import BagReader, BagWriter, sensors
-from adhesion_node.bag.writer import FILE_NAME
+from adhesion_node.bag import BagReader, BagWriter, Limits, sensors
+from adhesion_node.bag.writer import file_name
 from adhesion_node.topics import BRAKING_CURVE, POSITION
 
 S = 10**9
@@ -29,7 +29,7 @@ def interrupted(path: Path, steps: int) -> None:
             writer.flush()
     writer.close()
     (path / "metadata.yaml").unlink()
-    with (path / FILE_NAME).open("r+b") as file:
+    with (path / file_name(0)).open("r+b") as file:
         file.truncate(file.seek(0, 2) * 2 // 3)
 
 
@@ -58,7 +58,7 @@ def test_recovering_twice_changes_nothing(tmp_path: Path) -> None:
     recover.recover(tmp_path / "bag", tmp_path / "one")
     summary = recover.recover(tmp_path / "one", tmp_path / "two")
     assert summary["complete"]
-    assert (tmp_path / "one" / FILE_NAME).read_bytes() == (tmp_path / "two" / FILE_NAME).read_bytes()
+    assert (tmp_path / "one" / file_name(0)).read_bytes() == (tmp_path / "two" / file_name(0)).read_bytes()
 
 
 def test_types_of_others_are_kept(tmp_path: Path) -> None:
@@ -107,3 +107,38 @@ def test_bad_usage_is_code_2(capsys: pytest.CaptureFixture[str]) -> None:
         recover.main(["bag"])
     assert end.value.code == 2
     assert "--output" in capsys.readouterr().err
+
+
+def test_it_says_what_is_lost_where_the_metadata_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with BagWriter(tmp_path / "bag", Limits(max_duration_ns=10 * S)) as writer:
+        for step in range(40):
+            writer.write("/position", POSITION.type, sensors.position(step * S, step / 3, 0.25), step * S)
+    (tmp_path / "bag" / file_name(1)).unlink()
+    cut(tmp_path / "bag" / file_name(3))
+    assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole"), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert (summary["messages"], summary["lost"]) == ({"/position": 20}, {"/position": 20})
+    assert summary["damage"] == err.splitlines()
+    last, missing, lost = summary["damage"]
+    assert f"{file_name(3)} breaks off at byte" in last
+    assert last.endswith(" bytes there are left out")
+    assert missing == f"{tmp_path / 'bag' / file_name(1)} is missing"
+    assert lost == "/position: 20 messages are lost"
+
+
+def cut(file: Path) -> None:
+    """Cut a file of one chunk within its chunk."""
+    with file.open("r+b") as stream:
+        stream.truncate(stream.seek(0, 2) // 5)
+
+
+def test_a_complete_recording_without_metadata_gets_it(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.write("/position", POSITION.type, sensors.position(0, 0.0, 0.25), 0)
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    summary = recover.recover(tmp_path / "bag", tmp_path / "whole")
+    assert summary["damage"] == [f"{tmp_path / 'bag'} has no readable metadata.yaml: its recording was interrupted"]
+    assert summary["messages"] == {"/position": 1}
+    with Reader(tmp_path / "whole") as reader:
+        assert reader.message_count == 1

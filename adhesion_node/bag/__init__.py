@@ -6,6 +6,16 @@ from .reader import BagReader
 from .recordings import Record
 from .selection import parse_remap, select
 from .types import deserialize, serialize, typestore
-from .writer import BagWriter
+from .writer import BagWriter, Limits
 
-__all__ = ["BagReader", "BagWriter", "Record", "deserialize", "parse_remap", "select", "serialize", "typestore"]
+__all__ = [
+    "BagReader",
+    "BagWriter",
+    "Limits",
+    "Record",
+    "deserialize",
+    "parse_remap",
+    "select",
+    "serialize",
+    "typestore",
+]

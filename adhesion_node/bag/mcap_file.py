@@ -62,8 +62,9 @@ class TopicInfo(NamedTuple):
 
 
 class McapFile:
-    """An open MCAP file: `topics` and message `counts` by channel, `blocks`, and `damage`: a sentence per loss.
+    """An MCAP file: `topics` and message `counts` by channel, `blocks`, and `damage`: a sentence per loss.
 
+    It is open only while it is scanned or a block is read: a recording may have more files than a process may open.
     Raises ValueError when it is not an MCAP file.
     """
 
@@ -74,39 +75,38 @@ class McapFile:
         self.blocks: list[Block] = []
         self.damage: list[str] = []
         self._schemas: dict[int, Schema] = {}
-        self._stream = path.open("rb")
-        try:
-            self._scan()
-        except BaseException:
-            self._stream.close()
-            raise
-
-    def close(self) -> None:
-        """Close the file."""
-        self._stream.close()
+        with path.open("rb") as stream:
+            self._scan(stream)
 
     def messages(self, block: Block) -> Iterator[Message]:
         """Yield the messages of a block in the order they were written; those of nameless channels are left out."""
-        self._stream.seek(block.offset)
-        for opcode, body in _unpack(block.opcode, self._stream.read(block.length)):
-            if opcode == Opcode.MESSAGE and (message := _message(body)).channel in self.topics:
+        with self.path.open("rb") as stream:
+            stream.seek(block.offset)
+            body = stream.read(block.length)
+        for opcode, inner in _unpack(block.opcode, body):
+            if opcode == Opcode.MESSAGE and (message := _message(inner)).channel in self.topics:
                 yield message
 
-    def _scan(self) -> None:
-        if self._stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+    def _scan(self, stream: BinaryIO) -> None:
+        if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             empty = self.path.stat().st_size == 0
             raise ValueError(f"{self.path}: {'is empty' if empty else 'is not an MCAP file'}: name another recording")
         finished = False
-        for opcode, offset, length in _records(self._stream):
+        end = len(MCAP0_MAGIC)
+        for opcode, offset, length in _records(stream):
+            end = offset + length
             if opcode == Opcode.FOOTER:
-                self._stream.seek(offset + length)
-                finished = self._stream.read() == MCAP0_MAGIC
+                stream.seek(end)
+                finished = stream.read() == MCAP0_MAGIC
             if opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
-                self._take_block(opcode, offset, self._stream.read(length))
+                self._take_block(opcode, offset, stream.read(length))
         if nameless := sum(count for channel, count in self.counts.items() if channel not in self.topics):
             self.damage.append(f"{self.path}: {nameless} messages are left out, the names of their topics are lost")
         if not finished:
-            self.damage.append(f"{self.path} breaks off: its recording was interrupted or the file was cut")
+            stream.seek(end)
+            rest = f", the {extent} bytes there are left out" if (extent := _extent(stream)) else ""
+            reason = "its recording was interrupted or the file was cut"
+            self.damage.append(f"{self.path} breaks off at byte {end}: {reason}{rest}")
 
     def _take_block(self, opcode: int, offset: int, body: bytes) -> None:
         """Note a record of the data section; a damaged one is left out as a whole."""
@@ -147,6 +147,16 @@ def _records(stream: BinaryIO) -> Iterator[tuple[int, int, int]]:
         if opcode == Opcode.FOOTER:
             return
         offset += length
+
+
+def _extent(stream: BinaryIO) -> int:
+    """Return the number of bytes to the end, without the zeros in which room that was set aside is left."""
+    extent = position = 0
+    while block := stream.read(2**20):
+        if used := len(block.rstrip(b"\0")):
+            extent = position + used
+        position += len(block)
+    return extent
 
 
 def _unpack(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:

@@ -1,13 +1,19 @@
-"""metadata.yaml of rosbag2, version 9, as ROS 2 Jazzy writes it."""
+"""metadata.yaml of rosbag2: written in version 9, as ROS 2 Jazzy does, and what is read of any version."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from io import StringIO
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
 VERSION = 9
+
+_ROOT = "rosbag2_bagfile_information"
 
 FOREVER = {"sec": 9223372036, "nsec": 854775807}
 """How rosbag2 writes a duration that is not limited."""
@@ -20,6 +26,41 @@ class Topic(NamedTuple):
     type: str
     type_hash: str
     latched: bool
+
+
+class File(NamedTuple):
+    """What the metadata says of a file: the time of its first message, how long it goes on, how many there are."""
+
+    name: str
+    first_ns: int
+    duration_ns: int
+    messages: int
+
+
+class Metadata(NamedTuple):
+    """What is read of the metadata: whether there is any, the files, messages by topic, whether they are compressed."""
+
+    readable: bool = False
+    files: tuple[str, ...] = ()
+    messages: Mapping[str, int] = MappingProxyType({})
+    compressed: bool = False
+
+
+def read_metadata(bag: Path) -> Metadata:
+    """Read the metadata in a directory; an empty one when it is missing or unreadable, as after an interruption."""
+    try:
+        information = YAML(typ="safe").load((bag / "metadata.yaml").read_text(encoding="utf-8"))[_ROOT]
+        return Metadata(
+            True,
+            tuple(Path(name).name for name in information.get("relative_file_paths") or ()),
+            {
+                str(entry["topic_metadata"]["name"]): int(entry["message_count"])
+                for entry in information.get("topics_with_message_count") or ()
+            },
+            str(information.get("compression_mode") or "none").lower() != "none",
+        )
+    except (OSError, YAMLError, AttributeError, LookupError, TypeError, ValueError):
+        return Metadata()
 
 
 def qos_profiles(latched: bool) -> list[dict[str, Any]]:
@@ -39,33 +80,34 @@ def qos_profiles(latched: bool) -> list[dict[str, Any]]:
     ]
 
 
-def document(file_name: str, topics: list[tuple[Topic, int]], first_ns: int, duration_ns: int) -> str:
-    """Return the text of metadata.yaml for one MCAP file; each topic comes with its number of messages."""
-    count = sum(messages for _, messages in topics)
+def document(files: Sequence[File], topics: Sequence[tuple[Topic, int]]) -> str:
+    """Return the text of metadata.yaml; each topic comes with its number of messages."""
+    filled = [file for file in files if file.messages]
+    first_ns = min((file.first_ns for file in filled), default=0)
+    last_ns = max((file.first_ns + file.duration_ns for file in filled), default=0)
     information = {
         "version": VERSION,
         "storage_identifier": "mcap",
-        "duration": {"nanoseconds": duration_ns},
-        "starting_time": {"nanoseconds_since_epoch": first_ns},
-        "message_count": count,
+        **_period(first_ns, last_ns - first_ns),
+        "message_count": sum(file.messages for file in files),
         "topics_with_message_count": [_topic(topic, messages) for topic, messages in topics],
         "compression_format": "",
         "compression_mode": "",
-        "relative_file_paths": [file_name],
+        "relative_file_paths": [file.name for file in files],
         "files": [
-            {
-                "path": file_name,
-                "starting_time": {"nanoseconds_since_epoch": first_ns},
-                "duration": {"nanoseconds": duration_ns},
-                "message_count": count,
-            }
+            {"path": file.name, **_period(file.first_ns, file.duration_ns), "message_count": file.messages}
+            for file in files
         ],
         "custom_data": None,
         "ros_distro": "jazzy",
     }
     text = StringIO()
-    YAML().dump({"rosbag2_bagfile_information": information}, text)
+    YAML().dump({_ROOT: information}, text)
     return text.getvalue()
+
+
+def _period(first_ns: int, duration_ns: int) -> dict[str, dict[str, int]]:
+    return {"duration": {"nanoseconds": duration_ns}, "starting_time": {"nanoseconds_since_epoch": first_ns}}
 
 
 def _topic(topic: Topic, messages: int) -> dict[str, Any]:

@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any, Self
-
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+from typing import Self
 
 from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
+from .metadata import Metadata, read_metadata
 from .recordings import McapRecording, Record, Recording
 from .types import same_name
 
@@ -20,21 +18,25 @@ class BagReader:
     """An open recording; a context manager.
 
     `topics` are the types and `counts` the numbers of messages by topic name, for topics that hold messages.
-    `complete` is False when something of the recording is lost; `damage` then says what, a sentence each. What is
-    there can be read all the same. Raises ValueError when there is no such recording or nothing in it is readable.
+    `complete` is False when something of the recording is lost or was never written; `damage` then says what, a
+    sentence each, and `lost` how many messages of which topic, where the metadata tells. What is there can be read all
+    the same. Raises ValueError when there is no such recording or nothing in it is readable.
     """
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self._recording = _open(self.path)
+        self._metadata = read_metadata(self.path)
+        self._recording = _open(self.path, self._metadata)
         try:
-            self.damage = tuple(self._recording.damage)
-            self.complete = not self.damage
             self.infos, self.counts = self._survey()
+            self.lost = self._losses()
         except BaseException:
             self.close()
             raise
         self.topics: dict[str, str] = {name: info.type for name, info in self.infos.items()}
+        losses = [f"{name}: {count} messages are lost" for name, count in self.lost.items()]
+        self.damage = (*self._recording.damage, *losses)
+        self.complete = not self.damage
 
     def messages(self, names: Iterable[str] | None = None) -> Iterator[Record]:
         """Yield the records in the order of (log time, arrival), of all topics or of those named.
@@ -70,14 +72,20 @@ class BagReader:
             if known.type != info.type:
                 raise ValueError(f"bag = {self.path}: topic {info.name} is both {known.type} and {info.type}: split it")
             counts[info.name] += count
-        if self.damage and not infos:
-            raise ValueError(f"bag = {self.path}: holds no readable message ({self.damage[0]}): name another recording")
+        if self._recording.damage and not infos:
+            first = self._recording.damage[0]
+            raise ValueError(f"bag = {self.path}: holds no readable message ({first}): name another recording")
         return infos, dict(counts)
 
+    def _losses(self) -> dict[str, int]:
+        """Return how many messages less there are than the metadata says, by topic."""
+        missing = {name: count - self.counts.get(name, 0) for name, count in self._metadata.messages.items()}
+        return {name: count for name, count in missing.items() if count > 0}
 
-def _open(path: Path) -> Recording:
+
+def _open(path: Path, metadata: Metadata) -> Recording:
     if path.is_dir():
-        return _open_directory(path)
+        return _open_directory(path, metadata)
     if not path.exists():
         raise ValueError(f"bag = {path}: does not exist: name a rosbag2 directory or an .mcap file")
     if path.suffix == ".mcap":
@@ -88,35 +96,23 @@ def _open(path: Path) -> Recording:
     raise ValueError(f"bag = {path}: is no recording of ROS 2: {hint}")
 
 
-def _open_directory(path: Path) -> Recording:
+def _open_directory(path: Path, metadata: Metadata) -> Recording:
     """Open what is there: the metadata is only asked for what the files cannot tell."""
-    metadata = _metadata(path / "metadata.yaml")
-    if str(metadata.get("compression_mode") or "none").lower() != "none":
+    if metadata.compressed:
         return ForeignRecording([path])
     recording: Recording
     if mcaps := _numbered(path, ".mcap"):
         recording = McapRecording(mcaps)
     elif databases := _numbered(path, ".db3"):
         recording = ForeignRecording(databases)
-        if not metadata:
-            recording.damage.append(f"{path} has no metadata.yaml: its recording was interrupted")
     else:
         raise ValueError(f"bag = {path}: holds no .mcap or .db3 file: name the directory of a recording")
-    for name in metadata.get("relative_file_paths") or []:
-        if not (path / Path(name).name).exists():
-            recording.damage.append(f"{path / Path(name).name} is missing")
+    if not (metadata.readable or recording.damage):
+        recording.damage.append(f"{path} has no readable metadata.yaml: its recording was interrupted")
+    recording.damage += [f"{path / name} is missing" for name in metadata.files if not (path / name).exists()]
     return recording
 
 
 def _numbered(path: Path, suffix: str) -> list[Path]:
     """Return the files of a split recording in their order: x_2 before x_10."""
     return sorted(path.glob(f"*{suffix}"), key=lambda file: (len(file.name), file.name))
-
-
-def _metadata(path: Path) -> dict[str, Any]:
-    """Return the metadata; {} when it is missing or unreadable, as after an interruption."""
-    try:
-        document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
-        return dict(document["rosbag2_bagfile_information"])
-    except (OSError, UnicodeDecodeError, YAMLError, LookupError, TypeError, ValueError):
-        return {}

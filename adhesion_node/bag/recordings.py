@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -48,9 +47,7 @@ class McapRecording:
     """MCAP files, also unfinished and damaged ones."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        with ExitStack() as stack:
-            self._files = [stack.enter_context(closing(McapFile(path))) for path in paths]
-            self._stack = stack.pop_all()
+        self._files = [McapFile(path) for path in paths]
         self.damage = [sentence for file in self._files for sentence in file.damage]
 
     def infos(self) -> Iterator[tuple[TopicInfo, int]]:
@@ -78,8 +75,7 @@ class McapRecording:
             yield self._record(heapq.heappop(pending))
 
     def close(self) -> None:
-        """Close the files."""
-        self._stack.close()
+        """Nothing stays open."""
 
     def _record(self, entry: tuple[int, int, int, int, Message]) -> Record:
         message = entry[-1]

@@ -1,56 +1,61 @@
-"""Writes a recording: a rosbag2 directory with one MCAP file and metadata.yaml beside it."""
+"""Writes a recording: a rosbag2 directory with one or several MCAP files and metadata.yaml beside them."""
 
 from __future__ import annotations
 
-import json
+import errno
+import math
 import shutil
-from dataclasses import dataclass
+from collections import Counter
 from pathlib import Path
-from typing import Any, Self
+from typing import NamedTuple, Self
 
-from mcap.writer import CompressionType, Writer
-
-from .metadata import Topic, document, qos_profiles
+from .metadata import File, Topic, document
+from .part import Part, message_bound
 from .types import Definition, definition, type_hash
-
-CHUNK_BYTES = 64 * 1024
-"""Size of a chunk before compression: what an interruption between two flushes can cost."""
-
-FILE_NAME = "bag_0.mcap"
-"""Not named after the directory: a recording may be renamed, and equal recordings are equal byte by byte."""
 
 LATEST_NS = 2**63 - 1
 
+MB = 1_000_000
 
-@dataclass
-class _Channel:
-    id: int
-    topic: Topic
-    count: int = 0
+
+class Limits(NamedTuple):
+    """What bounds a recording: its files, what an interruption costs, and the disk."""
+
+    max_bytes: float = math.inf
+    """Size of a file; the recording goes on in the next one. A single greater message is a file of its own."""
+    max_duration_ns: float = math.inf
+    """Log time from the first message of a file to the first of the next."""
+    span_ns: float = math.inf
+    """Log time after which messages are handed to the operating system. That comes with the next message or
+    `BagWriter.advance`, and nothing but log time decides: equal messages still give equal files."""
+    min_free_bytes: float = 0
+    """The recording ends when less than this is free on its disk."""
 
 
 class BagWriter:
     """Writes messages into a new directory; a context manager. Equal messages give equal files.
 
-    Nothing but what is passed in is written, the clock is not read. Until `close` (or when the process dies) the
-    directory holds an MCAP file without index and metadata, which `BagReader` reads up to the last `flush` or full
-    chunk. Raises ValueError when the directory exists.
+    Nothing but what is passed in is written, the clock is not read. Until `close` (or when the process dies) the last
+    file has no index and the directory no metadata; `BagReader` reads it up to the last `flush`, full chunk or
+    `Limits.span_ns`. Raises ValueError when the directory exists and OSError when the disk is full; `close` then still
+    makes the recording complete up to there.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, limits: Limits | None = None) -> None:
         self.path = Path(path)
+        self._limits = limits or Limits()
+        self._topics: dict[str, tuple[Topic, Definition]] = {}
+        self._counts: Counter[str] = Counter()
+        self._files: list[File] = []
+        self._closed = False
         if self.path.exists():
             raise ValueError(f"output = {str(self.path)!r}: it exists already, give the name of a new directory")
         self.path.mkdir(parents=True)
-        self._file = (self.path / FILE_NAME).open("xb")
-        # Any: mcap annotates its writer only in part.
-        self._writer: Any = Writer(self._file, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._writer.start(profile="ros2", library="adhesion_node")
-        self._file.flush()
-        self._channels: dict[str, _Channel] = {}
-        self._schemas: dict[str, int] = {}
-        self._first_ns = LATEST_NS
-        self._last_ns = 0
+        try:
+            self._part = self._open(0)
+        except OSError:
+            self.path.rmdir()
+            raise
 
     def add_topic(
         self, name: str, type_name: str, *, latched: bool = False, known_as: Definition | None = None
@@ -60,53 +65,66 @@ class BagWriter:
         `latched` topics are marked transient local. `known_as` defines a type that is not part of ROS 2 Jazzy.
         Raises ValueError when the type is unknown.
         """
-        if name in self._channels:
-            return
-        if type_name not in self._schemas:
-            encoding, text = known_as if known_as and known_as.text else definition(type_name)
-            self._schemas[type_name] = self._writer.register_schema(type_name, encoding, text.encode())
-        topic = Topic(name, type_name, type_hash(type_name), latched)
-        # JSON is YAML as well, and rosbag2 wants YAML here.
-        qos = {"offered_qos_profiles": json.dumps(qos_profiles(latched)), "topic_type_hash": topic.type_hash}
-        channel = self._writer.register_channel(name, "cdr", self._schemas[type_name], qos)
-        self._channels[name] = _Channel(channel, topic)
+        if name not in self._topics:
+            defined = known_as if known_as and known_as.text else definition(type_name)
+            self._topics[name] = Topic(name, type_name, type_hash(type_name), latched), defined
 
     def write(self, topic_name: str, type_name: str, cdr: bytes, log_ns: int) -> None:
         """Append one message. Raises ValueError when the topic has another type or the time is out of range."""
         self.add_topic(topic_name, type_name)
-        channel = self._channels[topic_name]
-        if channel.topic.type != type_name:
-            raise ValueError(f"topic {topic_name}: type = {type_name}: the recording holds it as {channel.topic.type}")
+        topic, defined = self._topics[topic_name]
+        if topic.type != type_name:
+            raise ValueError(f"topic {topic_name}: type = {type_name}: the recording holds it as {topic.type}")
         if not 0 <= log_ns <= LATEST_NS:
             raise ValueError(f"topic {topic_name}: log time = {log_ns} ns: give nanoseconds from 0 to 2^63 - 1")
-        self._writer.add_message(channel.id, log_time=log_ns, data=cdr, publish_time=log_ns)
-        channel.count += 1
-        self._first_ns = min(self._first_ns, log_ns)
-        self._last_ns = max(self._last_ns, log_ns)
+        if self._is_full(cdr, log_ns):
+            following = self._open(len(self._files) + 1)
+            self._files.append(self._part.finish())
+            self._part = following
+        if not self._part.holds(topic):
+            self._part.declare(topic, defined)
+        self._part.write(topic_name, cdr, log_ns)
+        self._counts[topic_name] += 1
 
     @property
     def counts(self) -> dict[str, int]:
         """Messages written so far by topic."""
-        return {name: channel.count for name, channel in self._channels.items()}
+        return {name: self._counts[name] for name in self._topics}
+
+    @property
+    def unsaved(self) -> int:
+        """Messages that the death of this process would cost."""
+        return self._part.unsaved
+
+    def advance(self, log_ns: int) -> None:
+        """Tell that what follows is of this time or later: a chunk whose span is over is handed on at once."""
+        self._part.advance(log_ns)
 
     def flush(self) -> None:
         """Hand everything written so far to the operating system: it survives the death of this process."""
-        self._writer.flush()
+        self._part.flush()
+
+    def check_disk(self) -> None:
+        """Raise OSError when less is free than is to stay free."""
+        free = shutil.disk_usage(self.path).free
+        if free < self._limits.min_free_bytes:
+            least = self._limits.min_free_bytes / MB
+            message = f"{free / MB:.0f} MB are free where {least:.0f} MB are to stay free: delete something"
+            raise OSError(errno.ENOSPC, message, str(self.path))
 
     def close(self) -> None:
         """Write the index and metadata.yaml; closing again does nothing."""
-        if self._file.closed:
+        if self._closed:
             return
-        self._writer.finish()
-        self._file.close()
-        topics = [(channel.topic, channel.count) for channel in self._channels.values()]
-        first_ns = min(self._first_ns, self._last_ns)
-        text = document(FILE_NAME, topics, first_ns, self._last_ns - first_ns)
-        (self.path / "metadata.yaml").write_text(text, encoding="utf-8")
+        self._closed = True
+        self._files.append(self._part.finish())
+        topics = [(topic, self._counts[topic.name]) for topic, _ in self._topics.values()]
+        (self.path / "metadata.yaml").write_text(document(self._files, topics), encoding="utf-8")
 
     def discard(self) -> None:
         """Close and delete the directory: nothing of a failed conversion is left."""
-        self._file.close()
+        self._closed = True
+        self._part.close()
         shutil.rmtree(self.path)
 
     def __enter__(self) -> Self:
@@ -114,3 +132,22 @@ class BagWriter:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+    def _open(self, number: int) -> Part:
+        self.check_disk()
+        return Part(self.path / file_name(number), self._limits.span_ns)
+
+    def _is_full(self, cdr: bytes, log_ns: int) -> bool:
+        """Tell whether a message belongs into the next file."""
+        if not self._part.count:
+            return False
+        late = abs(log_ns - self._part.first_ns) >= self._limits.max_duration_ns
+        return late or self._part.bound() + message_bound(cdr) > self._limits.max_bytes
+
+
+def file_name(number: int) -> str:
+    """Return the name of a file of a recording, counted from 0.
+
+    Not named after the directory: a recording may be renamed, and equal recordings are equal byte by byte.
+    """
+    return f"bag_{number}.mcap"
