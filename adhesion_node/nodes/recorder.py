@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,15 +17,25 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
 from .. import topics
-from ..bag import BagWriter, deserialize, serialize
+from ..bag import BagWriter, Limits, deserialize, serialize
+from ..bag.writer import MB
 from ..cli import help_texts, run_tool
 from . import runtime
 from .qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
-FLUSH_S = 0.5
-"""A killed recorder loses what came since the last flush, or the one before while /clock stands still."""
+SPAN_NS = 300_000_000
+"""Log time that a killed recorder loses at most, while it goes as fast as the clock or faster."""
+
+ROUND_S = 0.2
+ROUNDS = 3
+"""A message that log time has not brought to the disk goes there after so many rounds of the system's clock: /clock
+stands still or is slow. A busy machine misses rounds, so it does not change what equal runs leave, as a deadline would.
+"""
+
+MIN_FREE_MB = 100.0
+LIMITS = Limits(span_ns=SPAN_NS, min_free_bytes=MIN_FREE_MB * MB)
 
 LATCHED = (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)
 LATCHED_SUBSCRIPTION = QoSProfile(
@@ -51,25 +62,28 @@ class Recorder(Node):
     message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder does
     not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks. Until the
     first /clock, the header's stamp takes its place. `heard` counts the messages received by topic. Call `close` at
-    the end. Raises ValueError when `output` exists.
+    the end. Raises ValueError when `output` exists. A callback raises OSError when the disk is full; `close` then
+    still makes the recording complete up to there.
     """
 
-    def __init__(self, output: Path, **kwargs: Any) -> None:
+    def __init__(self, output: Path, limits: Limits = LIMITS, **kwargs: Any) -> None:
         super().__init__("recorder", **kwargs)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
         self._clock_ns: int | None = None
         self._last_ns = 0
         self.heard: Counter[topics.Topic] = Counter()
         self._arrivals = 0
-        self._arrived_at_flush = 0
+        self._rounds = deque([0] * ROUNDS, maxlen=ROUNDS)
+        """Arrivals at the latest rounds."""
+        self._oldest_unsaved = 0
         self._pending: list[_Message] = []
         if self._simulated:
             # First, so that the executor hands over a /clock before the messages published after it.
             subscribe(self, topics.CLOCK, self._on_clock, SENSOR_SUBSCRIPTION)
         for topic in topics.RECORDED:
             subscribe(self, topic, self._receiver(topic), _profile(topic), raw=True)
-        self.create_timer(FLUSH_S, self.flush, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
-        self._writer = BagWriter(output)
+        self.create_timer(ROUND_S, self.save, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
+        self._writer = BagWriter(output, limits)
         self.get_logger().info(f"recording to {output}")
 
     @property
@@ -77,14 +91,14 @@ class Recorder(Node):
         """Messages recorded so far by topic."""
         return self._writer.counts
 
-    def flush(self) -> None:
-        """Hand everything that has its log time to the operating system.
-
-        What already waited at the last flush goes with it: its /clock stands still or was the last one.
-        """
-        self._release(lambda message: message.arrival <= self._arrived_at_flush)
-        self._arrived_at_flush = self._arrivals
-        self._writer.flush()
+    def save(self) -> None:
+        """Hand what has waited for `ROUNDS` of these calls to the operating system; see to the room on the disk."""
+        self._writer.check_disk()
+        due = self._rounds[0]
+        self._rounds.append(self._arrivals)
+        self._release(lambda message: message.arrival <= due)
+        if self._writer.unsaved and self._oldest_unsaved <= due:
+            self._writer.flush()
 
     def close(self) -> None:
         """Write the rest, the index and the metadata."""
@@ -127,26 +141,63 @@ class Recorder(Node):
         published_ns = info["source_timestamp"]
         self._release(lambda message: message.published_ns < published_ns)
         self._clock_ns = now_ns
+        self._writer.advance(now_ns)
 
     def _release(self, ready: Callable[[_Message], bool]) -> None:
         """Write the waiting messages that are ready in the order of publishing."""
-        for message in sorted(filter(ready, self._pending)):
-            self._write(message, self._clock_ns if self._clock_ns is not None else message.stamp_ns or self._last_ns)
+        due = sorted(filter(ready, self._pending))
         self._pending = [message for message in self._pending if not ready(message)]
+        for message in due:
+            self._write(message, self._clock_ns if self._clock_ns is not None else message.stamp_ns or self._last_ns)
 
     def _write(self, message: _Message, log_ns: int) -> None:
         self._last_ns = log_ns
-        self._writer.write(message.name, message.type, message.cdr, log_ns)
+        try:
+            self._writer.write(message.name, message.type, message.cdr, log_ns)
+        except OSError:
+            self._pending = []  # the recording ends here, not with a gap
+            raise
+        first = self._writer.unsaved == 1
+        self._oldest_unsaved = message.arrival if first else min(self._oldest_unsaved, message.arrival)
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run `recorder --output DIR [--ros-args ...]` until a signal."""
     own, ros = runtime.split_ros_arguments(sys.argv[1:] if args is None else args)
+    return run_tool(_parser(), lambda options: _record(options, ros), own)
+
+
+def _record(options: argparse.Namespace, ros: Sequence[str]) -> int:
+    limits = LIMITS._replace(
+        max_bytes=_at_least(1.0, "max-size-mb", options.max_size_mb) * MB,
+        max_duration_ns=_at_least(1.0, "max-duration-s", options.max_duration_s) * 1e9,
+        min_free_bytes=_at_least(0.0, "min-free-mb", options.min_free_mb) * MB,
+    )
+    return runtime.run(lambda: Recorder(Path(options.output), limits), ros)
+
+
+def _at_least(least: float, name: str, value: float) -> float:
+    if not value >= least:
+        raise ValueError(f"{name} = {value}: give a number of at least {least:g}")
+    return value
+
+
+def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         "recorder", usage="%(prog)s --output DIR [--ros-args ...]", **help_texts(__doc__, *EXAMPLES)
     )
-    parser.add_argument("--output", metavar="DIR", required=True, help="the recording, a new directory")
-    return run_tool(parser, lambda options: runtime.run(lambda: Recorder(Path(options.output)), ros), own)
+    add = parser.add_argument
+    add("--output", metavar="DIR", required=True, help="the recording, a new directory")
+    add("--max-size-mb", metavar="MB", type=float, default=math.inf, help="go on in a new file before this size")
+    add("--max-duration-s", metavar="S", type=float, default=math.inf, help="go on in a new file after this log time")
+    add(
+        "--min-free-mb",
+        metavar="MB",
+        type=float,
+        default=MIN_FREE_MB,
+        help=f"end before less is free on the disk (default: {MIN_FREE_MB:g})",
+    )
+    return parser
 
 
 def _profile(topic: topics.Topic) -> QoSProfile:
