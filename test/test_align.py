@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from adhesion_node.core.align import Aligner, PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core.align import MOST, Aligner, PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.measurement import Measurement
 
 S = 1_000_000_000
@@ -118,3 +118,19 @@ def test_random_streams_lose_and_double_nothing() -> None:
         for m in measurements:
             if m.brake_pressure_pa is not None:
                 assert 0 <= m.t_ns / S - m.brake_pressure_pa <= 1.0 + 1e-9  # a pressure is its own stamp here
+
+
+def test_positions_whose_stamp_stands_still_do_not_wait_without_end() -> None:
+    aligner = _aligner()
+    released = [m for _ in range(MOST + 5) for m in aligner.push(_position(1.0))]
+    assert len(released) == 5
+    assert len(aligner.flush()) == MOST
+
+
+def test_a_flood_keeps_the_newest_pressures() -> None:
+    aligner = _aligner()
+    for number in range(MOST + 5):
+        aligner.push(PressureSample(S + number, float(number)))
+    oldest, newest = PositionSample(S + 5, 0.0, 1.0), PositionSample(S + MOST + 4, 0.0, 1.0)
+    pressures = [m.brake_pressure_pa for m in _all(aligner, [PositionSample(S + 4, 0.0, 1.0), oldest, newest])]
+    assert pressures == [None, 5.0, float(MOST + 4)]

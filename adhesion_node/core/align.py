@@ -42,6 +42,9 @@ Timed = TypeVar("Timed", PressureSample, SpeedSample)
 HORIZON_NS = 60_000_000_000
 """Samples further apart than this belong to different times: the older ones are spent, or the clock has jumped."""
 
+MOST = 6_000
+"""Samples of a stream that are kept at most, 60 s of 100 Hz: no flood and no standing stamps fill the memory."""
+
 
 class Aligner:
     """Merges the three streams into measurements. Mutable: it is the inbox of one node or one replay."""
@@ -79,7 +82,7 @@ class Aligner:
         known_until = self._newest_ns - self._max_wait_ns
         if self._pressures:
             known_until = max(known_until, self._pressures[-1].t_ns)
-        ready = 0
+        ready = max(len(self._positions) - MOST, 0)
         while ready < len(self._positions) and self._positions[ready].t_ns <= known_until:
             ready += 1
         return self._take(ready)
@@ -112,5 +115,5 @@ def _insert(samples: list[Timed], sample: Timed) -> None:
     if samples and abs(sample.t_ns - samples[-1].t_ns) > HORIZON_NS:
         samples.clear()
     insort(samples, sample)
-    while samples[-1].t_ns - samples[0].t_ns > HORIZON_NS:
+    while samples[-1].t_ns - samples[0].t_ns > HORIZON_NS or len(samples) > MOST:
         samples.pop(0)
