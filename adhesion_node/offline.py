@@ -35,7 +35,7 @@ OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_override
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
-    values = _read_parameters(options.params) if options.params else {}
+    values = read_parameters(options.params) if options.params else {}
     values |= dict(map(parse_setting, options.set))
     if options.seed is not None:
         values[SEED.name] = options.seed
@@ -117,7 +117,7 @@ def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[tuple[
         yield selection[record.topic], record.message, record.log_ns
 
 
-def _read_parameters(path: str) -> dict[str, Any]:
+def read_parameters(path: str) -> dict[str, Any]:
     """Settings of the estimator in a ROS parameter file; ValueError when it is unreadable or not for the estimator."""
     try:
         document = YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))

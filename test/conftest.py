@@ -15,8 +15,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Protocol
 
+import hypothesis
 import pytest
 import rclpy
+from hypothesis.configuration import set_hypothesis_home_dir
 from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 
@@ -33,6 +35,12 @@ class SpinUntil(Protocol):
     def __call__(self, executor: Executor, predicate: Callable[[], object], timeout_s: float = 10.0) -> None: ...
 
 
+# The same examples in every run: what passes once, passes always. HYPOTHESIS_PROFILE=search looks for new ones.
+hypothesis.settings.register_profile("same", derandomize=True, deadline=None, max_examples=60)
+hypothesis.settings.register_profile("search", deadline=None, max_examples=3000, print_blob=True)
+hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Set the environment of this process and of those it starts, before the first context is made."""
     home = config.stash[_ros_home] = tempfile.mkdtemp(prefix="adhesion_node_test_")
@@ -41,6 +49,7 @@ def pytest_configure(config: pytest.Config) -> None:
     os.environ["ROS_DOMAIN_ID"] = str(_claim_domain())
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ["ROS_HOME"] = home
+    set_hypothesis_home_dir(os.path.join(home, "hypothesis"))
     os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
 

@@ -24,13 +24,14 @@ from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
 from zstandard import decompress as zstd_decompress
 
+from .metadata import LATEST_NS
 from .types import Definition, is_latched
 
 _HEAD = Struct("<BQ")
 _MESSAGE = Struct("<HIQQ")
 _CHUNK_TIMES = Struct("<QQ")
 
-_UNREADABLE = (error, ValueError, McapError, ZstdError, RuntimeError)
+_UNREADABLE = (error, ValueError, OverflowError, MemoryError, McapError, ZstdError, RuntimeError)
 """What the decoders raise on bytes that are not what they seem."""
 
 
@@ -120,16 +121,20 @@ class McapFile:
             self.counts.update(message.channel for message in messages)
 
     def _declares(self, opcode: int, body: bytes) -> bool:
-        """Take over a schema or channel record; False for a message."""
+        """Take over a schema or channel record; False for a message.
+
+        The end of a file repeats them without a checksum: what was said first, in a checked chunk, holds.
+        """
         if opcode == Opcode.SCHEMA:
             schema = Schema.read(ReadDataStream(BytesIO(body)))
-            self._schemas[schema.id] = schema
+            self._schemas.setdefault(schema.id, schema)
         elif opcode == Opcode.CHANNEL:
             channel = Channel.read(ReadDataStream(BytesIO(body)))
             schema = self._schemas.get(channel.schema_id) or Schema(id=0, data=b"", encoding="", name="")
             known_as = Definition(schema.encoding, schema.data.decode())
             latched = is_latched(channel.metadata.get("offered_qos_profiles", ""))
-            self.topics[channel.id] = TopicInfo(channel.topic, schema.name, channel.message_encoding, known_as, latched)
+            info = TopicInfo(channel.topic, schema.name, channel.message_encoding, known_as, latched)
+            self.topics.setdefault(channel.id, info)
         return opcode != Opcode.MESSAGE
 
 
@@ -185,4 +190,6 @@ def _decompress(chunk: Chunk) -> bytes:
 
 def _message(body: bytes) -> Message:
     channel, _, log_ns, _ = _MESSAGE.unpack_from(body)
+    if log_ns > LATEST_NS:
+        raise ValueError(f"log time = {log_ns} ns: beyond what a recording may hold")
     return Message(log_ns, channel, body[_MESSAGE.size :])

@@ -13,6 +13,9 @@ from ruamel.yaml.error import YAMLError
 
 VERSION = 9
 
+LATEST_NS = 2**63 - 1
+"""The last log time that rosbag2 holds."""
+
 _ROOT = "rosbag2_bagfile_information"
 
 FOREVER = {"sec": 9223372036, "nsec": 854775807}

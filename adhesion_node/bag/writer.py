@@ -9,11 +9,9 @@ from collections import Counter
 from pathlib import Path
 from typing import NamedTuple, Self
 
-from .metadata import File, Topic, document
+from .metadata import LATEST_NS, File, Topic, document
 from .part import Part, message_bound
 from .types import Definition, definition, type_hash
-
-LATEST_NS = 2**63 - 1
 
 MB = 1_000_000
 
