@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.summary import Summary
 from mcap_ros2.decoder import DecoderFactory
@@ -335,6 +336,22 @@ def test_a_damaged_chunk_is_left_out_and_reported(tmp_path: Path) -> None:
     kept = iter(written)
     assert all(record in kept for record in read), "what is left is in order and unchanged"
     assert read[-1] == written[-1]
+
+
+def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
+    """One wrong bit makes the one kind of record the other."""
+    written = write_steps(tmp_path / "bag", 20)
+    file = tmp_path / "bag" / file_name(0)
+    data = bytearray(file.read_bytes())
+    chunk = index_of(file).chunk_indexes[0]
+    place = chunk.chunk_start_offset + chunk.chunk_length
+    assert data[place] == Opcode.MESSAGE_INDEX
+    data[place] = Opcode.MESSAGE
+    file.write_bytes(data)
+    with BagReader(tmp_path / "bag") as reader:
+        assert list(reader.messages()) == written
+        assert not reader.complete
+        assert "is damaged at byte" in reader.damage[0]
 
 
 @pytest.mark.parametrize(

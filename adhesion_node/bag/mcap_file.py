@@ -112,6 +112,8 @@ class McapFile:
     def _take_block(self, opcode: int, offset: int, body: bytes) -> None:
         """Note a record of the data section; a damaged one is left out as a whole."""
         try:
+            if opcode == Opcode.MESSAGE and self.blocks and self.blocks[-1].opcode == Opcode.CHUNK:
+                raise ValueError("behind a chunk comes its index, which one wrong bit makes a message")
             messages = [_message(inner) for kind, inner in _unpack(opcode, body) if not self._declares(kind, inner)]
         except _UNREADABLE:
             self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
