@@ -136,6 +136,22 @@ def test_log_times_are_those_of_publishing_however_late_the_recorder_is(
     assert order[:3] == ["/train1/truth/mu", "/train1/truth/mu", "/train1/position"]
 
 
+def test_a_message_keeps_its_clock_when_later_clocks_overtake_it(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """Three messages to a tick: their queue falls behind the clock's."""
+    recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], sim=True)
+    for number in range(90):
+        if number % 3 == 0:
+            ends[CLOCK].publish(clock(number // 3 * S))
+        ends[POSITION].publish(stamped(POSITION, number // 3 * S + number))
+    spin_until(executor, lambda: recording.heard[POSITION] == 90)
+    recording.close()
+    with BagReader(tmp_path / "bag") as reader:
+        times = [(record.log_ns, record.message.header.stamp.nanosec) for record in reader.messages()]
+    assert times == [(number // 3 * S, number) for number in range(90)]
+
+
 def test_without_a_clock_the_stamp_takes_its_place(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:

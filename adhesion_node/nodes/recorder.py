@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from bisect import bisect_right, insort
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -25,14 +26,17 @@ from .qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
-SPAN_NS = 300_000_000
-"""Log time that a killed recorder loses at most, while it goes as fast as the clock or faster."""
+SPAN_NS = 200_000_000
+"""Log time in a chunk. A message waits for two /clock and for its chunk to end: 0.6 s while /clock comes in time."""
 
-ROUND_S = 0.2
-ROUNDS = 3
+ROUND_S = 0.1
+ROUNDS = 6
 """A message that log time has not brought to the disk goes there after so many rounds of the system's clock: /clock
 stands still or is slow. A busy machine misses rounds, so it does not change what equal runs leave, as a deadline would.
 """
+
+CLOCKS = 1000
+"""How many /clock are remembered: more than a subscription's queue holds."""
 
 MIN_FREE_MB = 100.0
 LIMITS = Limits(span_ns=SPAN_NS, min_free_bytes=MIN_FREE_MB * MB)
@@ -55,12 +59,19 @@ class _Message(NamedTuple):
     stamp_ns: int
 
 
+class _Tick(NamedTuple):
+    """A /clock. Sorts by the time of publishing."""
+
+    published_ns: int
+    clock_ns: int
+
+
 class Recorder(Node):
     """Records `topics.RECORDED` under their resolved names into the new directory `output`.
 
     The log time is the node's time: the system clock at arrival, or with `use_sim_time` the /clock in force when the
     message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder does
-    not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks. Until the
+    not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks. Before the
     first /clock, the header's stamp takes its place. `heard` counts the messages received by topic. Call `close` at
     the end. Raises ValueError when `output` exists. A callback raises OSError when the disk is full; `close` then
     still makes the recording complete up to there.
@@ -69,7 +80,7 @@ class Recorder(Node):
     def __init__(self, output: Path, limits: Limits = LIMITS, **kwargs: Any) -> None:
         super().__init__("recorder", **kwargs)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
-        self._clock_ns: int | None = None
+        self._clocks: list[_Tick] = []
         self._last_ns = 0
         self.heard: Counter[topics.Topic] = Counter()
         self._arrivals = 0
@@ -78,7 +89,6 @@ class Recorder(Node):
         self._oldest_unsaved = 0
         self._pending: list[_Message] = []
         if self._simulated:
-            # First, so that the executor hands over a /clock before the messages published after it.
             subscribe(self, topics.CLOCK, self._on_clock, SENSOR_SUBSCRIPTION)
         for topic in topics.RECORDED:
             subscribe(self, topic, self._receiver(topic), _profile(topic), raw=True)
@@ -135,20 +145,27 @@ class Recorder(Node):
         return serialize(message, type_name), stamp_ns
 
     def _on_clock(self, message: Clock, info: Mapping[str, int]) -> None:
-        now_ns = message.clock.sec * 10**9 + message.clock.nanosec
-        if self._clock_ns is None:
-            self._clock_ns = now_ns
-        published_ns = info["source_timestamp"]
-        self._release(lambda message: message.published_ns < published_ns)
-        self._clock_ns = now_ns
-        self._writer.advance(now_ns)
+        """Write what was published before the /clock before this one: what was published since may be on its way."""
+        insort(self._clocks, _Tick(info["source_timestamp"], message.clock.sec * 10**9 + message.clock.nanosec))
+        del self._clocks[:-CLOCKS]
+        if len(self._clocks) > 1:
+            before = self._clocks[-2]
+            self._release(lambda message: message.published_ns < before.published_ns)
+            self._writer.advance(before.clock_ns)
 
     def _release(self, ready: Callable[[_Message], bool]) -> None:
         """Write the waiting messages that are ready in the order of publishing."""
         due = sorted(filter(ready, self._pending))
         self._pending = [message for message in self._pending if not ready(message)]
         for message in due:
-            self._write(message, self._clock_ns if self._clock_ns is not None else message.stamp_ns or self._last_ns)
+            self._write(message, self._clock_at(message))
+
+    def _clock_at(self, message: _Message) -> int:
+        """Return the clock in force when a message was published, however late it comes."""
+        following = bisect_right(self._clocks, message.published_ns, key=lambda tick: tick.published_ns)
+        if following:
+            return self._clocks[following - 1].clock_ns
+        return message.stamp_ns or (self._clocks[0].clock_ns if self._clocks else self._last_ns)
 
     def _write(self, message: _Message, log_ns: int) -> None:
         self._last_ns = log_ns
