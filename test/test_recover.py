@@ -6,9 +6,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import Reader
+from test_recording_survives import file_size_limit
 
 from adhesion_node import recover
 from adhesion_node.bag import BagReader, BagWriter, Limits, sensors
@@ -142,3 +144,18 @@ def test_a_complete_recording_without_metadata_gets_it(tmp_path: Path) -> None:
     assert summary["messages"] == {"/position": 1}
     with Reader(tmp_path / "whole") as reader:
         assert reader.message_count == 1
+
+
+def test_a_full_disk_leaves_nothing_half_recovered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither when it is full from the beginning, nor when it fills up on the way."""
+    rng = np.random.default_rng(1)
+    with BagWriter(tmp_path / "bag") as writer:
+        for step in range(200):
+            writer.write("/text", "std_msgs/msg/String", rng.bytes(5000), step * S)
+    for size in (100_000, 700_000):
+        with file_size_limit(size):
+            assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole")]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"recover: {tmp_path / 'whole'}")
+        assert "File too large" in line
+        assert not (tmp_path / "whole").exists()
