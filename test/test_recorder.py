@@ -165,6 +165,17 @@ def test_without_a_clock_the_stamp_takes_its_place(
         assert [record.log_ns for record in reader.messages()] == [3 * S, 3 * S]
 
 
+def test_a_stamp_before_1970_does_not_end_the_recording(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], sim=True)
+    ends[POSITION].publish(stamped(POSITION, -3 * S))
+    spin_until(executor, lambda: recording.counts)
+    recording.close()
+    with BagReader(tmp_path / "bag") as reader:
+        assert [(record.log_ns, record.message.header.stamp.sec) for record in reader.messages()] == [(0, -3)]
+
+
 def test_a_curve_from_before_the_recorder_is_recorded(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:

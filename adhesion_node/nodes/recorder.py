@@ -168,9 +168,9 @@ class Recorder(Node):
         return message.stamp_ns or (self._clocks[0].clock_ns if self._clocks else self._last_ns)
 
     def _write(self, message: _Message, log_ns: int) -> None:
-        self._last_ns = log_ns
+        self._last_ns = max(log_ns, 0)  # a stamp may lie before 1970, a log time may not
         try:
-            self._writer.write(message.name, message.type, message.cdr, log_ns)
+            self._writer.write(message.name, message.type, message.cdr, self._last_ns)
         except OSError:
             self._pending = []  # the recording ends here, not with a gap
             raise
