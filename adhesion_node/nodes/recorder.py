@@ -27,10 +27,10 @@ from .qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
 SPAN_NS = 200_000_000
-"""Log time in a chunk. A message waits for two /clock and for its chunk to end: 0.6 s while /clock comes in time."""
+"""Log time in a chunk. A message waits for two more /clock and for its chunk to end: 0.3 s with a /clock of 10 Hz."""
 
 ROUND_S = 0.1
-ROUNDS = 6
+ROUNDS = 5
 """A message that log time has not brought to the disk goes there after so many rounds of the system's clock: /clock
 stands still or is slow. A busy machine misses rounds, so it does not change what equal runs leave, as a deadline would.
 """
