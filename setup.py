@@ -21,6 +21,9 @@ PROGRAMS = {
     "bench": "adhesion_node.bench.__main__",
 }
 
+# The studies on a Dask cluster. Its versions are those of the calendar.
+CLUSTER = ["distributed>=2024.8,<2027"]
+
 
 def shared_files() -> list[tuple[str, list[str]]]:
     """List what goes under share/: marker, manifest, default parameters and reference recordings."""
@@ -61,7 +64,8 @@ setup(
     extras_require={
         # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
         "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],
-        "test": ["pytest>=8,<10", "hypothesis>=6.100,<7", "mcap-ros2-support>=0.5.5,<1"],
+        "cluster": CLUSTER,
+        "test": ["pytest>=8,<10", "hypothesis>=6.100,<7", "mcap-ros2-support>=0.5.5,<1", *CLUSTER],
         "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
         # What `bench` measures against; particles wants numpy below 2.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from adhesion_node.study import identified, sensitivity
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.methods import STARTS
 from adhesion_node.study.montecarlo import Chunk, Result
+from adhesion_node.study.running import Running
 from adhesion_node.study.runs import ROW
 
 
@@ -63,20 +65,23 @@ def test_rows_tell_mean_band_and_saving() -> None:
 def test_one_setting_at_a_time_leaves_the_nominal_ones() -> None:
     nominal = Chunk("tunnel_entry", "particle_em", 0.5, 1000, 3)
     for setting, value, chunk in sensitivity.variations(3):
-        assert chunk._replace(method="particle_em", **{setting: getattr(nominal, setting)}) == nominal
-        assert getattr(chunk, setting) == value
+        varied = chunk if setting in Chunk._fields else chunk.config
+        assert getattr(varied, setting) == value
+        config = replace(chunk.config, window=50, step=10, particles=20)
+        assert chunk._replace(method="particle_em", sigma_m=0.5, config=config) == nominal
+        assert [chunk.sigma_m != 0.5, chunk.config != nominal.config].count(True) <= 1
 
 
 def test_the_sensitivity_table_says_where_the_papers_figure_is_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def computed(wanted: Sequence[Chunk], _cache: Path, _workers: int) -> list[Result]:
+    def computed(wanted: Sequence[Chunk], _where: Running) -> list[Result]:
         """Errors of 1, 1.5, 10 ... %: rising with the noise."""
         scales = {0.05: 1.01, 0.1: 1.015}
         runs = [[a_run(300.0, 100.0, scales.get(chunk.sigma_m, 1.1))[40:]] * len(STARTS) for chunk in wanted]
         return [Result(chunk, some, 0.0, np.zeros(1)) for chunk, some in zip(wanted, runs, strict=True)]
 
-    monkeypatch.setattr(sensitivity, "run_all", computed)
+    monkeypatch.setattr(sensitivity, "results", computed)
     assert main(["sensitivity", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
     assert "the paper's 1.87 % is met up to sigma = 0.1 m" in capsys.readouterr().out
     first = json.loads((tmp_path / "table.json").read_text())[0]

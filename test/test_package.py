@@ -20,6 +20,9 @@ from conftest import ROOT
 
 OWN = ("adhesion_node", "sim_node")
 ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|interfaces)")
+OPTIONAL = {"distributed": "cluster"}
+"""Imported only where it is asked for: extra by module."""
+
 FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "numpy": ("numpy", "python3-numpy"),
     "scipy": ("scipy", "python3-scipy"),
@@ -121,7 +124,9 @@ def test_what_is_imported_is_declared() -> None:
     ros_packages = {name for name in imported() if ROS.fullmatch(name)}
     assert ros_packages <= depends
     required = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in setup_arguments()["install_requires"]}
-    for name in imported() - ros_packages - PEERS:
+    extras = setup_arguments()["extras_require"]
+    assert all(requirement.startswith(name) for name, extra in OPTIONAL.items() for requirement in extras[extra])
+    for name in imported() - ros_packages - PEERS - OPTIONAL.keys():
         distribution, rosdep_key = FROM_PYPI[name]
         assert distribution in required
         assert rosdep_key in depends

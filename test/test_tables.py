@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -12,16 +13,18 @@ import pytest
 
 from adhesion_node.core import Config, Estimate, Regime
 from adhesion_node.score import mean_relative_error_percent
-from adhesion_node.study import distances, montecarlo
+from adhesion_node.study import distances
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.accuracy import Curve, converged_kmh, errors, figures, over_speed
 from adhesion_node.study.methods import METHODS, STARTS, Lane
-from adhesion_node.study.montecarlo import Chunk, chunks, compute, load, run_all, save
+from adhesion_node.study.montecarlo import Chunk, Result, chunks, result_of, results
 from adhesion_node.study.published import START_OF_MEAN, TABLES
+from adhesion_node.study.running import Running
 from adhesion_node.study.runs import ROW, rows_of, simulate
 from adhesion_node.study.tables import Cell, rows
+from adhesion_node.study.tasks import Arrays, file_name, load, save
 
-QUICK = Chunk("tunnel_exit", "particle_em", 0.5, 1000, 1, window=20, particles=5, iterations=2)
+QUICK = Chunk("tunnel_exit", "particle_em", 0.5, 1000, 1, Config(window=20, particles=5, iterations=2))
 """A chunk of the paper's method in little time."""
 
 
@@ -30,11 +33,11 @@ def _rows(*values: tuple[float, float, float, float, float, bool, bool]) -> np.n
 
 
 @cache
-def _quick() -> montecarlo.Result:
-    return compute(QUICK)
+def _quick() -> Arrays:
+    return QUICK.compute()
 
 
-def _same(one: montecarlo.Result, other: montecarlo.Result) -> bool:
+def _same(one: Result, other: Result) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(one.rows, other.rows, strict=True))
 
 
@@ -105,37 +108,27 @@ def test_chunks_cover_every_run_once() -> None:
 
 
 def test_a_chunk_comes_back_from_the_cache_whole(tmp_path: Path) -> None:
-    result = _quick()
-    save(result, QUICK.file(tmp_path))
-    again = load(QUICK, tmp_path)
-    assert _same(result, again)
-    assert (again.chunk, again.seconds) == (QUICK, result.seconds)
-    assert [file.suffix for file in tmp_path.iterdir()] == [".npz"]
+    save(QUICK, _quick(), tmp_path)
+    stored, fresh = (result_of(QUICK, found) for found in (load(QUICK, tmp_path), _quick()))
+    assert _same(stored, fresh)
+    assert len(stored.rows) == len(STARTS)
+    assert (stored.chunk, stored.seconds) == (QUICK, fresh.seconds)
 
 
-def test_a_chunk_of_other_settings_has_another_file(tmp_path: Path) -> None:
-    changed = (QUICK._replace(particles=6), QUICK._replace(seeds=2), QUICK._replace(sigma_m=0.1))
-    assert len({chunk.file(tmp_path) for chunk in (QUICK, *changed)}) == 4
-
-
-def test_a_killed_study_goes_on_where_it_stopped(tmp_path: Path) -> None:
-    wanted = [QUICK, QUICK._replace(method="ekf_tuned")]
-    marked = _quick()
-    marked = marked._replace(rows=[rows[:3] for rows in marked.rows])
-    save(marked, QUICK.file(tmp_path))
-    (tmp_path / "unfinished.npz.1").write_bytes(b"half a ch")
-    first, second = run_all(wanted, tmp_path, 1)
-    assert _same(first, marked)  # not computed again
-    assert _same(second, compute(wanted[1]))
+def test_a_chunk_of_other_settings_has_another_file() -> None:
+    finer = replace(QUICK.config, particles=6)
+    changed = (QUICK._replace(config=finer), QUICK._replace(seeds=2), QUICK._replace(sigma_m=0.1))
+    others = (QUICK._replace(method="ekf_tuned"), QUICK._replace(scenario="tunnel_entry"))
+    assert len({file_name(chunk) for chunk in (QUICK, *changed, *others)}) == 6
 
 
 def test_numbers_do_not_depend_on_the_workers_or_the_chunks(tmp_path: Path) -> None:
     small = [QUICK, QUICK._replace(first_seed=1001)]
-    one = list(run_all(small, tmp_path / "1", workers=1))
-    two = list(run_all(small, tmp_path / "2", workers=2))
+    one = list(results(small, Running(tmp_path / "1", workers=1)))
+    two = list(results(small, Running(tmp_path / "2", workers=2)))
     assert all(_same(a, b) for a, b in zip(one, two, strict=True))
-    together = compute(QUICK._replace(seeds=2))
-    for ours, apart in zip(together.rows, one[0].rows + one[1].rows, strict=True):
+    both = QUICK._replace(seeds=2)
+    for ours, apart in zip(result_of(both, both.compute()).rows, one[0].rows + one[1].rows, strict=True):
         np.testing.assert_allclose(ours["mu"], apart["mu"], rtol=1e-9)  # sums may round otherwise in another batch
 
 
@@ -145,9 +138,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, Any]
     folder = tmp_path_factory.mktemp("study")
     for scenario in TABLES:
         (wanted,) = chunks(scenario, "particle_em", 0.5, 1)
-        quick = wanted._replace(window=20, particles=5, iterations=2)
+        quick = wanted._replace(config=QUICK.config)
         (folder / "cache").mkdir(exist_ok=True)
-        save(compute(quick)._replace(chunk=wanted), wanted.file(folder / "cache"))
+        save(wanted, quick.compute(), folder / "cache")
     file, cache, figures_ = (str(folder / name) for name in ("t.json", "cache", "figures"))
     assert main(["tables", "--runs", "1", "--json", file, "--cache", cache, "--figures", figures_]) == 0
     return json.loads(Path(file).read_text()), folder / "figures"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..cli import DONE, report
@@ -12,7 +11,8 @@ from ..core import braking
 from ..core.adhesion import WET, AdhesionLaw
 from ..core.train import CRH3, KMH
 from . import identified
-from .montecarlo import add_running_options, chunks, run_all
+from .montecarlo import chunks, results
+from .running import Running, add_running_options, running
 
 
 class Published(NamedTuple):
@@ -92,10 +92,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_running_options(parser)
 
 
-def by_identified(runs: int, cache: Path, workers: int) -> list[dict[str, Any]]:
+def by_identified(runs: int, where: Running) -> list[dict[str, Any]]:
     """Distances by the adhesion that the paper's method identified in the runs of `study tables`."""
     wanted = [chunk for scenario in identified.BRAKINGS for chunk in chunks(scenario, "particle_em", 0.5, runs)]
-    return list(identified.rows(list(run_all(wanted, cache, workers))))
+    return list(identified.rows(list(results(wanted, where))))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -116,7 +116,7 @@ def run(options: argparse.Namespace) -> int:
         f"{ours.time_percent:6.2f} {paper.time_percent:6.2f}"
         for ours, paper in zip(savings(table), PUBLISHED_SAVINGS, strict=True)
     ]
-    found = by_identified(options.runs, options.cache, options.workers) if options.runs else []
+    found = by_identified(options.runs, running(options)) if options.runs else []
     lines += [line for row in found for line in identified.lines(row)]
     report(options.json, table + found, "\n".join(lines))
     return DONE

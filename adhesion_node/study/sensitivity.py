@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from ..cli import DONE, report
 from .accuracy import figures
 from .methods import STARTS
-from .montecarlo import Chunk, Result, add_running_options, run_all
+from .montecarlo import Chunk, Result, results
 from .published import START_OF_MEAN, TABLES
+from .running import add_running_options, running
 from .runs import FIRST_SEED
 
 SCENARIO = "tunnel_entry"
@@ -39,8 +41,14 @@ def variations(runs: int) -> Iterator[tuple[str, float, Chunk]]:
     for setting, values in VARIED.items():
         for method in ("particle_em", "ekf_tuned") if setting == "sigma_m" else ("particle_em",):
             for value in values:
-                changed: dict[str, Any] = {setting: value}
-                yield setting, value, Chunk(SCENARIO, method, 0.5, FIRST_SEED, runs)._replace(**changed)
+                yield setting, value, _changed(Chunk(SCENARIO, method, 0.5, FIRST_SEED, runs), {setting: value})
+
+
+def _changed(chunk: Chunk, change: dict[str, Any]) -> Chunk:
+    """Change a field of the chunk or a setting of its estimator."""
+    if change.keys() <= set(Chunk._fields):
+        return chunk._replace(**change)
+    return chunk._replace(config=replace(chunk.config, **change))
 
 
 def run(options: argparse.Namespace) -> int:
@@ -48,8 +56,8 @@ def run(options: argparse.Namespace) -> int:
     if options.runs < 1:
         raise ValueError(f"runs = {options.runs}: give at least 1")
     wanted = list(variations(options.runs))
-    results = run_all([chunk for _, _, chunk in wanted], options.cache, options.workers)
-    table = [_row(setting, value, result) for (setting, value, _), result in zip(wanted, results, strict=True)]
+    found = results([chunk for _, _, chunk in wanted], running(options))
+    table = [_row(setting, value, result) for (setting, value, _), result in zip(wanted, found, strict=True)]
     report(options.json, table, "\n".join(_lines(table)))
     return DONE
 

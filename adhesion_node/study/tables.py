@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from ..cli import DONE, report
 from .accuracy import figures, over_speed
 from .methods import METHODS, STARTS
-from .montecarlo import Chunk, Result, add_running_options, chunks, run_all
+from .montecarlo import Chunk, Result, chunks, results
 from .published import START_OF_MEAN, TABLES
+from .running import Running, add_running_options, running
 
 NOMINAL_SIGMA_M = 0.5
 
@@ -48,11 +49,11 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 4-9 and 14-19 into DIR")
 
 
-def cells(wanted: Sequence[Chunk], cache: Path, workers: int) -> list[Cell]:
+def cells(wanted: Sequence[Chunk], where: Running) -> list[Cell]:
     """Run the chunks and put together those that differ in their seeds only."""
-    results: dict[tuple[str, str, float], list[Result]] = {}
-    for result in run_all(wanted, cache, workers):
-        results.setdefault((result.chunk.scenario, result.chunk.method, result.chunk.sigma_m), []).append(result)
+    by_cell: dict[tuple[str, str, float], list[Result]] = {}
+    for result in results(wanted, where):
+        by_cell.setdefault((result.chunk.scenario, result.chunk.method, result.chunk.sigma_m), []).append(result)
     return [
         Cell(
             *key,
@@ -60,7 +61,7 @@ def cells(wanted: Sequence[Chunk], cache: Path, workers: int) -> list[Cell]:
             sum(result.seconds for result in some),
             np.concatenate([result.window_ms for result in some]),
         )
-        for key, some in results.items()
+        for key, some in by_cell.items()
     ]
 
 
@@ -88,16 +89,15 @@ def rows(cell: Cell) -> Iterator[dict[str, Any]]:
 
 def run(options: argparse.Namespace) -> int:
     """Run what is missing, print the tables, draw the figures."""
-    for name in ("runs", "workers"):
-        if getattr(options, name) < 1:
-            raise ValueError(f"{name} = {getattr(options, name)}: give at least 1")
+    if options.runs < 1:
+        raise ValueError(f"runs = {options.runs}: give at least 1")
     wanted = [
         chunk
         for method in METHODS
         for scenario in TABLES
         for chunk in chunks(scenario, method, NOMINAL_SIGMA_M, options.runs)
     ]
-    found = cells(wanted, options.cache, options.workers)
+    found = cells(wanted, running(options))
     table = [row for cell in found for row in rows(cell)]
     if options.figures:
         from .curves import draw_all

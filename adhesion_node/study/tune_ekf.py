@@ -7,21 +7,22 @@ the pair with the least mean relative error wins.
 from __future__ import annotations
 
 import argparse
-import multiprocessing
-import os
+from dataclasses import asdict
 from functools import cache
 from itertools import product
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 
-from ..cli import DONE, progress, report
+from ..cli import DONE, report
 from ..core import Config
 from ..core.ekf import TUNED, Tuning
 from .accuracy import errors
 from .methods import STARTS, Lane, ekf
 from .published import TABLES
+from .running import add_running_options, run_all, running
 from .runs import simulate
+from .tasks import Arrays
 
 FIRST_SEED = 5000
 
@@ -31,21 +32,50 @@ MU_NOISES = (2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 8e-4, 1e-3, 2e-3)
 SIGMA_M = 0.5
 
 
+class Trial(NamedTuple):
+    """A tuning on runs of both scenarios from all starts."""
+
+    tuning: Tuning
+    runs: int
+
+    @property
+    def name(self) -> str:
+        """Readable beginning of its file's name."""
+        return "tune-ekf"
+
+    @property
+    def weight(self) -> float:
+        """All are alike."""
+        return 1.0
+
+    @property
+    def sources(self) -> tuple[str, ...]:
+        """Where its numbers come from."""
+        study = (f"adhesion_node/study/{name}.py" for name in ("tune_ekf", "accuracy", "methods", "published", "runs"))
+        return "adhesion_node/core/*.py", "adhesion_node/score.py", "sim_node/*.py", *study
+
+    def compute(self) -> Arrays:
+        """Mean relative error, %."""
+        found = errors(ekf(self.tuning)(Config(), _lanes(self.runs)).rows)
+        return {"percent": np.array(np.mean(found.relative_percent))}
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study tune-ekf`."""
     parser.add_argument("--runs", type=int, default=10, help="runs of each scenario and start (default %(default)s)")
+    add_running_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Search the grid and print it, best first."""
     if options.runs < 1:
         raise ValueError(f"runs = {options.runs}: give at least 1")
-    tasks = [(mu_std, mu_noise, options.runs) for mu_std, mu_noise in product(MU_STDS, MU_NOISES)]
-    with multiprocessing.get_context("spawn").Pool(min(os.cpu_count() or 1, len(tasks))) as pool:
-        table = sorted(
-            progress(pool.imap_unordered(_score, tasks), "tunings", len(tasks)),
-            key=lambda row: float(row["mean_relative_error_percent"]),
-        )
+    trials = [Trial(Tuning(*values), options.runs) for values in product(MU_STDS, MU_NOISES)]
+    percents = [float(result["percent"]) for result in run_all(trials, running(options))]
+    table = [
+        {**asdict(trial.tuning), "runs": trial.runs, "mean_relative_error_percent": percent}
+        for percent, trial in sorted(zip(percents, trials, strict=True), key=lambda pair: pair[0])
+    ]
     lines = [f"{'mu_std':>8} {'mu_noise':>9} {'error, %':>9}"]
     lines += [
         f"{row['mu_std']:8g} {row['mu_noise']:9g} {row['mean_relative_error_percent']:9.3f}"
@@ -54,13 +84,6 @@ def run(options: argparse.Namespace) -> int:
     ]
     report(options.json, table, "\n".join(lines))
     return DONE
-
-
-def _score(task: tuple[float, float, int]) -> dict[str, Any]:
-    mu_std, mu_noise, runs = task
-    found = errors(ekf(Tuning(mu_std, mu_noise))(Config(), _lanes(runs)).rows)
-    error = float(np.mean(found.relative_percent))
-    return {"mu_std": mu_std, "mu_noise": mu_noise, "runs": runs, "mean_relative_error_percent": error}
 
 
 @cache

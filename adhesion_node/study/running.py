@@ -1,0 +1,99 @@
+"""Runs the tasks that the cache lacks, with a progress bar; the numbers do not depend on where they are computed."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import socket
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import NamedTuple
+
+from . import engines
+from .tasks import Arrays, Task, file_name, load, save
+
+PROGRESS_S = 5.0
+"""Time between two signs of life."""
+
+
+class Running(NamedTuple):
+    """Where tasks are computed and kept."""
+
+    cache: Path
+    workers: int = 1
+    scheduler: str | None = None
+    """Address of a Dask scheduler; takes the place of the workers."""
+
+
+def add_running_options(parser: argparse.ArgumentParser) -> None:
+    """Options of every study that runs tasks; `running` reads them."""
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="compute on the Dask cluster of tcp://HOST:PORT instead (extra cluster)"
+    )
+    parser.add_argument(
+        "--cache",
+        type=Path,
+        metavar="DIR",
+        default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
+        help="where finished runs are kept, so that a killed study goes on (default %(default)s)",
+    )
+
+
+def running(options: argparse.Namespace) -> Running:
+    """Read the options of `add_running_options`. Raises ValueError naming a bad one."""
+    if options.workers < 1:
+        raise ValueError(f"workers = {options.workers}: give at least 1")
+    return Running(options.cache, options.workers, options.scheduler)
+
+
+def run_all(wanted: Sequence[Task], where: Running) -> Iterator[Arrays]:
+    """Yield the results of all tasks in order, computing those that the cache lacks."""
+    where.cache.mkdir(parents=True, exist_ok=True)
+    by_file = {file_name(task): task for task in wanted}
+    missing = [task for file, task in by_file.items() if not (where.cache / file).exists()]
+    if missing:
+        _compute_all(sorted(missing, key=lambda task: -task.weight), where)
+    for task in wanted:
+        yield load(task, where.cache)
+
+
+def _compute_all(missing: Sequence[Task], where: Running) -> None:
+    """Compute tasks into the cache, and draw the bar on standard error, by weights; short work stays silent."""
+    with _executor(where, len(missing)) as executor:
+        futures = {executor.submit(_compute, task, file_name(task)): task for task in missing}
+        started, finished, total = time.monotonic(), 0.0, sum(task.weight for task in missing)
+        due = started + PROGRESS_S
+        while futures:
+            for future in _done(futures, due):
+                task = futures.pop(future)
+                save(task, future.result(), where.cache)
+                finished += task.weight
+            if time.monotonic() >= due:
+                due = time.monotonic() + PROGRESS_S
+                _draw_bar(finished / total, time.monotonic() - started)
+
+
+def _executor(where: Running, tasks: int) -> AbstractContextManager[Executor]:
+    return engines.cluster(where.scheduler) if where.scheduler else engines.processes(min(where.workers, tasks))
+
+
+def _done(futures: dict[Future[Arrays], Task], due: float) -> set[Future[Arrays]]:
+    """Wait until something is done or `due` has come."""
+    return wait(futures, max(due - time.monotonic(), 0.0), FIRST_COMPLETED).done
+
+
+def _draw_bar(share: float, spent_s: float) -> None:
+    left = f"{spent_s / share - spent_s:.0f} s left" if share else f"{spent_s:.0f} s gone"
+    print(f"[{'#' * round(30 * share):<30}] {share:4.0%}, {left}", file=sys.stderr)
+
+
+def _compute(task: Task, file: str) -> Arrays:
+    """Compute a task where its numbers will be those of `file`."""
+    if file_name(task) != file:
+        raise RuntimeError(f"{socket.gethostname()} has another version of this package or of numpy")
+    return task.compute()
