@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adhesion_node.study import creep, creep_runs
+from adhesion_node.study import creep, creep_runs, engines
 from adhesion_node.study.__main__ import main
 
 KEYS = {"experiment", "peak_true", "peak_estimated_mean", "peak_estimated_std", "used_fraction"}
@@ -19,7 +19,8 @@ KEYS = {"experiment", "peak_true", "peak_estimated_mean", "peak_estimated_std", 
 def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[Any, dict[str, Any]]]:
     """The study with 20 seeds, once: the folder of its figures and its rows by experiment."""
     folder = tmp_path_factory.mktemp("study")
-    assert main(["creep", "--json", str(folder / "creep.json"), "--figures", str(folder / "figures")]) == 0
+    files = ["--json", str(folder / "creep.json"), "--figures", str(folder / "figures")]
+    assert main(["creep", *files, "--cache", str(folder / "cache")]) == 0
     rows = json.loads((folder / "creep.json").read_text(encoding="utf-8"))
     return folder / "figures", {row["experiment"]: row for row in rows}
 
@@ -76,11 +77,20 @@ def test_the_sensitivity_tells_samples_and_gains(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(creep, "SCAN_SWINGS", (50,))
     monkeypatch.setattr(creep, "SCAN_RAMPS", (100,))
     monkeypatch.setattr(creep, "RAMP", 2000)
-    rows = {row["experiment"]: row for row in creep.sensitivity(2, 1)}
+    wanted = creep.sensitivity(2, 1)
+    rows = {name: creep.row_of(name, task, task.compute()["theta"]) for name, task in wanted.items()}
     names = [f"{number}, {what}" for what in ("50 samples per rise", "single rise of 100") for number in (2, 3)]
     assert list(rows) == [*names, "3, single rise, K_p 0.3", "3, single rise, K_p 1"]
     assert rows[names[0]]["samples"] == 300
     assert rows["3, single rise, K_p 1"]["used_fraction"] < rows["3, single rise, K_p 0.3"]["used_fraction"]
+
+
+def test_the_same_study_again_computes_nothing(
+    study: tuple[Path, dict[Any, dict[str, Any]]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(engines, "processes")
+    assert main(["creep", "--json", str(tmp_path / "again.json"), "--cache", str(study[0].parent / "cache")]) == 0
+    assert json.loads((tmp_path / "again.json").read_text()) == list(study[1].values())
 
 
 def test_a_run_does_not_depend_on_how_many_there_are() -> None:

@@ -18,6 +18,8 @@ from distributed import LocalCluster
 from adhesion_node.core import Config
 from adhesion_node.study import engines, running, tasks
 from adhesion_node.study.__main__ import main
+from adhesion_node.study.creep_runs import VARYING_ETA
+from adhesion_node.study.creep_tasks import Experiment
 from adhesion_node.study.montecarlo import Chunk
 from adhesion_node.study.running import Running, run_all
 from adhesion_node.study.tasks import Arrays, Task, file_name, load, save
@@ -27,6 +29,8 @@ TIMEOUT_S = 60.0
 
 CHUNK = Chunk("tunnel_exit", "particle_em", 0.5, 1000, 1, Config(window=20, particles=5, iterations=2))
 """A chunk of the paper's method in little time."""
+
+TIMES = ("seconds", "window_ms")
 
 
 class Square(NamedTuple):
@@ -112,12 +116,13 @@ def test_a_cluster_takes_the_place_of_the_workers(tmp_path: Path, dask: LocalClu
 
 
 def test_a_cluster_gives_the_numbers_of_the_processes(tmp_path: Path, dask: LocalCluster) -> None:
-    wanted = [CHUNK, CHUNK._replace(method="ekf_tuned"), CHUNK._replace(first_seed=1001)]
+    wanted: list[Task] = [CHUNK, CHUNK._replace(method="ekf_tuned"), CHUNK._replace(first_seed=1001)]
+    wanted += [Experiment(2, 1), Experiment(2, 1, VARYING_ETA, 50, "swings")]
     ours = list(run_all(wanted, Running(tmp_path / "processes", workers=2)))
     theirs = list(run_all(wanted, Running(tmp_path / "cluster", scheduler=dask.scheduler_address)))
     for one, other in zip(ours, theirs, strict=True):
-        assert one["rows"].tobytes() == other["rows"].tobytes()
-        assert one["ends"].tolist() == other["ends"].tolist()
+        assert one.keys() == other.keys()
+        assert all(one[name].tobytes() == other[name].tobytes() for name in one if name not in TIMES)
     files = [sorted(file.name for file in folder.iterdir()) for folder in tmp_path.iterdir()]
     assert files == [sorted(map(file_name, wanted))] * 2
 
@@ -131,7 +136,7 @@ def test_a_worker_with_other_code_is_refused(tmp_path: Path, dask: LocalCluster)
     assert caught.value.filename == dask.scheduler_address
 
 
-@pytest.mark.parametrize("study", ["tables", "sensitivity", "tune-ekf"])
+@pytest.mark.parametrize("study", ["tables", "sensitivity", "tune-ekf", "creep"])
 def test_a_scheduler_that_does_not_answer_is_one_line_and_code_1(
     study: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -139,7 +144,7 @@ def test_a_scheduler_that_does_not_answer_is_one_line_and_code_1(
     with socket.socket() as unused:  # bound but not listening: nobody answers
         unused.bind(("127.0.0.1", 0))
         address = f"tcp://127.0.0.1:{unused.getsockname()[1]}"
-        assert main([study, "--runs", "1", "--cache", str(tmp_path), "--scheduler", address]) == 1
+        assert main([study, "--runs", "2", "--cache", str(tmp_path), "--scheduler", address]) == 1
     assert capsys.readouterr().err == f"study: {address}: no Dask scheduler answered within 0.2 s\n"
 
 
@@ -171,6 +176,8 @@ import socket, sys
 from pathlib import Path
 from typing import NamedTuple
 from adhesion_node.cli import run_tool
+from adhesion_node.study.creep_runs import VARYING_ETA
+from adhesion_node.study.creep_tasks import Experiment
 from adhesion_node.study.montecarlo import Chunk
 from adhesion_node.study.running import Running, run_all
 import argparse

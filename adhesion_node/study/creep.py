@@ -16,7 +16,6 @@ import numpy as np
 
 from ..cli import DONE, report
 from ..core.train import Array
-from . import creep_beyond
 from .creep_runs import (
     BAND,
     DRY_PEAK,
@@ -24,17 +23,14 @@ from .creep_runs import (
     FIXED_ETA,
     LAMBDA_M,
     RAMP,
-    RISE,
     VARYING_ETA,
     WET_PEAK,
-    Trace,
     first_fraction,
-    one_surface,
-    rise,
-    swings,
-    switched,
+    peaks,
     used_fraction,
 )
+from .creep_tasks import BEYOND, Beyond, Experiment, value_of
+from .running import add_running_options, run_all, running
 
 RUNS, SEED = 20, 1
 
@@ -44,6 +40,9 @@ SCAN_SWINGS, SCAN_RAMPS = (600, 800, 1000, 1200), (1000, 2000, 4000, 8000)
 SCAN_GAINS = (0.3, 1.0)
 """Other gains K_p of (13) for experiment 3 with one rise per surface."""
 
+SWITCHES = {"2": FIXED_ETA, "3": VARYING_ETA}
+"""The experiments on two surfaces."""
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Give the study its options."""
@@ -51,49 +50,68 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"first seed (default {SEED})")
     parser.add_argument("--figures", metavar="DIR", help="draw the counterparts of the paper's Figs. 5-11 into DIR")
     parser.add_argument("--sensitivity", action="store_true", help="also other numbers of samples and other gains")
+    add_running_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run the study; draw the figures where asked."""
     if options.runs < 2 or options.seed < 0:
         raise ValueError(f"runs = {options.runs}, seed = {options.seed}: give at least 2 runs and a seed of at least 0")
-    runs, seed = options.runs, options.seed
-    traces = main_traces(runs, seed)
-    rows = [row_of_one("1", traces["1"])]
-    rows += [row_of_switch(name, traces[name], swings().size) for name in ("2", "3")]
-    rows += [row_of_one("1, noise in mu", one_surface(runs, seed, in_mu=True)), *ramp_rows(runs, seed, RAMP)]
+    wanted = experiments(options.runs, options.seed)
     if options.sensitivity:
-        rows += sensitivity(runs, seed)
-    noise = creep_beyond.creep_noise(runs, seed)
-    covered, withheld = creep_beyond.coverage(seed), creep_beyond.withholding(seed)
-    difference = creep_beyond.dfp_difference(runs, seed)
+        wanted |= sensitivity(options.runs, options.seed)
+    beyond = [Beyond(what, options.runs, options.seed) for what in BEYOND]
+    found = list(run_all([*wanted.values(), *beyond], running(options)))
+    thetas = {name: result["theta"] for name, result in zip(wanted, found[: len(wanted)], strict=True)}
+    rows = [row_of(name, experiment, thetas[name]) for name, experiment in wanted.items()]
+    *noises, covered, withheld, difference = map(value_of, found[len(wanted) :])
     rows[0] |= {"dfp_difference": difference, "coverage95": covered, "withholding": withheld}
+    noise = [row for rows_of_std in noises for row in rows_of_std]
     if options.figures:
         from .creep_figures import draw
 
-        draw(traces, Path(options.figures))
+        draw(thetas, Path(options.figures))
     report(options.json, rows + noise, text(rows, noise, covered, withheld, difference))
     return DONE
 
 
-def main_traces(runs: int, seed: int) -> dict[str, Trace]:
-    """Experiments 1, 2 and 3 by name."""
-    return {
-        "1": one_surface(runs, seed),
-        "2": switched(FIXED_ETA, swings(), runs, seed),
-        "3": switched(VARYING_ETA, swings(), runs, seed),
+def experiments(runs: int, seed: int) -> dict[str, Experiment]:
+    """Experiments 1, 2 and 3 by name, 1 with the noise in mu, 2 and 3 with one single rise per surface."""
+    one = Experiment(runs, seed)
+    swinging = {name: one._replace(config=config, movement="swings") for name, config in SWITCHES.items()}
+    return {"1": one, **swinging, "1, noise in mu": one._replace(in_mu=True), **single_rises(one, RAMP)}
+
+
+def single_rises(one: Experiment, samples: int, suffix: str = "") -> dict[str, Experiment]:
+    """Experiments 2 and 3 with one single rise per surface."""
+    single = one._replace(movement="rise", samples=samples)
+    return {f"{name}, single rise{suffix}": single._replace(config=config) for name, config in SWITCHES.items()}
+
+
+def sensitivity(runs: int, seed: int) -> dict[str, Experiment]:
+    """Experiments 2 and 3 with other numbers of samples, experiment 3 with other gains."""
+    one = Experiment(runs, seed)
+    wanted = {
+        f"{name}, {samples} samples per rise": one._replace(config=config, movement="swings", samples=samples)
+        for samples in SCAN_SWINGS
+        for name, config in SWITCHES.items()
     }
+    for samples in SCAN_RAMPS:
+        wanted |= single_rises(one, samples, f" of {samples}")
+    for gain in SCAN_GAINS:
+        config = replace(VARYING_ETA, gain=gain)
+        wanted[f"3, single rise, K_p {gain:g}"] = one._replace(config=config, movement="rise", samples=RAMP)
+    return wanted
 
 
-def row_of_one(name: str, trace: Trace) -> dict[str, Any]:
-    """Row of experiment 1: the estimate at a creep of 0.03, which used 30 % of the rise."""
-    predicted = trace.peaks[round(RISE * ENOUGH / LAMBDA_M) - 1]
-    return _row(name, DRY_PEAK, predicted, ENOUGH / LAMBDA_M) | {"creep_used": ENOUGH, "samples": RISE}
-
-
-def row_of_switch(name: str, trace: Trace, samples: int) -> dict[str, Any]:
-    """Row of experiment 2 or 3: the estimate at the end of the `samples` on the new surface."""
-    before, after = trace.peaks[samples // 2 : samples], trace.peaks[samples:]
+def row_of(name: str, experiment: Experiment, theta: Array) -> dict[str, Any]:
+    """Row of an experiment: on one surface the estimate at a creep of 0.03, after a switch that at the end."""
+    found, samples = peaks(theta), experiment.samples_of_surface
+    if experiment.movement is None:
+        share = ENOUGH / LAMBDA_M
+        row = _row(name, DRY_PEAK, found[round(samples * share) - 1], share)
+        return row | {"creep_used": ENOUGH, "samples": samples}
+    before, after = found[samples // 2 : samples], found[samples:]
     used = used_fraction(after, WET_PEAK)
     return _row(name, WET_PEAK, after[-1], float(np.mean(used))) | {
         "used_fraction_5_to_95": np.quantile(used, [0.05, 0.95]).tolist(),
@@ -101,31 +119,6 @@ def row_of_switch(name: str, trace: Trace, samples: int) -> dict[str, Any]:
         "std_before_switch": float(np.mean(np.std(before, axis=0))),
         "samples": samples,
     }
-
-
-def ramp_rows(runs: int, seed: int, samples: int) -> list[dict[str, Any]]:
-    """Experiments 2 and 3 with one single rise per surface."""
-    creeps = rise(samples)
-    return [
-        row_of_switch(f"{name}, single rise", switched(config, creeps, runs, seed), samples)
-        for name, config in (("2", FIXED_ETA), ("3", VARYING_ETA))
-    ]
-
-
-def sensitivity(runs: int, seed: int) -> list[dict[str, Any]]:
-    """Experiments 2 and 3 with other numbers of samples, experiment 3 with other gains."""
-    rows = [
-        row_of_switch(f"{name}, {samples} samples per rise", switched(config, swings(samples), runs, seed), creeps.size)
-        for samples in SCAN_SWINGS
-        for creeps in (swings(samples),)
-        for name, config in (("2", FIXED_ETA), ("3", VARYING_ETA))
-    ]
-    for samples in SCAN_RAMPS:
-        rows += [row | {"experiment": f"{row['experiment']} of {samples}"} for row in ramp_rows(runs, seed, samples)]
-    for gain in SCAN_GAINS:
-        trace = switched(replace(VARYING_ETA, gain=gain), rise(RAMP), runs, seed)
-        rows.append(row_of_switch(f"3, single rise, K_p {gain:g}", trace, RAMP))
-    return rows
 
 
 def text(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -29,6 +30,7 @@ from .creep_runs import (
     identify,
     measure,
     on_one,
+    peaks,
     rise,
 )
 
@@ -42,30 +44,34 @@ WRONG = 0.1
 """A published peak further from the truth than this share of it is wrong."""
 
 
-def creep_noise(runs: int, seed: int) -> list[dict[str, Any]]:
+def with_creep_noise(creep_std: float) -> Callable[[int, int], list[dict[str, Any]]]:
     """Peak from the dry creeps up to 0.03 with noise on mu and on the creep: plain, compensated, maximum likelihood."""
-    creeps = rise(RAMP)[: round(RAMP * ENOUGH / LAMBDA_M)]
-    rows = []
-    for creep_std in CREEP_STDS:
+
+    def rows(runs: int, seed: int) -> list[dict[str, Any]]:
+        creeps = rise(RAMP)[: round(RAMP * ENOUGH / LAMBDA_M)]
         data = measure(creeps, on_one(creeps), runs, seed, in_mu=True, creep_std=creep_std)
         variances = np.full(data.creep.shape, creep_std**2), np.full(data.creep.shape, NOISE_STD**2)
         expected = noise_products(data.creep, data.adhesion, SLOPE, *variances)
-        for method, peaks in (
-            ("least squares", identify(ONE, data).peaks[-1]),
-            ("compensated least squares", identify(ONE, data, expected).peaks[-1]),
-            ("errors in variables", _likeliest(data, creep_std)),
-        ):
-            rows.append(
-                {
-                    "experiment": f"creep noise {creep_std:g}, {method}",
-                    "peak_true": DRY_PEAK,
-                    "peak_estimated_mean": float(np.mean(peaks)),
-                    "peak_estimated_std": float(np.std(peaks)),
-                    "used_fraction": ENOUGH / LAMBDA_M,
-                    "bias_percent": 100.0 * (float(np.mean(peaks)) / DRY_PEAK - 1.0),
-                }
-            )
+        found = {
+            "least squares": peaks(identify(ONE, data).theta[-1]),
+            "compensated least squares": peaks(identify(ONE, data, expected).theta[-1]),
+            "errors in variables": _likeliest(data, creep_std),
+        }
+        return [_row(f"creep noise {creep_std:g}, {method}", values) for method, values in found.items()]
+
     return rows
+
+
+def _row(name: str, found: Array) -> dict[str, Any]:
+    mean = float(np.mean(found))
+    return {
+        "experiment": name,
+        "peak_true": DRY_PEAK,
+        "peak_estimated_mean": mean,
+        "peak_estimated_std": float(np.std(found)),
+        "used_fraction": ENOUGH / LAMBDA_M,
+        "bias_percent": 100.0 * (mean / DRY_PEAK - 1.0),
+    }
 
 
 def _likeliest(data: Data, creep_std: float) -> Array:
@@ -74,7 +80,7 @@ def _likeliest(data: Data, creep_std: float) -> Array:
         creep_eiv.fit(creeps, adhesions, SLOPE, START_SHARE * DRY, noise).theta
         for creeps, adhesions in zip(data.creep.T, data.adhesion.T, strict=True)
     ]
-    return peak(SLOPE, np.array(thetas))[0]
+    return peaks(np.array(thetas))
 
 
 def coverage(seed: int) -> dict[str, float]:
@@ -104,7 +110,7 @@ def withholding(seed: int) -> list[dict[str, float]]:
         data = measure(creeps, on_one(creeps, theta), MANY // 2, seed, in_mu=True)
         for end in ends:
             last = identify(ONE, Data(data.creep[:end], data.adhesion[:end], data.theta[:end])).last
-            wrong = np.abs(peak(SLOPE, last.theta)[0] - truth) > WRONG * truth
+            wrong = np.abs(peaks(last.theta) - truth) > WRONG * truth
             tallies[end].append((_published(last), wrong))
     rows = []
     for end, halves in tallies.items():
@@ -123,7 +129,7 @@ def withholding(seed: int) -> list[dict[str, float]]:
 
 def _published(last: Recursion) -> Array:
     """Which runs tell the peak by the criteria of `core.creep_recursion.judge`; on one surface none is changing."""
-    values = peak(SLOPE, last.theta)[0]
+    values = peaks(last.theta)
     std = np.sqrt(np.diagonal(_covariance(last), axis1=-2, axis2=-1))[..., 2]
     positive = (last.theta > 0.0).all(axis=-1)
     enough = last.sums.weight >= ONE.min_samples

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..core.train import Array
 from ..report.picture import BLACK, BLUE, GREY, ORANGE
-from .creep_runs import BAND, DRY, DRY_PEAK, ENOUGH, WET, WET_PEAK, Trace, rise, swings
+from .creep_runs import BAND, DRY, DRY_PEAK, ENOUGH, WET, WET_PEAK, peaks, rise, swings
 
 POINTS = 1500
 """Points of a curve at most."""
@@ -40,19 +40,19 @@ PANELS = (
 )
 
 
-def draw(traces: Mapping[str, Trace], folder: Path) -> None:
-    """Draw fig05.png to fig11.png into `folder`, which is made when missing; `traces` by experiment."""
+def draw(thetas: Mapping[str, Array], folder: Path) -> None:
+    """Draw fig05.png to fig11.png into `folder`, made when missing; thetas (samples, runs, 2) by experiment."""
     folder.mkdir(parents=True, exist_ok=True)
     for panel in PANELS:
         figure = Figure(figsize=(7, 4.2), layout="constrained")
         FigureCanvasAgg(figure)
-        _draw_panel(figure.subplots(), panel, _values(traces[panel.experiment], panel.quantity))
+        _draw_panel(figure.subplots(), panel, _values(thetas[panel.experiment], panel.quantity))
         figure.savefig(folder / f"fig{panel.number:02d}.png", dpi=120)
 
 
-def _values(trace: Trace, quantity: str) -> Array:
+def _values(theta: Array, quantity: str) -> Array:
     """What a panel shows, shape (samples, runs)."""
-    return trace.peaks if quantity == PEAK else trace.theta[..., int(quantity[1]) - 1]
+    return peaks(theta) if quantity == PEAK else theta[..., int(quantity[1]) - 1]
 
 
 def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:

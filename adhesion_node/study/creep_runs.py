@@ -56,14 +56,12 @@ class Trace(NamedTuple):
 
     theta: Array
     """Shape (samples, runs, 2)."""
-    eta: Array
-    """Shape (samples, runs)."""
     last: Recursion
 
-    @property
-    def peaks(self) -> Array:
-        """Estimated mu_max, shape (samples, runs)."""
-        return peak(SLOPE, self.theta)[0]
+
+def peaks(theta: Array) -> Array:
+    """Estimated mu_max after every sample, shape (samples, runs); `theta` as in `Trace`."""
+    return peak(SLOPE, theta)[0]
 
 
 def rise(samples: int = RISE) -> Array:
@@ -104,11 +102,11 @@ def on_one(creeps: Array, theta: Array = DRY) -> Array:
 def identify(config: CreepConfig, data: Data, noise: Array | None = None) -> Trace:
     """Run the recursion over all runs at once; `noise` is what is taken off sample by sample, as `creep_fit.add`."""
     recursion = begin(config, data.creep.shape[1:], START_SHARE * data.theta[0])
-    thetas, etas = np.empty((*data.creep.shape, 2)), np.empty(data.creep.shape)
+    thetas = np.empty((*data.creep.shape, 2))
     for index, (creeps, adhesions) in enumerate(zip(data.creep, data.adhesion, strict=True)):
         recursion = advance(config, recursion, creeps, adhesions, 0.0 if noise is None else noise[index])
-        thetas[index], etas[index] = recursion.theta, recursion.eta
-    return Trace(thetas, etas, recursion)
+        thetas[index] = recursion.theta
+    return Trace(thetas, recursion)
 
 
 def one_surface(runs: int, seed: int, *, in_mu: bool = False) -> Trace:
@@ -123,23 +121,23 @@ def switched(config: CreepConfig, creeps: Array, runs: int, seed: int) -> Trace:
     return identify(config, measure(np.tile(creeps, 2), surfaces, runs, seed))
 
 
-def used_fraction(peaks: Array, truth: float) -> Array:
+def used_fraction(found: Array, truth: float) -> Array:
     """Share of the samples, per run, after which the estimate stays within `BAND` of the truth to the last one.
 
     >>> used_fraction(np.array([[9.0], [1.0], [9.0], [1.0], [1.01]]), 1.0).tolist()
     [0.6]
     """
-    wrong = np.abs(peaks - truth) > BAND * truth
+    wrong = np.abs(found - truth) > BAND * truth
     return _share(wrong.shape[0] - np.argmax(wrong[::-1], axis=0), wrong)
 
 
-def first_fraction(peaks: Array, truth: float) -> Array:
+def first_fraction(found: Array, truth: float) -> Array:
     """Share of the samples, per run, after which the estimate is within `BAND` of the truth for the first time.
 
     >>> first_fraction(np.array([[9.0], [1.0], [9.0], [1.0], [1.01]]), 1.0).tolist()
     [0.2]
     """
-    wrong = np.abs(peaks - truth) > BAND * truth
+    wrong = np.abs(found - truth) > BAND * truth
     first = np.where(wrong.all(axis=0), wrong.shape[0], np.argmin(wrong, axis=0))
     return np.asarray(first / wrong.shape[0])
 
