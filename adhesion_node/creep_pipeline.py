@@ -5,14 +5,19 @@ from __future__ import annotations
 import hashlib
 import struct
 from collections import Counter
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, fields
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
+from . import reading
 from .core.creep import CreepEstimate, CreepSample, creep_step, init
 from .core.creep_align import CreepAligner, Paired, Sample
 from .core.creep_config import CreepConfig, CreepOutcome
 from .core.creep_curve import creep, used_adhesion
-from .core.setting import check_settings, setting
+from .core.setting import check_settings, check_value, setting, settings_of
+from .settings import FRAME_ID, check_names
+from .topics import SPEED, TRACTION_FORCE, WHEEL_SPEED
 
 UNPAIRED, SLOW, AXLES, UNEQUAL = "UNPAIRED", "SLOW", "AXLES", "UNEQUAL"
 """Why a wheel speed never became a creep: no speed or force of its time, a train too slow, another number of axles
@@ -45,6 +50,44 @@ class Vehicle:
         """Variance of the mean creep by the noise of speed and wheel speeds, from the derivatives of (2)."""
         wheels = (self.wheel_radius_m * self.wheel_std_radps) ** 2 / self.axles
         return (((1.0 + mean_creep) * self.speed_std_mps) ** 2 + wheels) / speed_mps**2
+
+
+SETTINGS = (FRAME_ID, *settings_of(Vehicle), *settings_of(CreepConfig))
+"""All settings of the creep estimator."""
+
+READERS: Mapping[str, Callable[[Any, str], Sample]] = MappingProxyType(
+    {
+        SPEED.name: reading.speed,
+        TRACTION_FORCE.name: reading.traction_force,
+        WHEEL_SPEED.name: reading.wheel_speed,
+    }
+)
+"""How the messages of a sensor topic become samples."""
+
+
+class CreepSetup(NamedTuple):
+    """What a creep estimator is set up with."""
+
+    config: CreepConfig
+    vehicle: Vehicle
+    frame: str
+    """The frame_id that sensor messages must have."""
+
+
+def setup_of(values: Mapping[str, Any]) -> CreepSetup:
+    """Build the set-up from values by setting name; what is not named keeps its default.
+
+    Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
+    """
+    check_names(values, SETTINGS)
+    frame = values.get(FRAME_ID.name, FRAME_ID.default)
+    check_value(FRAME_ID.name, frame, str, FRAME_ID._asdict())
+    return CreepSetup(_build(CreepConfig, values), _build(Vehicle, values), frame)
+
+
+def _build(kind: type[Any], values: Mapping[str, Any]) -> Any:
+    own = {item.name for item in fields(kind)}
+    return kind(**{name: value for name, value in values.items() if name in own})
 
 
 class CreepPipeline:

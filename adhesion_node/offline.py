@@ -5,21 +5,18 @@ from __future__ import annotations
 import argparse
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
-from . import reading
+from . import parameter_file, reading
 from .bag import BagReader
 from .cli import DONE, FAILED, progress, report
 from .core.align import PressureSample, Sample
 from .core.prediction import Prediction
 from .pipeline import Pipeline
 from .score import Truth, mean_relative_error_percent
-from .settings import SEED, parse_setting, setup_of
+from .settings import SEED, SETTINGS, setup_of
 from .topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED, TRUTH_MU, TRUTH_STATE
 
 READERS: dict[str, Callable[[Any, str], Sample]] = {
@@ -29,14 +26,10 @@ READERS: dict[str, Callable[[Any, str], Sample]] = {
 }
 """How the messages of a sensor topic become samples."""
 
-OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides.")
-"""Parameters that ROS itself gives to every node: they may stand in a parameter file and mean nothing here."""
-
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
-    values = read_parameters(options.params) if options.params else {}
-    values |= dict(map(parse_setting, options.set))
+    values = parameter_file.given(options, "estimator", SETTINGS)
     if options.seed is not None:
         values[SEED.name] = options.seed
     if POSITION.name not in selection.values():
@@ -115,24 +108,3 @@ def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[tuple[
     """Yield the recorded messages of `selection` under our names."""
     for record in reader.messages(selection):
         yield selection[record.topic], record.message, record.log_ns
-
-
-def read_parameters(path: str) -> dict[str, Any]:
-    """Settings of the estimator in a ROS parameter file; ValueError when it is unreadable or not for the estimator."""
-    try:
-        document = YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))
-        nodes = {name.strip("/"): _flat(content["ros__parameters"]) for name, content in document.items()}
-    except (OSError, UnicodeDecodeError, YAMLError, AttributeError, LookupError, TypeError) as error:
-        raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
-    if "estimator" not in nodes and "**" not in nodes:
-        raise ValueError(f"params = {path}: has {', '.join(nodes)}: name the node 'estimator' or '/**'")
-    given = {**nodes.get("**", {}), **nodes.get("estimator", {})}
-    return {name: value for name, value in given.items() if not name.startswith(OF_EVERY_NODE)}
-
-
-def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Parameter names as ROS spells them: `train: {mass_kg: 1}` is `train.mass_kg`."""
-    flat: dict[str, Any] = {}
-    for name, value in values.items():
-        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
-    return flat

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, NamedTuple
 
@@ -39,15 +39,20 @@ class Setup(NamedTuple):
     """The frame_id that sensor messages must have."""
 
 
+def check_names(values: Mapping[str, Any], settings: Sequence[Setting]) -> None:
+    """Raise ValueError naming the first value that is of no setting."""
+    names = {setting.name for setting in settings}
+    for name, value in values.items():
+        if name not in names:
+            raise ValueError(f"setting {name} = {value!r}: there is none; choose of {', '.join(sorted(names))}")
+
+
 def setup_of(values: Mapping[str, Any]) -> Setup:
     """Build the set-up from values by setting name; what is not named keeps its default.
 
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
-    names = {setting.name for setting in SETTINGS}
-    for name in values:
-        if name not in names:
-            raise ValueError(f"setting {name} = {values[name]!r}: there is none; choose of {', '.join(sorted(names))}")
+    check_names(values, SETTINGS)
     for setting in (SEED, FRAME_ID, TRACK):
         check_value(setting.name, values.get(setting.name, setting.default), type(setting.default), setting._asdict())
     train = Train(**{name.removeprefix("train."): value for name, value in values.items() if name.startswith("train.")})
@@ -60,16 +65,16 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     return Setup(config, values.get(SEED.name, SEED.default), values.get(FRAME_ID.name, FRAME_ID.default))
 
 
-def parse_setting(text: str) -> tuple[str, bool | int | float | str]:
-    """Split "NAME=VALUE" and read the value as the setting's type. Raises ValueError naming the setting.
+def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:
+    """Split "NAME=VALUE" and read the value as the type of its setting. Raises ValueError naming the setting.
 
     >>> parse_setting("start_mu=0.12")
     ('start_mu', 0.12)
     """
     name, separator, value = text.partition("=")
-    setting = next((setting for setting in SETTINGS if setting.name == name), None)
+    setting = next((setting for setting in settings if setting.name == name), None)
     if setting is None or not separator:
-        raise ValueError(f"setting {text!r}: write NAME=VALUE with one of {', '.join(s.name for s in SETTINGS)}")
+        raise ValueError(f"setting {text!r}: write NAME=VALUE with one of {', '.join(s.name for s in settings)}")
     kind = type(setting.default)
     try:
         return name, {"true": True, "false": False}[value.lower()] if kind is bool else kind(value)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -20,11 +19,8 @@ from rclpy.node import Node
 
 from adhesion_node import reading, topics
 from adhesion_node.core.creep import CreepEstimate
-from adhesion_node.core.creep_align import Sample
-from adhesion_node.core.creep_config import CreepConfig, CreepOutcome
-from adhesion_node.core.setting import settings_of
-from adhesion_node.creep_pipeline import CreepPipeline, Vehicle
-from adhesion_node.settings import FRAME_ID
+from adhesion_node.core.creep_config import CreepOutcome
+from adhesion_node.creep_pipeline import READERS, SETTINGS, CreepPipeline, setup_of
 
 from . import convert, qos, runtime
 from .params import declare, spec_of
@@ -32,8 +28,9 @@ from .params import declare, spec_of
 REPORT_EVERY = 10
 """The first refused message of its kind and then every tenth reach the operator."""
 
+PARAMETERS = tuple(map(spec_of, SETTINGS))
 
-PARAMETERS = tuple(map(spec_of, (FRAME_ID, *settings_of(Vehicle), *settings_of(CreepConfig))))
+INPUTS = (topics.SPEED, topics.TRACTION_FORCE, topics.WHEEL_SPEED)
 
 EXAMPLES = ("creep_estimator", "creep_estimator --ros-args -p axles:=4 -p wheel_radius_m:=0.46")
 
@@ -48,19 +45,15 @@ class CreepEstimator(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("creep_estimator", automatically_declare_parameters_from_overrides=True, **kwargs)
-        values = declare(self, PARAMETERS)
-        self._frame: str = values["frame"]
-        self._pipeline = CreepPipeline(_build(CreepConfig, values), _build(Vehicle, values))
+        setup = setup_of(declare(self, PARAMETERS))
+        self._frame = setup.frame
+        self._pipeline = CreepPipeline(setup.config, setup.vehicle)
         self._newest_ns = 0
         self.heard: Counter[topics.Topic] = Counter()
         self.published: Counter[topics.Topic] = Counter()
         self._outputs = {topic: qos.advertise(self, topic, qos.RESULT) for topic in OUTPUTS}
-        for topic, read in (
-            (topics.SPEED, reading.speed),
-            (topics.TRACTION_FORCE, reading.traction_force),
-            (topics.WHEEL_SPEED, reading.wheel_speed),
-        ):
-            qos.subscribe(self, topic, self._receiver(topic, read), qos.SENSOR_SUBSCRIPTION)
+        for topic in INPUTS:
+            qos.subscribe(self, topic, self._receiver(topic), qos.SENSOR_SUBSCRIPTION)
         self.get_logger().info(f"ready: waiting for {self.resolve_topic_name(topics.WHEEL_SPEED.name)}")
 
     @property
@@ -80,11 +73,11 @@ class CreepEstimator(Node):
             f"{self._pipeline.accepted} samples, dropped {self._pipeline.dropped or 'none'}, digest {self.digest}"
         )
 
-    def _receiver(self, topic: topics.Topic, read: Callable[[Any, str], Sample]) -> Callable[[Any], None]:
+    def _receiver(self, topic: topics.Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             self.heard[topic] += 1
             try:
-                sample = read(message, self._frame)
+                sample = READERS[topic.name](message, self._frame)
             except reading.Rejected as refusal:
                 self._refuse(topic, refusal)
             else:
@@ -134,10 +127,6 @@ def _values(pipeline: CreepPipeline) -> dict[str, str]:
     counts = {"samples": str(pipeline.accepted), "resets": str(pipeline.state.counts[CreepOutcome.RESET])}
     drops = {f"dropped.{reason}": str(count) for reason, count in pipeline.dropped.items()}
     return {**numbers, **counts, **drops, "digest": pipeline.digest}
-
-
-def _build(kind: type[Any], values: dict[str, Any]) -> Any:
-    return kind(**{item.name: values[item.name] for item in fields(kind)})
 
 
 def main(args: Sequence[str] | None = None) -> int:

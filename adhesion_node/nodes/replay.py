@@ -9,6 +9,7 @@ from functools import partial
 
 from ..bag import BagReader, parse_remap, select
 from ..cli import DONE, FAILED, help_texts, json_option, report, run_tool
+from ..topics import POSITION
 
 EXAMPLES = (
     "replay my_run --offline",
@@ -16,6 +17,9 @@ EXAMPLES = (
     "replay my_run --rate 5",
     "replay their_run --offline --remap /gnss/along_track:=position",
 )
+
+ADHESION, CREEP = "adhesion", "creep"
+"""The estimators of an offline replay."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -34,8 +38,9 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
     from . import runtime
     from .player import Replay
 
-    if options.set or options.params or options.seed is not None:
-        raise ValueError("--set, --params and --seed are for --offline: give a live estimator its own parameters")
+    if options.set or options.params or options.seed is not None or options.estimator is not None:
+        own = "--set, --params, --seed and --estimator are for --offline"
+        raise ValueError(f"{own}: start the live estimator of your choice with its own parameters")
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
         nodes: list[Replay] = []
@@ -58,10 +63,13 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
 
 
 def _offline(options: argparse.Namespace) -> int:
-    from .. import offline
+    from .. import creep_offline, offline
 
     with BagReader(options.bag) as reader:
-        return offline.run(options, reader, _selection(reader, options))
+        selection = _selection(reader, options)
+        wanted = options.estimator or (ADHESION if POSITION.name in selection.values() else CREEP)
+        run = offline.run if wanted == ADHESION else creep_offline.run
+        return run(options, reader, selection)
 
 
 def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]:
@@ -105,6 +113,11 @@ def _parser() -> argparse.ArgumentParser:
     )
     straight = parser.add_argument_group("offline").add_argument
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
+    straight(
+        "--estimator",
+        choices=(ADHESION, CREEP),
+        help="the adhesion under the brake, or the creep curve (default: by whether there is a position)",
+    )
     straight("--seed", type=int, help="seed of the estimator")
     straight("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
     straight("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
