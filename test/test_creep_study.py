@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adhesion_node.study import creep, creep_runs, engines
+from adhesion_node.study import creep, creep_models, creep_runs, engines
 from adhesion_node.study.__main__ import main
 
 KEYS = {"experiment", "peak_true", "peak_estimated_mean", "peak_estimated_std", "used_fraction"}
@@ -68,8 +68,24 @@ def test_intervals_cover_and_wrong_peaks_are_withheld(study: tuple[Path, dict[An
 
 
 def test_every_figure_is_drawn(study: tuple[Path, dict[Any, dict[str, Any]]]) -> None:
-    assert sorted(path.name for path in study[0].iterdir()) == [f"fig{number:02d}.png" for number in range(5, 12)]
+    assert sorted(path.name for path in study[0].iterdir()) == [
+        f"fig{number:02d}.png" for number in (1, 2, 3, *range(5, 12))
+    ]
     assert all(path.read_bytes().startswith(b"\x89PNG") for path in study[0].iterdir())
+
+
+def test_kienckes_curve_comes_near_burckhardts_model() -> None:
+    """The paper: peaks less than 2 % apart. Near the fit no other p1, p2 is nearer."""
+    theta, truth = creep_models.like(creep_models.DRY_ROAD), creep_models.DRY_ROAD(creep_models.CREEPS)
+
+    def distance(theta: np.ndarray) -> float:
+        slope, (p1, p2), creeps = creep_models.DRY_ROAD.slope, theta, creep_models.CREEPS
+        return float(np.sum((slope * creeps / (1.0 + p1 * creeps + p2 * creeps**2) - truth) ** 2))
+
+    others = [theta + 0.1 * step for step in (*np.eye(2), *-np.eye(2))]
+    assert distance(theta) < min(map(distance, others))
+    peak = creep_models.DRY_ROAD.slope / (theta[0] + 2.0 * theta[1] ** 0.5)
+    assert peak == pytest.approx(truth.max(), rel=0.02)
 
 
 def test_the_sensitivity_tells_samples_and_gains(monkeypatch: pytest.MonkeyPatch) -> None:

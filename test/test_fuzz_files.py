@@ -239,7 +239,7 @@ VALUES = st.one_of(
 @given(text=st.text(max_size=30) | st.builds("{}={}".format, NAMES, VALUES))
 def test_any_text_as_a_setting(text: str) -> None:
     with refusals_say_why():
-        assert isinstance(setup_of(dict([parse_setting(text)])), Setup)
+        assert isinstance(setup_of(dict([parse_setting(text, SETTINGS)])), Setup)
 
 
 @given(values=st.dictionaries(NAMES, VALUES, max_size=4))

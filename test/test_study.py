@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from adhesion_node.study import braking_figures
 from adhesion_node.study.__main__ import main
 
 PUBLISHED = {
@@ -77,6 +78,21 @@ def test_the_savings_are_those_of_the_rows(capsys: pytest.CaptureFixture[str]) -
         wet, worst = rows[start, "wet law"], rows[start, "0.0726"]
         ours = [f"{100 - 100 * wet[name] / worst[name]:.2f}" for name in ("distance_m", "time_s")]
         assert cells[3:] == [ours[0], paper[0], ours[1], paper[1]]
+
+
+def test_the_figures_of_the_brakings(tmp_path: Path) -> None:
+    assert main(["distances", "--figures", str(tmp_path / "new" / "figures")]) == 0
+    files = sorted(tmp_path.glob("new/figures/*.png"))
+    assert [int(file.name[3:5]) for file in files] == [2, 3, 10, 11, 12, 13, 20, 21]
+    assert all(file.stat().st_size > 10_000 for file in files)
+
+
+@pytest.mark.parametrize("scene", braking_figures.SCENES)
+def test_the_rail_drops_as_the_paper_says(scene: braking_figures.Scene) -> None:
+    speeds, adhesion = braking_figures.rail(scene)
+    assert (speeds[0], speeds[1], speeds[-1]) == (scene.from_kmh, scene.from_kmh, scene.to_kmh)
+    printed = {300: [0.1432, 0.0726, 0.1023], 250: [0.1514, 0.0770, 0.1206]}
+    assert adhesion[[0, 1, -1]] == pytest.approx(printed[round(scene.from_kmh)], abs=6e-5)
 
 
 @pytest.mark.parametrize("args", [["--help"], ["distances", "--help"]])

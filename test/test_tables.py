@@ -18,7 +18,7 @@ from adhesion_node.study.__main__ import main
 from adhesion_node.study.accuracy import Curve, converged_kmh, errors, figures, over_speed
 from adhesion_node.study.methods import METHODS, STARTS, Lane
 from adhesion_node.study.montecarlo import Chunk, Result, chunks, result_of, results
-from adhesion_node.study.published import START_OF_MEAN, TABLES
+from adhesion_node.study.published import SAVINGS, START_OF_MEAN, TABLES
 from adhesion_node.study.running import Running
 from adhesion_node.study.runs import ROW, rows_of, simulate
 from adhesion_node.study.tables import Cell, rows
@@ -187,8 +187,8 @@ def test_methods_start_where_they_are_told() -> None:
 def test_savings_beside_the_papers() -> None:
     found = distances.savings(distances.rows())
     assert [saving[:2] for saving in found] == [(300, 100), (250, 50)]
-    for ours, paper in zip(found, distances.PUBLISHED_SAVINGS, strict=True):
+    for ours, paper in zip(found, SAVINGS, strict=True):
         assert ours.distance_percent == pytest.approx(paper.distance_percent, abs=4.0)
         assert ours.time_percent == pytest.approx(paper.time_percent, abs=4.0)
     printed = [100 * (1 - 3481.1 / 3946.7), 100 * (1 - 2614.4 / 2958.9)]
-    assert printed == pytest.approx([saving.distance_percent for saving in distances.PUBLISHED_SAVINGS], abs=0.01)
+    assert printed == pytest.approx([saving.distance_percent for saving in SAVINGS], abs=0.01)

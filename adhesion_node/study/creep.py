@@ -48,7 +48,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Give the study its options."""
     parser.add_argument("--runs", type=int, default=RUNS, metavar="N", help=f"seeds per experiment (default {RUNS})")
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"first seed (default {SEED})")
-    parser.add_argument("--figures", metavar="DIR", help="draw the counterparts of the paper's Figs. 5-11 into DIR")
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 1-3 and 5-11 into DIR")
     parser.add_argument("--sensitivity", action="store_true", help="also other numbers of samples and other gains")
     add_running_options(parser)
 
@@ -68,9 +68,10 @@ def run(options: argparse.Namespace) -> int:
     rows[0] |= {"dfp_difference": difference, "coverage95": covered, "withholding": withheld}
     noise = [row for rows_of_std in noises for row in rows_of_std]
     if options.figures:
-        from .creep_figures import draw
+        from . import creep_figures, creep_models
 
-        draw(thetas, Path(options.figures))
+        creep_figures.draw(thetas, options.figures)
+        creep_models.draw(options.figures)
     report(options.json, rows + noise, text(rows, noise, covered, withheld, difference))
     return DONE
 

@@ -7,12 +7,11 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from ..core.train import Array
 from ..report.picture import BLACK, BLUE, GREY, ORANGE
 from .creep_runs import BAND, DRY, DRY_PEAK, ENOUGH, WET, WET_PEAK, peaks, rise, swings
+from .drawing import picture
 
 POINTS = 1500
 """Points of a curve at most."""
@@ -44,10 +43,9 @@ def draw(thetas: Mapping[str, Array], folder: Path) -> None:
     """Draw fig05.png to fig11.png into `folder`, made when missing; thetas (samples, runs, 2) by experiment."""
     folder.mkdir(parents=True, exist_ok=True)
     for panel in PANELS:
-        figure = Figure(figsize=(7, 4.2), layout="constrained")
-        FigureCanvasAgg(figure)
-        _draw_panel(figure.subplots(), panel, _values(thetas[panel.experiment], panel.quantity))
-        figure.savefig(folder / f"fig{panel.number:02d}.png", dpi=120)
+        title = f"Fig. {panel.number}: {panel.quantity}, {panel.title}"
+        with picture(folder / f"fig{panel.number:02d}.png", title) as axis:
+            _draw_panel(axis, panel, _values(thetas[panel.experiment], panel.quantity))
 
 
 def _values(theta: Array, quantity: str) -> Array:
@@ -76,8 +74,6 @@ def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
     axis.set_xlim(places[0], places[-1])
     axis.set_xlabel("creep" if len(panel.truths) == 1 else "samples on a surface, each from 0 to 1")
     axis.set_ylabel(panel.quantity)
-    axis.set_title(f"Fig. {panel.number}: {panel.quantity}, {panel.title}", fontsize="medium")
-    axis.grid(alpha=0.3)
     axis.legend(loc="upper right", fontsize="small")
 
 

@@ -7,18 +7,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from ..core.train import KMH
+from .drawing import STYLES, panels
 from .methods import STARTS
 
 if TYPE_CHECKING:
     from .tables import Cell
-
-STYLES = (("0.0", "-"), ("#0b5fa5", "--"), ("#c75b00", "-."), ("0.45", ":"), ("#5b8c2a", (0, (5, 1, 1, 1, 1, 1))))
-"""Colour and dashes of each start: told apart without the colour."""
 
 FIRST_FIGURES = {"tunnel_entry": {"particle_em": 4, "ekf": 7}, "tunnel_exit": {"particle_em": 14, "ekf": 17}}
 """Number of the first of three figures in the paper."""
@@ -51,16 +47,12 @@ def draw_all(cells: Sequence[Cell], folder: Path) -> None:
 
 
 def _draw(cells: Sequence[Cell], quantity: Quantity, path: Path, title: str) -> None:
-    figure = Figure(figsize=(8, 4 * len(cells) + 0.5), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(title)
-    for axis, cell in zip(figure.subplots(len(cells), squeeze=False)[:, 0], cells, strict=True):
-        _draw_cell(axis, cell, quantity)
-        axis.set(title=cell.method, xlabel="speed, km/h", ylabel=quantity.label)
-        axis.invert_xaxis()
-        axis.grid(alpha=0.3)
-        axis.legend(loc="best", fontsize="small", ncols=2)
-    figure.savefig(path, dpi=110)
+    with panels(path, title, len(cells)) as axes:
+        for axis, cell in zip(axes, cells, strict=True):
+            _draw_cell(axis, cell, quantity)
+            axis.set(title=cell.method, xlabel="speed, km/h", ylabel=quantity.label)
+            axis.invert_xaxis()
+            axis.legend(loc="best", fontsize="small", ncols=2)
 
 
 def _draw_cell(axis: Any, cell: Cell, quantity: Quantity) -> None:

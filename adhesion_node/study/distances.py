@@ -4,45 +4,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from pathlib import Path
+from typing import Any
 
 from ..cli import DONE, report
 from ..core import braking
-from ..core.adhesion import WET, AdhesionLaw
 from ..core.train import CRH3, KMH
 from . import identified
 from .montecarlo import chunks, results
+from .published import BRAKINGS, SAVINGS, Saving
 from .running import Running, add_running_options, running
-
-
-class Published(NamedTuple):
-    """A braking of the paper: speeds in km/h, distance in m and time in s as printed with Figs. 10, 11, 20, 21."""
-
-    from_kmh: float
-    to_kmh: float
-    case: str
-    mu: float | AdhesionLaw
-    distance_m: float
-    time_s: float
-
-
-BEST, WORST = 0.1542, 0.0726
-"""Adhesion of a wet rail at 0 and at 300 km/h: the constants between which the paper compares."""
-
-PUBLISHED = (
-    Published(300, 100, "0.1542", BEST, 3060.7, 56.1),
-    Published(300, 100, "0.0726", WORST, 3946.7, 71.7),
-    Published(300, 100, "wet law", WET, 3481.1, 62.8),
-    Published(250, 50, "0.1542", BEST, 2404.3, 59.3),
-    Published(250, 50, "0.0726", WORST, 2958.9, 72.7),
-    Published(250, 50, "wet law", WET, 2614.4, 62.7),
-)
 
 
 def rows() -> list[dict[str, Any]]:
     """Our distances and times beside the published ones, a row per braking."""
     table = []
-    for case in PUBLISHED:
+    for case in BRAKINGS:
         ours = braking.curve(CRH3, case.from_kmh * KMH, case.mu, case.to_kmh * KMH)
         distance, time = float(ours.distance_m[-1]), float(ours.time_s[-1])
         table.append(
@@ -61,23 +38,11 @@ def rows() -> list[dict[str, Any]]:
     return table
 
 
-class Saving(NamedTuple):
-    """A headline of the paper: how much shorter the wet law's braking is than that by the fixed worst case, in %."""
-
-    from_kmh: float
-    to_kmh: float
-    distance_percent: float
-    time_percent: float
-
-
-PUBLISHED_SAVINGS = (Saving(300, 100, 11.80, 12.41), Saving(250, 50, 11.64, 13.76))
-
-
 def savings(table: Sequence[Mapping[str, Any]]) -> list[Saving]:
     """The same of our `rows`."""
     by_case = {(row["from_kmh"], row["to_kmh"], row["case"]): row for row in table}
     found = []
-    for published in PUBLISHED_SAVINGS:
+    for published in SAVINGS:
         wet, worst = (by_case[*published[:2], case] for case in ("wet law", "0.0726"))
         shares = (100.0 * (1.0 - wet[name] / worst[name]) for name in ("distance_m", "time_s"))
         found.append(Saving(*published[:2], *shares))
@@ -90,6 +55,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--runs", type=int, default=0, help="also by the adhesion identified in so many Monte-Carlo runs (default: 0)"
     )
     add_running_options(parser)
+    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 2, 3, 10-13, 20 and 21 into DIR")
 
 
 def by_identified(runs: int, where: Running) -> list[dict[str, Any]]:
@@ -114,9 +80,13 @@ def run(options: argparse.Namespace) -> int:
     lines += [
         f"{ours.from_kmh:>5g} -> {ours.to_kmh:>3g} {ours.distance_percent:35.2f} {paper.distance_percent:6.2f} "
         f"{ours.time_percent:6.2f} {paper.time_percent:6.2f}"
-        for ours, paper in zip(savings(table), PUBLISHED_SAVINGS, strict=True)
+        for ours, paper in zip(savings(table), SAVINGS, strict=True)
     ]
     found = by_identified(options.runs, running(options)) if options.runs else []
     lines += [line for row in found for line in identified.lines(row)]
+    if options.figures:
+        from .braking_figures import draw_all
+
+        draw_all(options.figures)
     report(options.json, table + found, "\n".join(lines))
     return DONE

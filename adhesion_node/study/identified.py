@@ -14,11 +14,10 @@ from ..core.train import CRH3, KMH, Array
 from ..score import CONVERGED_AFTER_MPS
 from .methods import STARTS
 from .montecarlo import Result
+from .published import WORST
 
 BRAKINGS = {"tunnel_entry": (300.0, 100.0), "tunnel_exit": (250.0, 50.0)}
 """Speeds of the scenarios, km/h."""
-
-WORST = 0.0726
 
 
 def law_of(rows: NDArray[np.void], from_mps: float) -> tuple[Array, Array]:

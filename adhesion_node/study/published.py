@@ -1,10 +1,12 @@
-"""Tables 2 and 3 of Xie et al. 2019 as printed."""
+"""What Xie et al. 2019 print: Tables 2 and 3, braking distances and times, and what they save."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import NamedTuple
+
+from ..core.adhesion import WET, AdhesionLaw
 
 
 class Printed(NamedTuple):
@@ -44,3 +46,39 @@ TABLES: Mapping[str, Mapping[float | str, Printed]] = MappingProxyType(
     }
 )
 """By scenario and start."""
+
+
+class Braking(NamedTuple):
+    """A braking of the paper: speeds in km/h, distance in m and time in s as printed with Figs. 10, 11, 20, 21."""
+
+    from_kmh: float
+    to_kmh: float
+    case: str
+    mu: float | AdhesionLaw
+    distance_m: float
+    time_s: float
+
+
+BEST, WORST = 0.1542, 0.0726
+"""Adhesion of a wet rail at 0 and at 300 km/h: the constants between which the paper compares."""
+
+BRAKINGS = (
+    Braking(300, 100, "0.1542", BEST, 3060.7, 56.1),
+    Braking(300, 100, "0.0726", WORST, 3946.7, 71.7),
+    Braking(300, 100, "wet law", WET, 3481.1, 62.8),
+    Braking(250, 50, "0.1542", BEST, 2404.3, 59.3),
+    Braking(250, 50, "0.0726", WORST, 2958.9, 72.7),
+    Braking(250, 50, "wet law", WET, 2614.4, 62.7),
+)
+
+
+class Saving(NamedTuple):
+    """A headline of the paper: how much shorter the wet law's braking is than that by the fixed worst case, in %."""
+
+    from_kmh: float
+    to_kmh: float
+    distance_percent: float
+    time_percent: float
+
+
+SAVINGS = (Saving(300, 100, 11.80, 12.41), Saving(250, 50, 11.64, 13.76))
