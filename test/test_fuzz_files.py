@@ -19,12 +19,11 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from adhesion_node import csv_rows, import_csv, recover
+from adhesion_node import csv_rows, import_csv, parameter_file, recover
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record, sensors
 from adhesion_node.bag.writer import file_name
 from adhesion_node.core.measurement import MAX_POSITION_M
 from adhesion_node.csv_rows import Format, Refusal, Row
-from adhesion_node.parameter_file import read
 from adhesion_node.settings import SETTINGS, Setup, parse_setting, setup_of
 from adhesion_node.topics import BRAKE_PRESSURE, POSITION
 
@@ -256,7 +255,7 @@ def parameters_in(content: bytes) -> dict[str, Any] | None:
         path = Path(folder, "params.yaml")
         path.write_bytes(content)
         with refusals_say_why():
-            values = read(str(path), "estimator")
+            values = parameter_file.read(str(path), "estimator")
             setup_of(values)
             return values
     return None

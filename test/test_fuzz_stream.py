@@ -25,8 +25,9 @@ from adhesion_node import reading
 from adhesion_node.core import Config, Measurement, Outcome, align, step
 from adhesion_node.core.align import PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.braking import BrakingCurve
-from adhesion_node.core.braking_window import BrakingWindow, Evaluation, evaluate
+from adhesion_node.core.braking_window import BrakingWindow
 from adhesion_node.core.em import Search
+from adhesion_node.core.paper import Evaluation, evaluate
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.pipeline import Pipeline
 from adhesion_node.reading import MAX_ABSOLUTE_PA, Reason, Rejected
@@ -259,7 +260,7 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
 
     monkeypatch.setattr(pipeline_module, "step", partial(step, evaluate=counted))
     monkeypatch.setattr(align, "MOST", 500)
-    pipeline = Pipeline(Config(iterations=1, particles=2, window=30, step=20), 1)
+    pipeline = Pipeline(Config(method="particle_em", iterations=1, particles=2, window=30, step=20), 1)
     rng = np.random.default_rng(1)
     sizes = []
     for number in range(6_000):

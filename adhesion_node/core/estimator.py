@@ -74,6 +74,8 @@ def step(
     if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
         state, estimates = _take_all(config, replace(state, pending=()), state.pending, evaluate)
         state = _reset(state)
+    if any(waiting.t_ns == measurement.t_ns for waiting in state.pending):
+        return _counted(state, Outcome.DUPLICATE), None
     pending = list(state.pending)
     insort(pending, measurement, key=lambda waiting: waiting.t_ns)
     due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)

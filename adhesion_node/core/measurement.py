@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 MAX_POSITION_M = 1e7
 MAX_SPEED_MPS = 200.0
+MAX_PRESSURE_PA = 1e7
 MIN_VARIANCE_M2, MAX_VARIANCE_M2 = 1e-12, 1e8
 """From (1 um)^2 to (10 km)^2: beyond them arithmetic suffers and no sensor exists."""
 
@@ -30,6 +31,6 @@ class Measurement(NamedTuple):
             math.isfinite(self.position_m)
             and abs(self.position_m) <= MAX_POSITION_M
             and MIN_VARIANCE_M2 <= self.variance_m2 <= MAX_VARIANCE_M2
-            and (pressure is None or math.isfinite(pressure))
+            and (pressure is None or abs(pressure) <= MAX_PRESSURE_PA)
             and (speed is None or (math.isfinite(speed) and abs(speed) <= MAX_SPEED_MPS))
         )

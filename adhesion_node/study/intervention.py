@@ -26,7 +26,8 @@ from ..core.train import CRH3, GRAVITY, KMH
 from ..pipeline import Pipeline
 from ..score import Truth
 from . import intervention_figure
-from .identified import BRAKINGS, WORST
+from .identified import BRAKINGS
+from .published import WORST
 
 SPEEDS_KMH = {"tunnel_entry": (280, 250, 200, 150), "tunnel_exit": (230, 200, 150, 100)}
 """Speeds at which the limits are looked at."""
