@@ -16,7 +16,7 @@ import pytest
 from oracles import Linear, make_window, rts
 
 from adhesion_node.bench import __main__ as bench
-from adhesion_node.bench import particle, scene, step
+from adhesion_node.bench import gaussian, particle, scene, step
 from adhesion_node.bench.timing import Contender, figures, interleave
 from adhesion_node.core.gaussian import Gaussian
 
@@ -115,6 +115,20 @@ def test_particle_comparison_has_a_row_per_smoother() -> None:
         assert row["ratio"] == pytest.approx(row["median_ms"] / rows[0]["median_ms"])
         assert row["mu"] == pytest.approx(scene.MU, abs=0.02)
         assert row["differs_mps"] < 0.2
+
+
+def test_gaussian_comparison_ends_everywhere_in_the_same_adhesion() -> None:
+    peer("filterpy")
+    rows = {row["method"]: row for row in gaussian.compare(steps=30, rounds=2, seed=1)}
+    assert list(rows) == [gaussian.OURS, gaussian.PASS, gaussian.FIFTY, gaussian.CONVERGED]
+    assert [row["calls"] for row in rows.values()] == [2, 2, 2, 1]
+    assert rows[gaussian.OURS]["mu_differs"] == 0.0
+    assert rows[gaussian.PASS]["iterations"] == 1
+    converged = rows[gaussian.CONVERGED]
+    assert 50 < converged["iterations"] < gaussian.MOST_ITERATIONS
+    assert converged["mu_differs"] < 1e-5
+    assert converged["speed_differs_mps"] < 1e-3
+    assert converged["ratio"] == pytest.approx(converged["median_ms"] / rows[gaussian.OURS]["median_ms"])
 
 
 @pytest.mark.usefixtures("few_windows")
