@@ -1,4 +1,4 @@
-"""`bench`: speed, ours beside its peers in one run; prints versions and settings with the times."""
+"""`bench`: speed, ours beside its peers in one run."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
 
-from ..cli import DONE, json_option, report, run_tool
+from ..cli import DONE, help_texts, json_option, report, run_tool
 from . import gaussian, particle, step
+
+PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
 
 PEERS = ("filterpy", "particles", "threadpoolctl")
 """Of the extra `bench`."""
@@ -57,7 +59,8 @@ BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], st
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the benchmarks and print their tables."""
-    parser = argparse.ArgumentParser("bench", description=__doc__, parents=[json_option()])
+    texts = help_texts(PURPOSE, "bench", "bench particle gaussian --rounds 20", "bench step memory --json -")
+    parser = argparse.ArgumentParser("bench", parents=[json_option()], **texts)
     parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
     parser.add_argument("--rounds", type=int, default=50, help="calls of each contender (default %(default)s)")
     parser.add_argument("--journeys", type=int, default=5, help="brakings for the latency (default %(default)s)")
