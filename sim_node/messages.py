@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from builtin_interfaces.msg import Time
-from geometry_msgs.msg import PoseWithCovarianceStamped, TwistWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, TwistWithCovarianceStamped, WrenchStamped
 from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from sensor_msgs.msg import FluidPressure
+from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Header
 
 from adhesion_node.topics import FRAME
@@ -46,6 +48,19 @@ def speed(t_ns: int, speed_mps: float, std_mps: float) -> TwistWithCovarianceSta
     message = TwistWithCovarianceStamped(header=_header(t_ns))
     message.twist.twist.linear.x = speed_mps
     message.twist.covariance[0] = std_mps**2
+    return message
+
+
+def wheel_speed(t_ns: int, speeds_radps: Sequence[float]) -> JointState:
+    """Angular speeds of the axles or axle groups, axle_1 first."""
+    names = [f"axle_{number}" for number in range(1, len(speeds_radps) + 1)]
+    return JointState(header=_header(t_ns), name=names, velocity=speeds_radps)
+
+
+def traction_force(t_ns: int, force_n: float) -> WrenchStamped:
+    """Traction force of all driven axles at the rim."""
+    message = WrenchStamped(header=_header(t_ns))
+    message.wrench.force.x = force_n
     return message
 
 

@@ -1,6 +1,7 @@
 """The simulator: publishes a scenario's sensors, its truth and /clock.
 
-    position, brake_pressure, speed     measurements, one stamp per sample
+    position, brake_pressure            measurements, one stamp per sample
+    speed, wheel_speed                  more of them, where their noise is above 0
     truth/state, truth/mu               the true train
     /clock                              time of the sample
 
@@ -53,6 +54,14 @@ PARAMETERS = (
     Spec("dropout_fraction", _NOISE.dropout_fraction, "fraction of positions that are missing", "", 0.0, 1.0),
     Spec("pressure_std_pa", _NOISE.pressure_std_pa, "noise of the brake pressure", "Pa", 0.0, 1e5),
     Spec("speed_std_mps", _NOISE.speed_std_mps, "noise of the speed; 0 = no odometer", "m/s", 0.0, 10.0),
+    Spec(
+        "wheel_speed_std_radps",
+        _NOISE.wheel_speed_std_radps,
+        "noise of the wheel speeds; 0 = no wheel-speed sensors",
+        "rad/s",
+        0.0,
+        10.0,
+    ),
 )
 
 EXAMPLES = (
@@ -96,6 +105,8 @@ class Simulator(Node):
         self._pressure_out = advertise(self, topics.BRAKE_PRESSURE, SENSOR_PUBLISHER)
         has_odometer = self._settings.speed_std_mps > 0
         self._speed_out = advertise(self, topics.SPEED, SENSOR_PUBLISHER) if has_odometer else None
+        has_wheels = self._settings.wheel_speed_std_radps > 0
+        self._wheels_out = advertise(self, topics.WHEEL_SPEED, SENSOR_PUBLISHER) if has_wheels else None
         self._position_out = advertise(self, topics.POSITION, SENSOR_PUBLISHER)
         if paced and self._wait_for:
             _log(self, f"waiting for {self._wait_for} subscriber(s) to {topics.POSITION.name}")
@@ -124,6 +135,8 @@ class Simulator(Node):
         self._pressure_out.publish(messages.brake_pressure(t_ns, reading.pressure_pa, noise.pressure_std_pa))
         if self._speed_out is not None and reading.speed_mps is not None:
             self._speed_out.publish(messages.speed(t_ns, reading.speed_mps, noise.speed_std_mps))
+        if self._wheels_out is not None and reading.wheel_radps is not None:
+            self._wheels_out.publish(messages.wheel_speed(t_ns, reading.wheel_radps))
         if reading.position_m is not None:
             self._position_out.publish(messages.position(t_ns, reading.position_m, noise.position_std_m))
 

@@ -9,6 +9,7 @@ import numpy as np
 from .plant import NOMINAL_NOISE, PlantNoise, Truth, simulate
 from .scenario import Scenario
 from .sensors import Reading, SensorSettings, measure
+from .wheels import wheel_speeds
 
 
 def run(
@@ -20,10 +21,17 @@ def run(
 ) -> Iterator[tuple[Truth, Reading]]:
     """Yield the truth and the reading of every sample; the node publishes exactly these.
 
-    The plant and the sensors draw from separate streams of `seed` (at least 0), so that the true run does not
-    depend on the sensors' settings. Raises ValueError as `simulate`.
+    The plant, the sensors and the wheels draw from separate streams of `seed` (at least 0), so that the true run does
+    not depend on the sensors' settings. Raises ValueError as `simulate`.
     """
-    plant_rng, sensor_rng = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(2))
-    nominal = settings or SensorSettings()
-    truths = simulate(scenario, period_s, plant_rng, noise)
-    return ((truth, measure(truth, nominal, sensor_rng)) for truth in truths)
+    plant_rng, sensor_rng, wheel_rng = (np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3))
+    used = settings or SensorSettings()
+    wheel_std, radius_m = used.wheel_speed_std_radps, scenario.train.wheel_radius_m
+
+    def read(truth: Truth) -> Reading:
+        reading = measure(truth, used, sensor_rng)
+        if not wheel_std:
+            return reading
+        return reading._replace(wheel_radps=wheel_speeds(truth, radius_m, wheel_std, wheel_rng))
+
+    return ((truth, read(truth)) for truth in simulate(scenario, period_s, plant_rng, noise))

@@ -11,8 +11,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from adhesion_node.core.adhesion import DRY, WET, SpeedLaw
-from adhesion_node.core.track import LEVEL, Track, Tunnel
+from adhesion_node.core.adhesion import DRY, SNOW, WET, SpeedLaw
+from adhesion_node.core.track import LEVEL, Grade, Track, Tunnel
 from adhesion_node.core.train import CRH3, KMH, Train
 
 RUN_ON_S = 2.0
@@ -179,8 +179,39 @@ def _low_adhesion_patch() -> Scenario:
     )
 
 
+def _open_line(
+    name: str, law: SpeedLaw, *, track: Track = LEVEL, train: Train = CRH3, end_s: float = 200.0
+) -> Scenario:
+    """From 300 to 100 km/h on one rail; what differs from `LEVEL` and `CRH3` is unknown to an estimator."""
+    return Scenario(
+        name=name,
+        speed_mps=300 * KMH,
+        rail=Rail(((0.0, law),)),
+        track=track,
+        train=train,
+        brake=Brake(CRUISE_S),
+        end_speed_mps=100 * KMH,
+        end_s=end_s,
+    )
+
+
+_OPEN_LINE = (
+    _open_line("constant_adhesion", SpeedLaw(0.07)),
+    _open_line("snow", SNOW),
+    _open_line("scaled_wet", replace(WET, scale=0.8)),
+    # Worn or glazed pads: 60 % of the force that the pressure promises, less than the wet rail takes at any speed.
+    _open_line("weak_brake", WET, train=replace(CRH3, pad_friction=0.6 * CRH3.pad_friction)),
+    _open_line("grade_unknown", WET, track=Track((Grade(0.0, 20e3, -100.0),))),
+    _open_line("overweight", WET, train=replace(CRH3, mass_kg=1.1 * CRH3.mass_kg)),
+    # A quarter of the wet adhesion: for more than three minutes nothing changes, and no change may be reported.
+    _open_line("long_braking", replace(WET, scale=0.25), end_s=400.0),
+)
+
 SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
-    {s.name: s for s in (_tunnel_entry(), _tunnel_exit(), _cruise(), _dry_braking(), _low_adhesion_patch())}
+    {
+        s.name: s
+        for s in (_tunnel_entry(), _tunnel_exit(), _cruise(), _dry_braking(), _low_adhesion_patch(), *_OPEN_LINE)
+    }
 )
 """The scenarios by name."""
 

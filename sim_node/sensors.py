@@ -1,4 +1,7 @@
-"""The sensors: position with Gaussian or heavy-tailed noise, outliers and dropouts; brake pressure; odometer."""
+"""The sensors: position with Gaussian or heavy-tailed noise, outliers and dropouts; brake pressure; odometer.
+
+The wheel-speed sensors have a file of their own, `wheels`.
+"""
 
 from __future__ import annotations
 
@@ -30,6 +33,8 @@ class SensorSettings:
     pressure_std_pa: float = 0.0
     speed_std_mps: float = 0.0
     """0 = the train has no odometer."""
+    wheel_speed_std_radps: float = 0.0
+    """0 = the train has no wheel-speed sensors."""
 
     def __post_init__(self) -> None:
         for name in (field.name for field in fields(self)):
@@ -53,10 +58,12 @@ class Reading(NamedTuple):
     pressure_pa: float
     """Absolute."""
     speed_mps: float | None
+    wheel_radps: tuple[float, ...] | None = None
+    """Angular speed of each axle group."""
 
 
 def measure(truth: Truth, settings: SensorSettings, rng: np.random.Generator) -> Reading:
-    """Measure one true sample.
+    """Measure one true sample, the wheels apart.
 
     Every call draws the same basic numbers, whatever the settings: outliers, dropouts and an odometer come on top
     of an otherwise equal run.

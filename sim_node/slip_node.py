@@ -13,16 +13,14 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
-from geometry_msgs.msg import WrenchStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.timer import Timer
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from adhesion_node import topics
-from adhesion_node.nodes import convert, runtime
+from adhesion_node.nodes import runtime
 from adhesion_node.nodes.params import Spec, declare
 from adhesion_node.nodes.qos import SENSOR_PUBLISHER, advertise
 
@@ -92,8 +90,8 @@ class SlipSimulator(Node):
             (topics.CLOCK, messages.clock(t_ns)),
             (topics.TRUTH_MU, Float64(data=truth.mu_max)),
             (topics.SPEED, messages.speed(t_ns, reading.speed_mps, self._noise.speed_std_mps)),
-            (topics.TRACTION_FORCE, traction_force(t_ns, reading.force_n)),
-            (topics.WHEEL_SPEED, wheel_speed(t_ns, reading.wheel_radps)),
+            (topics.TRACTION_FORCE, messages.traction_force(t_ns, reading.force_n)),
+            (topics.WHEEL_SPEED, messages.wheel_speed(t_ns, reading.wheel_radps)),
         ):
             self._outputs[topic].publish(message)
         self._published += 1
@@ -123,19 +121,6 @@ class SlipSimulator(Node):
         if self._timer is not None and not self._timer.is_canceled():
             self._timer.cancel()
             self.get_logger().info(f"scenario {self._scenario.name}: ended after {self._published} samples")
-
-
-def wheel_speed(t_ns: int, speeds_radps: tuple[float, ...]) -> JointState:
-    """Angular speeds of the driven axles, axle_1 first."""
-    names = [f"axle_{number}" for number in range(1, len(speeds_radps) + 1)]
-    return JointState(header=convert.header(t_ns), name=names, velocity=speeds_radps)
-
-
-def traction_force(t_ns: int, force_n: float) -> WrenchStamped:
-    """Traction force of all driven axles at the rim."""
-    message = WrenchStamped(header=convert.header(t_ns))
-    message.wrench.force.x = force_n
-    return message
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -23,7 +23,7 @@ from adhesion_node.creep_pipeline import CreepPipeline, Vehicle
 from adhesion_node.nodes import qos
 from adhesion_node.nodes.creep_estimator import OUTPUTS, PARAMETERS, CreepEstimator
 from sim_node import messages, slip
-from sim_node.slip_node import traction_force, wheel_speed
+from sim_node.messages import traction_force, wheel_speed
 from sim_node.slip_scenario import DRY, WET, SlipScenario, find
 
 INPUTS = (topics.SPEED, *topics.CREEP_SENSORS)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from adhesion_node.core.adhesion import DRY, WET
-from adhesion_node.core.track import Tunnel
-from adhesion_node.core.train import GRAVITY, KMH
+from adhesion_node.core.track import LEVEL, Tunnel
+from adhesion_node.core.train import CRH3, GRAVITY, KMH
+from sim_node.plant import NO_NOISE, advance, simulate
 from sim_node.scenario import CRUISE_S, SCENARIOS, Brake, Rail, Scenario, braking_place, find
 
-NAMES = ("tunnel_entry", "tunnel_exit", "cruise", "dry_braking", "low_adhesion_patch")
+OPEN_LINE = (*("constant_adhesion", "snow", "scaled_wet", "weak_brake", "grade_unknown", "overweight", "long_braking"),)
+NAMES = ("tunnel_entry", "tunnel_exit", "cruise", "dry_braking", "low_adhesion_patch", *OPEN_LINE)
 
 
 def test_every_scenario_is_found_by_its_name() -> None:
@@ -21,7 +25,7 @@ def test_every_scenario_is_found_by_its_name() -> None:
 
 
 def test_an_unknown_scenario_is_named_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"scenario = 'tunel': give one of tunnel_entry, .*low_adhesion_patch"):
+    with pytest.raises(ValueError, match=r"scenario = 'tunel': give one of tunnel_entry, .*low_adhesion_patch, .*"):
         find("tunel")
 
 
@@ -65,6 +69,57 @@ def test_patch_is_a_kilometre_of_0_45_wet() -> None:
     wet = 0.04 + 13.7 / 320
     seen = [scenario.rail.mu(start + at, speed) / wet for at in (-1.0, 0.0, 999.0, 1000.0)]
     assert seen == pytest.approx([1.0, 0.45, 0.45, 1.0])
+
+
+@pytest.mark.parametrize("name", OPEN_LINE)
+def test_open_line_scenarios_brake_from_300_to_100_km_h(name: str) -> None:
+    truths = list(simulate(find(name), 0.1, np.random.default_rng(0), NO_NOISE))
+    assert truths[0].speed_mps == pytest.approx(300 * KMH)
+    assert truths[-1].speed_mps < 100 * KMH
+    assert {truth.regime for truth in truths if truth.t_ns < CRUISE_S * 1e9} == {"COASTING"}
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("constant_adhesion", lambda kmh: 0.07),
+        ("snow", lambda kmh: 0.03 + 8 / (130 + kmh)),
+        ("scaled_wet", lambda kmh: 0.8 * (0.04 + 13.7 / (120 + kmh))),
+    ],
+)
+def test_rail_of_the_open_line(name: str, law: Callable[[float], float]) -> None:
+    speeds = (300.0, 200.0, 100.0)
+    assert [find(name).rail.mu(5e3, kmh * KMH) for kmh in speeds] == pytest.approx([law(kmh) for kmh in speeds])
+
+
+def _slowing(scenario: Scenario, speed_mps: float) -> float:
+    """Deceleration of the braking train, by the plant's own steps."""
+    time_s, step_s = CRUISE_S + 5.0, 0.01
+    return (speed_mps - advance(scenario, time_s, step_s, 3000.0, speed_mps)[1]) / step_s
+
+
+def test_weak_brake_limits_although_its_pressure_would_not() -> None:
+    scenario = find("weak_brake")
+    promised = CRH3.specific_brake(scenario.brake.pressure_pa)
+    assert promised > scenario.rail.mu(0.0, 300 * KMH)
+    used = _slowing(scenario, 300 * KMH) / GRAVITY - 68602 / (CRH3.mass_kg * GRAVITY)
+    assert used == pytest.approx(0.6 * promised, rel=1e-3)
+
+
+def test_unknown_grade_takes_5_per_mille_off_the_braking() -> None:
+    level = replace(find("grade_unknown"), track=LEVEL)
+    assert _slowing(level, 80.0) - _slowing(find("grade_unknown"), 80.0) == pytest.approx(0.005 * GRAVITY, rel=1e-3)
+
+
+def test_overweight_train_has_the_same_brakes() -> None:
+    scenario = find("overweight")
+    assert scenario.train.mass_kg == pytest.approx(1.1 * 536e3)
+    assert scenario.train.brake_force(410e3) == CRH3.brake_force(410e3)
+
+
+def test_long_braking_is_limited_by_the_adhesion_for_three_minutes() -> None:
+    truths = simulate(find("long_braking"), 0.1, np.random.default_rng(0), NO_NOISE)
+    assert sum(truth.regime == "ADHESION_LIMITED" for truth in truths) > 1800
 
 
 def test_dry_rail_always_carries_the_full_brake() -> None:

@@ -85,6 +85,7 @@ CHANGES = [
     {"dropout_fraction": 0.3},
     {"pressure_std_pa": 1e3},
     {"speed_std_mps": 0.1},
+    {"wheel_speed_std_radps": 0.1},
 ]
 
 
@@ -130,6 +131,7 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_another() -> None:
         ({"position_std_m": 0.0}, r"sensor position_std_m = 0: give a number above 0"),
         ({"position_std_m": -1.0}, r"sensor position_std_m = -1\.0"),
         ({"speed_std_mps": math.nan}, "sensor speed_std_mps = nan"),
+        ({"wheel_speed_std_radps": -0.1}, r"sensor wheel_speed_std_radps = -0\.1"),
         ({"pressure_std_pa": math.inf}, "sensor pressure_std_pa = inf"),
         ({"student_dof": 0.5}, r"sensor student_dof = 0\.5: give 0 \(Gaussian\) or at least 1"),
         ({"outlier_fraction": 1.1}, r"sensor outlier_fraction = 1\.1: give a fraction"),

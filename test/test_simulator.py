@@ -73,26 +73,31 @@ def _nanoseconds(stamp: Any) -> int:
 
 
 def test_a_sample_is_published_in_the_agreed_order(context: Context, sent: Sent) -> None:
-    simulator = _simulator(context, speed_std_mps=0.1)
+    simulator = _simulator(context, speed_std_mps=0.1, wheel_speed_std_radps=0.1)
     for _ in range(3):
         assert simulator.tick()
-    order = ["/clock", "/truth/state", "/truth/mu", "/brake_pressure", "/speed", "/position"]
+    order = ["/clock", "/truth/state", "/truth/mu", "/brake_pressure", "/speed", "/wheel_speed", "/position"]
     assert [topic for topic, _ in sent] == order * 3
     _destroy(simulator)
 
 
 def test_all_sensors_of_a_sample_share_their_stamp(context: Context, sent: Sent) -> None:
-    _drive(_simulator(context, rate_hz=4.0, start_time_s=12.5, speed_std_mps=0.1, scenario="cruise"))
+    _drive(
+        _simulator(
+            context, rate_hz=4.0, start_time_s=12.5, scenario="cruise", speed_std_mps=0.1, wheel_speed_std_radps=0.1
+        )
+    )
     lists = _by_topic(sent)
     expected = [12_500_000_000 + k * 250_000_000 for k in range(241)]
     assert [_nanoseconds(m.clock) for m in lists["/clock"]] == expected
-    for topic in ("/position", "/speed", "/brake_pressure", "/truth/state"):
+    for topic in ("/position", "/speed", "/wheel_speed", "/brake_pressure", "/truth/state"):
         assert [_nanoseconds(m.header.stamp) for m in lists[topic]] == expected
         assert {m.header.frame_id for m in lists[topic]} == {"track"}
 
 
 def test_messages_carry_the_run_and_its_variances(context: Context, sent: Sent) -> None:
     parameters: dict[str, Any] = {"position_std_m": 0.3, "pressure_std_pa": 500.0, "speed_std_mps": 0.2}
+    parameters["wheel_speed_std_radps"] = 0.1
     _drive(_simulator(context, scenario="tunnel_exit", seed=4, rate_hz=2.0, **parameters))
     lists = _by_topic(sent)
     expected = list(run(find("tunnel_exit"), 0.5, 4, SensorSettings(**parameters)))
@@ -103,6 +108,8 @@ def test_messages_carry_the_run_and_its_variances(context: Context, sent: Sent) 
     assert {m.variance for m in lists["/brake_pressure"]} == {500.0**2}
     assert [m.twist.twist.linear.x for m in lists["/speed"]] == [r.speed_mps for _, r in expected]
     assert {m.twist.covariance[0] for m in lists["/speed"]} == {0.2**2}
+    assert [tuple(m.velocity) for m in lists["/wheel_speed"]] == [r.wheel_radps for _, r in expected]
+    assert {tuple(m.name) for m in lists["/wheel_speed"]} == {("axle_1", "axle_2", "axle_3", "axle_4")}
     assert [m.data for m in lists["/truth/mu"]] == [t.mu for t, _ in expected]
     assert [m.pose.pose.position.x for m in lists["/truth/state"]] == [t.position_m for t, _ in expected]
     assert [m.twist.twist.linear.x for m in lists["/truth/state"]] == [t.speed_mps for t, _ in expected]
