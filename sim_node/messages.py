@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import PoseWithCovarianceStamped, TwistWithCovarianceStamped, WrenchStamped
@@ -11,12 +12,27 @@ from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import FluidPressure, JointState
 from std_msgs.msg import Float64, Header
 
+from adhesion_node import topics
 from adhesion_node.topics import FRAME
 
 from .plant import Truth
+from .sensor_messages import SensorMessage
 
 TRAIN_FRAME = "train"
 """Moving frame of the truth's velocity."""
+
+
+def message_of(sent: SensorMessage) -> Any:
+    """Build the message of a sensor, with all that a fault has made of it."""
+    built = _BUILDERS[sent.topic](sent.t_ns, sent.values)
+    built.header.frame_id = sent.frame
+    if sent.topic == topics.POSITION:
+        built.pose.covariance[0] = sent.variance
+    elif sent.topic == topics.SPEED:
+        built.twist.covariance[0] = sent.variance
+    elif sent.topic == topics.BRAKE_PRESSURE:
+        built.variance = sent.variance
+    return built
 
 
 def clock(t_ns: int) -> Clock:
@@ -71,6 +87,14 @@ def position(t_ns: int, position_m: float, std_m: float) -> PoseWithCovarianceSt
     message.pose.pose.orientation.w = 1.0
     message.pose.covariance[0] = std_m**2
     return message
+
+
+_BUILDERS: Mapping[topics.Topic, Callable[[int, Sequence[float]], Any]] = {
+    topics.BRAKE_PRESSURE: lambda t_ns, values: brake_pressure(t_ns, values[0], 0.0),
+    topics.SPEED: lambda t_ns, values: speed(t_ns, values[0], 0.0),
+    topics.WHEEL_SPEED: wheel_speed,
+    topics.POSITION: lambda t_ns, values: position(t_ns, values[0], 0.0),
+}
 
 
 def _header(t_ns: int) -> Header:

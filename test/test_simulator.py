@@ -19,7 +19,8 @@ from rclpy.publisher import Publisher
 
 from adhesion_node.nodes.qos import message_class
 from adhesion_node.topics import CLOCK, SENSORS, TRUTH
-from sim_node.node import MAX_BURST, Simulator, due
+from sim_node.node import Simulator
+from sim_node.pace import MAX_BURST, due
 from sim_node.run import run
 from sim_node.scenario import find
 from sim_node.sensors import SensorSettings
