@@ -6,11 +6,14 @@ import hashlib
 import struct
 from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 
 from .core import Config, Estimate, Measurement, Outcome, finish, init, step
 from .core.align import Aligner, PositionSample, Sample
 from .core.braking import BrakingCurve
 from .core.prediction import Prediction, predict
+from .guard import Guard
+from .reading import Rejected
 from .topics import POSITION
 
 
@@ -22,22 +25,50 @@ class Pipeline:
 
     def __init__(self, config: Config, seed: int) -> None:
         self.config = config
+        self._seed = seed
         self.state = init(config, seed)
         self.measurements = 0
         """Positions received, whatever became of them."""
         self.refused: Counter[str] = Counter()
         self.windows = 0
         self.last: Estimate | None = None
-        self._aligner = Aligner(config.pressure_wait_s, config.pressure_age_s)
+        self.refusal: Rejected | None = None
+        """Why the sample that came last was not used."""
         self._digest = hashlib.sha256()
+        self._begin()
+
+    def _begin(self) -> None:
+        self._aligner = Aligner(self.config.pressure_wait_s, self.config.pressure_age_s)
+        self._guard = Guard()
+        self._seen: Estimate | None = None
+        """The last estimate that positions have borne out."""
+        self._blind = 0
+        self._late: list[int] = []
 
     def push(self, sample: Sample) -> list[Prediction]:
         """Take one sample of any stream and return what it completes."""
         self.measurements += isinstance(sample, PositionSample)
-        return self._run(self._aligner.push(sample))
+        self.refusal = self._guard.refusal(sample, self._seen)
+        if self.refusal is None:
+            return self._run(self._aligner.push(sample))
+        self.refused[self.refusal.reason] += 1
+        return self._without_sight(sample.t_ns) if self.stuck and isinstance(sample, PositionSample) else []
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the position sensor repeats itself while the train moves."""
+        return self._guard.stuck
+
+    def reset(self) -> list[Prediction]:
+        """End the data so far as `finish` does and start anew: only the counts and the digest go on."""
+        predictions = self.finish()
+        counts = {**self.state.counts, Outcome.RESET: self.state.counts[Outcome.RESET] + 1}
+        self.state = replace(init(self.config, self._seed), counts=counts)
+        self._begin()
+        return predictions
 
     def refuse(self, topic: str, reason: str) -> None:
-        """Count a message of a topic that never became a sample."""
+        """Count a message of a topic that is not used."""
         self.measurements += topic == POSITION.name
         self.refused[reason] += 1
 
@@ -70,13 +101,33 @@ class Pipeline:
             self.state, estimate = step(self.config, self.state, measurement)
             if estimate is not None:
                 predictions += self._published([estimate])
+            if self._went_back(measurement.t_ns):
+                return predictions + self.reset()
         return predictions
 
+    def _went_back(self, t_ns: int) -> bool:
+        """Whether so many measurements in a row were late that it must be the time that has gone back.
+
+        Less than `reset_s`, that is, as in a short recording played in a loop; the core sees to the longer jumps.
+        """
+        late = self.state.outcome is Outcome.LATE
+        self._late = [*(self._late if self._late and t_ns > self._late[-1] else []), t_ns] if late else []
+        return len(self._late) >= self.config.max_outliers
+
+    def _without_sight(self, t_ns: int) -> list[Prediction]:
+        """As often as there are estimates, say what holds while the position sensor is stuck."""
+        self._blind += 1
+        prediction = self._guard.blind(self.config, t_ns) if self._blind % self.config.step == 1 else None
+        return [] if prediction is None else self._digested([prediction])
+
     def _published(self, estimates: Iterable[Estimate]) -> list[Prediction]:
-        predictions = [predict(self.config, estimate) for estimate in estimates]
+        return self._digested([predict(self.config, estimate) for estimate in estimates])
+
+    def _digested(self, predictions: list[Prediction]) -> list[Prediction]:
         for prediction in predictions:
             self.windows += prediction.estimate.window > 0
             self.last = prediction.estimate
+            self._seen = self._seen if prediction.withheld else self.last
             self._digest.update(_bytes(prediction))
         return predictions
 

@@ -45,6 +45,10 @@ class Reason(Enum):
     NO_AXLE = "give one velocity, rad/s, for every driven axle in name"
     IMPLAUSIBLE_WHEEL_SPEED = f"velocity is in rad/s, not rpm, within +-{MAX_WHEEL_RADPS:g}"
     IMPLAUSIBLE_FORCE = f"force.x is in N, within +-{MAX_FORCE_N:g}"
+    SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
+    STUCK = "the same to the bit although the train must have moved on: check the sensor"
+    TOO_OFTEN = "publish at most 200 messages a second: no more are used"
+    DISABLED = "call ~/set_enabled with true to go on"
     BAD_CURVE = (
         f"give one joint '{TRAIN}', at least two points, each with one position, velocity and acceleration; "
         "positions and times rise, speeds fall and are not negative, accelerations are below 0"

@@ -72,9 +72,9 @@ def rough(measurements: list[Measurement]) -> Iterator[Sample]:
         if index in (40, 70):
             yield position._replace(position_m=position.position_m + 0.1)
         if index == 50:
-            yield position._replace(t_ns=position.t_ns + 1, position_m=math.nan)
-            yield position._replace(t_ns=position.t_ns + 2, variance_m2=-1.0)
-            yield position._replace(t_ns=position.t_ns + 3, position_m=1e9)
+            yield position._replace(t_ns=position.t_ns + S // 100, position_m=math.nan)
+            yield position._replace(t_ns=position.t_ns + S // 50, variance_m2=-1.0)
+            yield position._replace(t_ns=position.t_ns + S // 25, position_m=1e9)
         if index in (45, 60, 65, 80):
             yield position._replace(t_ns=position.t_ns + S // 20, position_m=position.position_m + 100.0)
 

@@ -84,12 +84,12 @@ def test_a_downgrade_stronger_than_the_brake_has_no_curve() -> None:
     assert prediction.safe is None
     assert prediction.nominal is not None
     assert prediction.nominal.deceleration_mps2 == pytest.approx(0.02 * G)
-    assert predict(steep, estimate(mu=0.06, lower=0.05))[1:] == (None, None)
+    assert predict(steep, estimate(mu=0.06, lower=0.05))[1:3] == (None, None)
     assert predict(steep, estimate(mu=0.06, lower=0.05, position_m=5000.0)).safe is not None
 
 
 def test_without_any_adhesion_the_resistance_alone_brakes() -> None:
-    assert predict(config(), estimate(mu=0.0, lower=0.0))[1:] == (None, None)
+    assert predict(config(), estimate(mu=0.0, lower=0.0))[1:3] == (None, None)
     rolling = predict(Config(), estimate(mu=0.0, lower=0.0, speed_mps=1.0))
     assert rolling.safe is not None
     assert rolling.safe.deceleration_mps2[-1] == pytest.approx(0.79e-3 * G)

@@ -24,6 +24,8 @@ class Prediction(NamedTuple):
     """Built on mu_lower; None where the train would not slow down with so little adhesion."""
     nominal: BrakingCurve | None
     """Built on mu."""
+    withheld: bool = False
+    """Nothing is known of mu, not even by its age: the safe curve stands on the low-adhesion law."""
 
 
 def predict(config: Config, estimate: Estimate) -> Prediction:

@@ -1,0 +1,178 @@
+"""What is refused although it is well formed: a stuck sensor, a flood, km/h; and time that goes back a little."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import pytest
+
+from adhesion_node.core import Config, Outcome
+from adhesion_node.core.adhesion import SNOW
+from adhesion_node.core.align import PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core.prediction import Prediction
+from adhesion_node.guard import STRONGEST_MPS2, least_way
+from adhesion_node.pipeline import Pipeline
+from sim_node.run import run
+from sim_node.scenario import find
+from sim_node.sensors import ATMOSPHERE_PA
+
+S = 10**9
+FAST = Config(iterations=3, particles=10)
+
+
+def ride(begin_s: float, end_s: float, rate_hz: float = 10.0, scenario: str = "tunnel_entry") -> list[Sample]:
+    """Pressures and positions of a simulated run; the brake comes on at 20 s."""
+    samples: list[Sample] = []
+    for _, r in run(find(scenario), 1.0 / rate_hz, 1):
+        if begin_s * S <= r.t_ns < end_s * S and r.position_m is not None:
+            samples.append(PressureSample(r.t_ns, r.pressure_pa - ATMOSPHERE_PA))
+            samples.append(PositionSample(r.t_ns, r.position_m, 0.25))
+    return samples
+
+
+def stuck(samples: Sequence[Sample], from_s: float, until_s: float = 1e9) -> list[Sample]:
+    held = next(s.position_m for s in samples if isinstance(s, PositionSample) and s.t_ns >= from_s * S)
+    return [
+        s._replace(position_m=held) if isinstance(s, PositionSample) and from_s * S <= s.t_ns < until_s * S else s
+        for s in samples
+    ]
+
+
+def feed(pipeline: Pipeline, samples: Iterable[Sample]) -> list[Prediction]:
+    return [prediction for sample in samples for prediction in pipeline.push(sample)]
+
+
+@pytest.mark.parametrize("rate_hz", [5.0, 10.0, 50.0])
+def test_a_stuck_position_is_told_within_2_s(rate_hz: float) -> None:
+    pipeline = Pipeline(FAST, 1)
+    told_ns = 0
+    for sample in stuck(ride(10.0, 34.0, rate_hz), 30.0):
+        pipeline.push(sample)
+        told_ns = told_ns or (sample.t_ns if pipeline.stuck else 0)
+    assert 30.0 < told_ns / S < 32.0
+
+
+def test_while_it_is_stuck_mu_is_withheld_and_the_curve_falls_back_to_the_low_law() -> None:
+    pipeline = Pipeline(FAST, 1)
+    predictions = feed(pipeline, stuck(ride(10.0, 40.0), 30.0))
+    seen = [p.estimate for p in predictions if not p.withheld][-1]
+    blind = [p for p in predictions if p.withheld]
+    assert len(blind) == pytest.approx(9.5, abs=1.0)  # as often as there are estimates
+    truth = {t.t_ns: t for t, _ in run(find("tunnel_entry"), 0.1, 1)}
+    for prediction in blind:
+        estimate, true = prediction.estimate, truth[prediction.estimate.t_ns]
+        assert prediction.nominal is None
+        assert prediction.safe is not None
+        assert estimate.mu_lower == pytest.approx(float(SNOW(np.array(seen.speed_mps))))
+        assert prediction.safe.speed_mps[0] >= true.speed_mps
+        assert estimate.position_m >= true.position_m
+    stamps = [p.estimate.t_ns for p in predictions]
+    assert stamps == sorted(set(stamps))
+    assert pipeline.dropped["STUCK"] > 80
+
+
+def test_a_sensor_that_recovers_is_used_again() -> None:
+    pipeline = Pipeline(FAST, 1)
+    feed(pipeline, stuck(ride(10.0, 50.0), 30.0, 35.0))
+    assert not pipeline.stuck
+    assert pipeline.last is not None
+    assert pipeline.last.window >= 50
+    true = next(t for t, _ in run(find("tunnel_entry"), 0.1, 1) if t.t_ns == pipeline.last.t_ns)
+    assert pipeline.last.speed_mps == pytest.approx(true.speed_mps, abs=1.0)
+
+
+def test_a_train_that_stands_is_not_stuck() -> None:
+    """Noise-free positions of a train that brakes at 1 m/s^2 from 20 m/s and stays at 200 m, then none for a while."""
+    pipeline = Pipeline(FAST, 1)
+    for tick in (*range(600), *range(1200, 1400)):
+        t = tick / 10
+        place = 20.0 * t - t**2 / 2 if t < 20.0 else 200.0
+        pipeline.push(PressureSample(tick * S // 10, 2e5))
+        pipeline.push(PositionSample(tick * S // 10, place, 0.25))
+        assert not pipeline.stuck
+    assert "STUCK" not in pipeline.dropped
+
+
+def test_a_coarse_sensor_is_not_stuck() -> None:
+    pipeline = Pipeline(FAST, 1)
+    for sample in ride(10.0, 40.0, 50.0):
+        coarse = sample._replace(position_m=round(sample.position_m)) if isinstance(sample, PositionSample) else sample
+        pipeline.push(coarse)
+        assert not pipeline.stuck
+
+
+def test_least_way_is_that_of_the_strongest_braking() -> None:
+    times = np.linspace(0.0, 4.0, 4001)
+    speeds = np.maximum(9.0 - STRONGEST_MPS2 * times, 0.0)
+    assert least_way(9.0, 4.0) == pytest.approx(np.trapezoid(speeds, times), abs=1e-3)
+
+
+def test_a_flood_is_thinned_to_200_a_second_of_every_sensor() -> None:
+    pipeline = Pipeline(FAST, 1)
+    for tick in range(10_000):  # a second at 10 kHz
+        t_ns = tick * S // 10_000
+        pipeline.push(PressureSample(t_ns, 0.0))
+        pipeline.push(SpeedSample(t_ns, 80.0))
+        pipeline.push(PositionSample(t_ns, 80.0 * tick / 10_000, 0.25))
+    assert pipeline.accepted <= 201
+    assert pipeline.dropped["TOO_OFTEN"] >= 3 * (10_000 - 201)
+    assert pipeline.measurements == 10_000
+
+
+def test_100_hz_with_jitter_is_no_flood() -> None:
+    rng = np.random.default_rng(1)
+    pipeline = Pipeline(FAST, 1)
+    for tick in range(1000):
+        t_ns = round((tick + rng.uniform(-0.24, 0.24)) * S / 100)
+        pipeline.push(PositionSample(t_ns + S, 0.8 * t_ns * 100 / S, 0.25))
+    assert pipeline.dropped == {}
+
+
+@pytest.mark.parametrize("mps", [8.0, 50.0, 83.0])
+def test_the_first_speed_in_kmh_is_refused_with_the_remedy(mps: float) -> None:
+    pipeline = Pipeline(FAST, 1)
+    for tick in range(100):
+        pipeline.push(PressureSample(tick * S // 10, 0.0))
+        pipeline.push(PositionSample(tick * S // 10, mps * tick / 10, 0.25))
+    pipeline.push(SpeedSample(10 * S, mps))
+    assert pipeline.refusal is None
+    pipeline.push(SpeedSample(101 * S // 10, 3.6 * mps))
+    assert "divide km/h by 3.6" in str(pipeline.refusal)
+    assert pipeline.dropped == {"SPEED_IN_KMH": 1}
+
+
+def test_a_short_recording_in_a_loop_is_one_reset_each_and_goes_on_within_a_window() -> None:
+    """20 s of it, again and again: less than reset_s, so that every message of the second turn would be late."""
+    pipeline = Pipeline(FAST, 1)
+    turn = ride(15.0, 35.0)
+    for number in range(3):
+        predictions = feed(pipeline, turn)
+        assert pipeline.state.counts[Outcome.RESET] == number
+        windows = [p.estimate.t_ns / S for p in predictions if p.estimate.window >= FAST.window]
+        assert windows[-1] > 34.0
+        coasting = next(p.estimate for p in predictions if p.estimate.t_ns < 30 * S)
+        assert coasting.t_ns < 15.0 * S + 5.0 * S  # a window of 50 after the turn's begin
+
+
+def test_messages_of_a_slow_second_source_are_late_and_no_reset() -> None:
+    pipeline = Pipeline(FAST, 1)
+    samples = ride(10.0, 30.0)
+    for index in range(2, len(samples), 2):
+        feed(pipeline, samples[index : index + 2])
+        if index > 60:
+            pipeline.push(samples[index - 59])  # 3 s old, as every time
+    assert pipeline.state.counts[Outcome.LATE] > 50
+    assert pipeline.state.counts[Outcome.RESET] == 0
+
+
+def test_a_reset_forgets_all_but_the_counts() -> None:
+    """What comes after it is what a new pipeline says of the same samples."""
+    again, fresh = Pipeline(FAST, 1), Pipeline(FAST, 1)
+    feed(again, ride(10.0, 25.0))
+    again.reset()
+    counted, windows = again.accepted, again.windows
+    later = ride(22.0, 32.0)
+    assert [p.estimate for p in feed(again, later)] == [p.estimate for p in feed(fresh, later)]
+    assert (again.accepted - counted, again.windows - windows) == (fresh.accepted, fresh.windows)
+    assert again.state.counts[Outcome.RESET] == 1
