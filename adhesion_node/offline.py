@@ -17,12 +17,13 @@ from .core.prediction import Prediction
 from .pipeline import Pipeline
 from .score import Truth, mean_relative_error_percent
 from .settings import SEED, SETTINGS, setup_of
-from .topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED, TRUTH_MU, TRUTH_STATE
+from .topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED, TRUTH_MU, TRUTH_STATE, WHEEL_SPEED
 
 READERS: dict[str, Callable[[Any, str], Sample]] = {
     POSITION.name: reading.position,
     BRAKE_PRESSURE.name: reading.brake_pressure,
     SPEED.name: reading.speed,
+    WHEEL_SPEED.name: reading.wheel_speed,
 }
 """How the messages of a sensor topic become samples."""
 

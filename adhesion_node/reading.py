@@ -10,8 +10,8 @@ import math
 from enum import Enum
 from typing import Any
 
-from .core.align import PositionSample, PressureSample, SpeedSample
-from .core.creep_align import ForceSample, WheelSample
+from .core.align import PositionSample, PressureSample, SpeedSample, WheelSample
+from .core.creep_align import ForceSample
 from .core.measurement import MAX_POSITION_M, MAX_SPEED_MPS, MAX_VARIANCE_M2, MIN_VARIANCE_M2
 from .topics import FRAME, TRAIN
 

@@ -7,7 +7,7 @@ import itertools
 import numpy as np
 import pytest
 
-from adhesion_node.core.align import MOST, Aligner, PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core.align import MOST, Aligner, PositionSample, PressureSample, Sample, SpeedSample, WheelSample
 from adhesion_node.core.measurement import Measurement
 
 S = 1_000_000_000
@@ -34,6 +34,15 @@ def test_pairs_equal_stamps_at_once() -> None:
     assert aligner.push(_pressure(1.0, 5.0)) == []
     assert aligner.push(SpeedSample(S, 9.0)) == []
     assert aligner.push(_position(1.0)) == [Measurement(S, 10.0, 0.25, 5.0, 9.0)]
+
+
+def test_the_median_axle_counts_while_it_is_fresh() -> None:
+    aligner = _aligner()
+    aligner.push(WheelSample(S, (100.0, 20.0, 90.0)))
+    aligner.push(_pressure(1.1, 5.0))
+    assert aligner.push(_position(1.1))[0].wheel_radps == 90.0
+    aligner.push(_pressure(1.3, 5.0))
+    assert aligner.push(_position(1.3))[0].wheel_radps is None  # 0.3 s old
 
 
 def test_the_order_of_arrival_within_a_tick_does_not_matter() -> None:

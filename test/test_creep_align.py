@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 
-from adhesion_node.core.align import SpeedSample
-from adhesion_node.core.creep_align import CreepAligner, ForceSample, Paired, Sample, WheelSample
+from adhesion_node.core.align import SpeedSample, WheelSample
+from adhesion_node.core.creep_align import CreepAligner, ForceSample, Paired, Sample
 
 MS = 1_000_000
 START = 10**12

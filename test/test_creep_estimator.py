@@ -16,8 +16,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node import reading, topics
-from adhesion_node.core.align import SpeedSample
-from adhesion_node.core.creep_align import ForceSample, WheelSample
+from adhesion_node.core.align import SpeedSample, WheelSample
+from adhesion_node.core.creep_align import ForceSample
 from adhesion_node.core.creep_config import CreepConfig, Peak
 from adhesion_node.creep_pipeline import CreepPipeline, Vehicle
 from adhesion_node.nodes import qos

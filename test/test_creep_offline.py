@@ -22,7 +22,7 @@ from adhesion_node.core.creep_config import Peak
 from adhesion_node.nodes import qos, replay
 from adhesion_node.nodes.creep_estimator import INPUTS, CreepEstimator
 from sim_node import messages, slip
-from sim_node.slip_node import traction_force, wheel_speed
+from sim_node.messages import traction_force, wheel_speed
 from sim_node.slip_scenario import find
 
 SAMPLES = 380

@@ -1,4 +1,4 @@
-"""Pairs the position, brake-pressure and speed streams by their stamps, whatever order they arrive in.
+"""Pairs the position, brake-pressure, speed and wheel-speed streams by their stamps, whatever order they arrive in.
 
 A position waits until the pressure of its own time is known, that is, until a pressure with the same or a later
 stamp has come, or until the positions have moved on by `max_wait_s` (no pressure sensor, or a lost message). Only
@@ -8,6 +8,7 @@ stamps decide, never the clock: a live node and an offline replay pair alike.
 from __future__ import annotations
 
 from bisect import bisect_right, insort
+from statistics import median
 from typing import NamedTuple, TypeVar
 
 from .measurement import Measurement
@@ -35,9 +36,16 @@ class SpeedSample(NamedTuple):
     speed_mps: float
 
 
-Sample = PositionSample | PressureSample | SpeedSample
+class WheelSample(NamedTuple):
+    """Measured angular speeds of the axles."""
 
-Timed = TypeVar("Timed", PressureSample, SpeedSample)
+    t_ns: int
+    speeds_radps: tuple[float, ...]
+
+
+Sample = PositionSample | PressureSample | SpeedSample | WheelSample
+
+Timed = TypeVar("Timed", PressureSample, SpeedSample, WheelSample)
 
 HORIZON_NS = 60_000_000_000
 """Samples further apart than this belong to different times: the older ones are spent, or the clock has jumped."""
@@ -47,7 +55,7 @@ MOST = 6_000
 
 
 class Aligner:
-    """Merges the three streams into measurements. Mutable: it is the inbox of one node or one replay."""
+    """Merges the streams into measurements. Mutable: it is the inbox of one node or one replay."""
 
     def __init__(self, max_wait_s: float, max_pressure_age_s: float) -> None:
         self._max_wait_ns = round(max_wait_s * 1e9)
@@ -56,6 +64,7 @@ class Aligner:
         self._positions: list[PositionSample] = []
         self._pressures: list[PressureSample] = []
         self._speeds: list[SpeedSample] = []
+        self._wheels: list[WheelSample] = []
 
     def push(self, sample: Sample) -> list[Measurement]:
         """Take one sample; return the measurements that are complete now, in the order of their arrival."""
@@ -64,6 +73,8 @@ class Aligner:
             _insert(self._pressures, sample)
         elif isinstance(sample, SpeedSample):
             _insert(self._speeds, sample)
+        elif isinstance(sample, WheelSample):
+            _insert(self._wheels, sample)
         else:
             if self._newest_ns is not None and abs(sample.t_ns - self._newest_ns) > HORIZON_NS:
                 before = self.flush()
@@ -89,7 +100,12 @@ class Aligner:
 
     def _take(self, count: int) -> list[Measurement]:
         taken, self._positions = self._positions[:count], self._positions[count:]
-        return [Measurement(*position, self._pressure(position.t_ns), self._speed(position.t_ns)) for position in taken]
+        return [
+            Measurement(
+                *position, self._pressure(position.t_ns), self._speed(position.t_ns), self._wheel(position.t_ns)
+            )
+            for position in taken
+        ]
 
     def _pressure(self, t_ns: int) -> float | None:
         newest = bisect_right(self._pressures, t_ns, key=lambda sample: sample.t_ns) - 1
@@ -103,11 +119,18 @@ class Aligner:
             return None
         return self._speeds.pop(newest).speed_mps  # one observation: it must not count twice
 
+    def _wheel(self, t_ns: int) -> float | None:
+        newest = bisect_right(self._wheels, t_ns, key=lambda sample: sample.t_ns) - 1
+        if newest < 0 or t_ns - self._wheels[newest].t_ns > self._max_wait_ns:
+            return None
+        return median(self._wheels[newest].speeds_radps)
+
     def _start_anew(self, t_ns: int) -> None:
         """Keep of pressures and speeds only those of the new time, which may have come before its first position."""
         self._newest_ns = None
         self._pressures = [sample for sample in self._pressures if abs(sample.t_ns - t_ns) <= HORIZON_NS]
         self._speeds = [sample for sample in self._speeds if abs(sample.t_ns - t_ns) <= HORIZON_NS]
+        self._wheels = [sample for sample in self._wheels if abs(sample.t_ns - t_ns) <= HORIZON_NS]
 
 
 def _insert(samples: list[Timed], sample: Timed) -> None:

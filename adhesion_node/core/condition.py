@@ -35,6 +35,9 @@ EDGE = 5
 PLAUSIBLE = 0.005
 """Probability from which a hypothesis may lower the bound."""
 
+RECENT = 10
+"""Samples over which the wheels are taken to roll or to slide."""
+
 CLEAR = 2.0
 """Standard deviations by which kappa must stay below the brake's limit for a step to tell of it."""
 
@@ -73,7 +76,8 @@ def evaluate_condition(
     else:
         following = _following(config, window, found)
         law, now = _state(leading.now.belief), tuple(each.now for each in found)
-    regime, rail = _judge(config, now, suspected, before, window.samples[-1].brake)
+    limit = _limit(config, window, leading)
+    regime, rail = _judge(config, now, suspected, before, limit)
     return Verdict(
         regime=regime,
         rail=rail,
@@ -131,6 +135,22 @@ def _suspected(config: Config, leading: Found) -> Change | None:
     return found._replace(belief=scaled(found.belief, float(law(found.belief.mean[1]))))
 
 
+def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:
+    """The most that the brake can use, as far as the wheels do not tell better.
+
+    Sliding wheels show that adhesion limits, whatever the brake; rolling ones that the brake does, however weak.
+    """
+    recent = np.array([sample.wheel_mps for sample in window.samples[-RECENT:]])
+    creep = 1.0 - recent / leading.smoothed.trajectory[-recent.size :, 1]
+    measured = creep[np.isfinite(creep)]
+    if measured.size == 0:
+        return window.samples[-1].brake
+    typical = float(np.median(measured))
+    if typical >= config.sliding_creep:
+        return math.inf
+    return leading.now.mu if typical < 0.5 * config.sliding_creep else window.samples[-1].brake
+
+
 def _judge(
     config: Config, now: Sequence[Hypothesis], suspected: Change | None, before: Rail, limit: float
 ) -> tuple[Regime, Rail]:
@@ -142,7 +162,7 @@ def _judge(
     variances = np.array([each.variance for each in now]) + config.grade_std**2
     mu = max(float(weights @ mus), 0.0)
     std = math.sqrt(float(weights @ (variances + (mus - mu) ** 2)))
-    limit_std = config.brake_error * limit
+    limit_std = config.brake_error * limit if math.isfinite(limit) else 0.0
     used = variances + np.where(mus < limit, 0.0, limit_std**2)
     lower = _lower(config, np.minimum(mus, limit)[weights >= PLAUSIBLE], used[weights >= PLAUSIBLE])
     doubt = 0.0 if suspected is None else float(expit(suspected.log_odds - config.change_threshold))

@@ -59,6 +59,9 @@ class Config:
     speed_while_braking: bool = setting(
         False, "Use a measured speed under the brake too (a radar; an axle slides and would mislead)"
     )
+    sliding_creep: float = setting(
+        0.03, "Creep of the median axle from which the wheels slide; below half of it they roll", low=1e-3, high=1.0
+    )
     brake_threshold_pa: float = setting(
         10e3, "Brake-cylinder pressure (gauge) from which the brake counts as applied", "Pa", 0.0, 1e6
     )

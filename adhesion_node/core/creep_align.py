@@ -10,14 +10,7 @@ from __future__ import annotations
 from bisect import bisect_right, insort
 from typing import NamedTuple, TypeVar
 
-from .align import HORIZON_NS, SpeedSample
-
-
-class WheelSample(NamedTuple):
-    """Measured angular speeds of the driven axles."""
-
-    t_ns: int
-    speeds_radps: tuple[float, ...]
+from .align import HORIZON_NS, SpeedSample, WheelSample
 
 
 class ForceSample(NamedTuple):

@@ -149,6 +149,7 @@ def _accept(
         measurement.variance_m2,
         measurement.speed_mps or 0.0,
         _speed_variance(config, measurement),
+        math.nan if measurement.wheel_radps is None else measurement.wheel_radps * config.train.wheel_radius_m,
     )
     window = state.window if dt_s <= config.max_gap_s else None
     if window is not None:

@@ -23,14 +23,17 @@ class Measurement(NamedTuple):
     variance_m2: float
     brake_pressure_pa: float | None = None
     speed_mps: float | None = None
+    wheel_radps: float | None = None
+    """Angular speed of the median axle."""
 
     def is_valid(self) -> bool:
         """Whether every number is finite and physically possible."""
-        pressure, speed = self.brake_pressure_pa, self.speed_mps
+        pressure, speed, wheel = self.brake_pressure_pa, self.speed_mps, self.wheel_radps
         return (
             math.isfinite(self.position_m)
             and abs(self.position_m) <= MAX_POSITION_M
             and MIN_VARIANCE_M2 <= self.variance_m2 <= MAX_VARIANCE_M2
             and (pressure is None or abs(pressure) <= MAX_PRESSURE_PA)
-            and (speed is None or (math.isfinite(speed) and abs(speed) <= MAX_SPEED_MPS))
+            and (speed is None or abs(speed) <= MAX_SPEED_MPS)
+            and (wheel is None or math.isfinite(wheel))
         )

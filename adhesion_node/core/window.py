@@ -22,6 +22,8 @@ class Sample(NamedTuple):
     variance_m2: float
     speed_mps: float
     speed_variance: float
+    wheel_mps: float = math.nan
+    """Speed of the wheels' rims; NaN where none was measured."""
 
 
 Observation = tuple[int, float, float]
@@ -75,6 +77,6 @@ def window_of(samples: Sequence[Sample]) -> Window:
     one measured at its start.
     """
     t_ns = np.array([sample.t_ns for sample in samples], dtype=np.int64)
-    columns = np.array([sample[1:] for sample in samples], dtype=np.float64).T
+    columns = np.array([sample[1:6] for sample in samples], dtype=np.float64).T
     brake, position, variance, speed, speed_variance = columns
     return Window(np.diff(t_ns) * 1e-9, brake[:-1], position[1:], variance[1:], speed[1:], speed_variance[1:])

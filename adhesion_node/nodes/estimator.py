@@ -2,7 +2,7 @@
 
 ::
 
-    position, brake_pressure, speed  ->  adhesion/*, /diagnostics
+    position, brake_pressure, speed, wheel_speed  ->  adhesion/*, /diagnostics
 
 Every message goes through `Pipeline`, as in an offline replay; stamps drive the work, no timer does.
 """
@@ -69,6 +69,7 @@ class Estimator(Node):
         for topic, read in (
             (topics.BRAKE_PRESSURE, reading.brake_pressure),
             (topics.SPEED, reading.speed),
+            (topics.WHEEL_SPEED, reading.wheel_speed),
             (topics.POSITION, reading.position),
         ):
             qos.subscribe(self, topic, self._receiver(topic, read), qos.SENSOR_SUBSCRIPTION)
