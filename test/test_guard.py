@@ -58,7 +58,7 @@ def test_while_it_is_stuck_mu_is_withheld_and_the_curve_falls_back_to_the_low_la
     predictions = feed(pipeline, stuck(ride(10.0, 40.0), 30.0))
     seen = [p.estimate for p in predictions if not p.withheld][-1]
     blind = [p for p in predictions if p.withheld]
-    assert len(blind) == pytest.approx(9.5, abs=1.0)  # as often as there are estimates
+    assert len(blind) == pytest.approx(95 / FAST.step, abs=1.0)  # as often as there are estimates
     truth = {t.t_ns: t for t, _ in run(find("tunnel_entry"), 0.1, 1)}
     for prediction in blind:
         estimate, true = prediction.estimate, truth[prediction.estimate.t_ns]

@@ -10,6 +10,7 @@ from .gaussian import Gaussian
 from .hypothesis import Hypothesis
 from .outcome import Regime
 from .rail import Rail
+from .train import Array
 from .window import Sample
 
 
@@ -20,6 +21,8 @@ class BrakingWindow(NamedTuple):
     samples: tuple[Sample, ...]
     hypotheses: tuple[Hypothesis, ...] = ()
     """Joint laws with the rail condition at the first sample; empty until such a window is evaluated."""
+    trajectory: Array | None = None
+    """Smoothed positions and speeds of its first samples, from the last evaluation; where the next one begins."""
 
     def extended(self, sample: Sample) -> BrakingWindow:
         """The window with one more sample."""

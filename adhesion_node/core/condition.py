@@ -12,10 +12,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import expit, ndtri
+from scipy.special import ndtri
 
 from .braking_window import BrakingWindow, Verdict
-from .changes import Change, change
+from .changes import change
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
@@ -65,19 +65,17 @@ def evaluate_condition(
     arrays = window_of(window.samples)
     found = list[Found]()
     for hypothesis in window.hypotheses:
-        near = found[0].smoothed.trajectory if found else None
+        near = found[0].smoothed.trajectory if found else window.trajectory
         found.append(_find(config, arrays, hypothesis, (start, lowest), near))
     leading = max(found, key=lambda each: each.now.log_weight)
-    suspected = _suspected(config, leading)
-    changed = suspected is not None and suspected.log_odds >= config.change_threshold
-    if suspected is not None and changed:
-        following = _opened(config, suspected.belief, window._replace(samples=window.samples[-1:]))
-        law, now, suspected = following.prior, following.hypotheses, None
-    else:
+    changed = _changed(config, leading)
+    if changed is None:
         following = _following(config, window, found)
         law, now = _state(leading.now.belief), tuple(each.now for each in found)
-    limit = _limit(config, window, leading)
-    regime, rail = _judge(config, now, suspected, before, limit)
+    else:
+        following = _opened(config, changed, BrakingWindow(window.prior, window.samples[-1:]))
+        law, now = following.prior, following.hypotheses
+    regime, rail = _judge(config, now, before, _limit(config, window, leading))
     return Verdict(
         regime=regime,
         rail=rail,
@@ -88,14 +86,14 @@ def evaluate_condition(
         iterations=leading.smoothed.iterations,
         converged=leading.smoothed.converged,
         log_likelihood=leading.now.log_weight,
-        changed=changed,
+        changed=changed is not None,
     )
 
 
 def _opened(config: Config, belief: Belief, window: BrakingWindow) -> BrakingWindow:
     """The window with all hypotheses, from the law of (s, v, mu) at its first sample."""
     shapes = hypotheses(config.speed_law, config.low_law, config.law_probability, belief)
-    return BrakingWindow(_state(belief), window.samples, shapes)
+    return window._replace(prior=_state(belief), hypotheses=shapes)
 
 
 def _state(belief: Belief) -> Gaussian:
@@ -124,15 +122,17 @@ def _find(
     return Found(before, problem, smoothed, Hypothesis(before.law, now.belief, before.log_weight + now.log_evidence))
 
 
-def _suspected(config: Config, leading: Found) -> Change | None:
-    """A change of the rail within the window, its law that of (s, v, mu); None while the window is too short."""
+def _changed(config: Config, leading: Found) -> Belief | None:
+    """Law of (s, v, mu) at the newest sample if the rail has changed within the window."""
     candidates = np.arange(EDGE, leading.problem.window.steps - EDGE + 1, dtype=np.intp)
     if candidates.size == 0:
         return None
     law = leading.before.law
     jump_std = config.unknown_std / float(law(leading.before.belief.mean[1]))
     found = change(leading.problem, leading.smoothed, candidates, jump_std)
-    return found._replace(belief=scaled(found.belief, float(law(found.belief.mean[1]))))
+    if found.log_odds < config.change_threshold:
+        return None
+    return scaled(found.belief, float(law(found.belief.mean[1])))
 
 
 def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:
@@ -151,44 +151,32 @@ def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:
     return leading.now.mu if typical < 0.5 * config.sliding_creep else window.samples[-1].brake
 
 
-def _judge(
-    config: Config, now: Sequence[Hypothesis], suspected: Change | None, before: Rail, limit: float
-) -> tuple[Regime, Rail]:
+def _judge(config: Config, now: Sequence[Hypothesis], before: Rail, limit: float) -> tuple[Regime, Rail]:
     """Regime and rail at the newest sample, over all hypotheses; `limit` is the most that the brake can use.
 
-    The bound holds under every hypothesis that is plausible; a change that is suspected, not found, lowers it too.
+    The bound holds under every hypothesis that is plausible.
     """
     weights, mus = probabilities(now), np.array([each.mu for each in now])
     variances = np.array([each.variance for each in now]) + config.grade_std**2
     mu = max(float(weights @ mus), 0.0)
     std = math.sqrt(float(weights @ (variances + (mus - mu) ** 2)))
     limit_std = config.brake_error * limit if math.isfinite(limit) else 0.0
-    used = variances + np.where(mus < limit, 0.0, limit_std**2)
-    lower = _lower(config, np.minimum(mus, limit)[weights >= PLAUSIBLE], used[weights >= PLAUSIBLE])
-    doubt = 0.0 if suspected is None else float(expit(suspected.log_odds - config.change_threshold))
-    doubtful = suspected is not None and doubt > 1.0 - config.confidence
-    if suspected is not None and doubtful:
-        then = suspected.belief
-        lower = min(lower, _lower(config, then.mean[2], then.covariance[2, 2] + config.grade_std**2))
-    found = Rail(mu, std, min(lower, mu))
+    bounds = np.minimum(mus, limit) - float(ndtri(config.confidence)) * np.sqrt(
+        variances + np.where(mus < limit, 0.0, limit_std**2)
+    )
+    lower = min(max(float(np.min(bounds[weights >= PLAUSIBLE])), 0.0), mu)
     if std > UNDECIDED * config.unknown_std:
-        return Regime.COASTING, found
+        return Regime.COASTING, Rail(mu, std, lower)
     if mu + math.hypot(std, limit_std) < limit:
-        return Regime.ADHESION_LIMITED, found
-    seen = found._replace(mu=min(mu, limit))
-    return Regime.BRAKE_LIMITED, seen if doubtful else learn_bound(before, seen)
-
-
-def _lower(config: Config, mus: Array, variances: Array) -> float:
-    """Lower bound at the configured confidence under any of these laws of mu; not below 0."""
-    return max(float(np.min(mus - float(ndtri(config.confidence)) * np.sqrt(variances))), 0.0)
+        return Regime.ADHESION_LIMITED, Rail(mu, std, lower)
+    return Regime.BRAKE_LIMITED, learn_bound(before, Rail(min(mu, limit), std, min(lower, limit)))
 
 
 def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) -> BrakingWindow:
     """The window moved on, each hypothesis with the law that the samples left behind give."""
-    spent = window.spent(config)
+    spent, trajectory = window.spent(config), found[0].smoothed.trajectory
     if not spent:
-        return window
+        return window._replace(trajectory=trajectory)
     gone = window_of(window.samples[: spent + 1])
     drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
     passed = []
@@ -202,4 +190,4 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
         for hypothesis, probability in zip(passed, probabilities(passed), strict=True)
         if probability >= NEGLIGIBLE
     )
-    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept)
+    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, trajectory[spent:])

@@ -36,14 +36,14 @@ class Config:
         0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0
     )
     change_threshold: float = setting(
-        4.0, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
+        3.0, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
     )
     tail_dof: float = setting(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
     window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
     step: int = setting(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
     particles: int = setting(20, "Particles, M, of particle_em", low=2, high=100_000)
     iterations: int = setting(50, "EM iterations at most", low=1, high=10_000)
-    tolerance: float = setting(1e-7, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
+    tolerance: float = setting(1e-6, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
     start_mu: float = setting(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
     confidence: float = setting(0.95, "One-sided confidence of the lower bound", low=0.5, high=0.9999)
     position_noise_m: float = setting(

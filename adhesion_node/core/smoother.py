@@ -55,14 +55,14 @@ class Posterior(NamedTuple):
 
 
 def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoothed:
-    """Iterate E- and M-step to the most probable trajectory and kappa, from the trajectory `near` if there is one.
+    """Iterate E- and M-step to the most probable trajectory and kappa.
 
+    `near` is where to begin: a trajectory of the window or of its beginning, from an earlier or a similar one.
     The search begins where adhesion limits: beyond the brake's limit nothing would pull kappa back. Where it ends at
     that limit, Newton's steps leap to and fro across it; then the interval between them is halved.
     """
-    trajectory, kappa = _guess(problem, search.start)
-    trajectory = trajectory if near is None else near
-    weights = problem.model.weights(np.zeros(problem.window.steps) if near is None else problem.squared(near))
+    trajectory, kappa = _begin(problem, search.start, problem.prior.mean[None, :2] if near is None else near)
+    weights = problem.model.weights(np.zeros(problem.window.steps) if near is None else problem.squared(trajectory))
     low, high = search.lowest, math.inf
     for iteration in range(1, search.iterations + 1):
         steps = problem.linearise(trajectory, kappa)
@@ -106,18 +106,15 @@ def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
     return Posterior(Belief(mean, normal.factor.law_at_end()), -misfit - 0.5 * spread)
 
 
-def _guess(problem: Problem, kappa: float) -> tuple[Array, float]:
-    """A trajectory of constant deceleration from the prior's mean, at a kappa that some step can use."""
-    motion, window = problem.model.motion, problem.window
-    position, speed = problem.prior.mean[:2]
-    law = float(problem.model.law(np.asarray(speed)))
-    resistance = motion.resistance(np.asarray(position), np.asarray(speed))
-    limit = motion.train.used_adhesion(np.inf, window.brake, resistance)
-    kappa = min(kappa, 0.98 * float(np.max(limit)) / law)
-    trajectory = np.empty((window.steps + 1, 2))
-    trajectory[0] = position, speed
-    lost = GRAVITY * window.dt_s * (np.minimum(kappa * law, limit) + resistance)
-    trajectory[1:, 1] = speed - np.cumsum(lost)
-    travelled = 0.5 * window.dt_s * (trajectory[:-1, 1] + trajectory[1:, 1])
-    trajectory[1:, 0] = position + np.cumsum(travelled)
-    return trajectory, kappa
+def _begin(problem: Problem, kappa: float, near: Array) -> tuple[Array, float]:
+    """The trajectory `near` drawn out at constant deceleration, and a kappa that some step can use."""
+    motion, dt, brake = problem.model.motion, problem.window.dt_s, problem.window.brake
+    known = near.shape[0] - 1
+    position, speed = near[-1:].T
+    law, resistance = problem.model.law(speed), motion.resistance(position, speed)
+    limit = motion.train.used_adhesion(np.inf, brake, resistance)
+    kappa = min(kappa, 0.98 * float(np.max(limit)) / float(law[0]))
+    lost = GRAVITY * dt[known:] * (np.minimum(kappa * law, limit[known:]) + resistance)
+    speeds = np.concatenate((speed, speed - np.cumsum(lost)))
+    positions = position + np.cumsum(0.5 * dt[known:] * (speeds[:-1] + speeds[1:]))
+    return np.concatenate((near, np.stack((positions, speeds[1:]), axis=1))), kappa
