@@ -17,6 +17,7 @@ PROGRAMS = {
     "import_csv": "adhesion_node.import_csv",
     "recover": "adhesion_node.recover",
     "demo": "adhesion_node.demo",
+    "report": "adhesion_node.report.__main__",
     "study": "adhesion_node.study.__main__",
     "bench": "adhesion_node.bench.__main__",
 }
@@ -46,7 +47,7 @@ setup(
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=["adhesion_node*", "sim_node*"]),
-    package_data={"adhesion_node": ["py.typed", "nodes/*.yaml"], "sim_node": ["py.typed"]},
+    package_data={"adhesion_node": ["py.typed", "nodes/*.yaml", "web/*"], "sim_node": ["py.typed"]},
     data_files=shared_files(),
     zip_safe=False,
     python_requires=">=3.11",

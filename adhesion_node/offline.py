@@ -30,17 +30,20 @@ READERS: dict[str, Callable[[Any, str], Sample]] = {
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
-    values = parameter_file.given(options, "estimator", SETTINGS)
-    if options.seed is not None:
-        values[SEED.name] = options.seed
     if POSITION.name not in selection.values():
         raise ValueError(f"bag = {reader.path}: holds no {POSITION.name}, without which nothing is identified")
-    setup, truth = setup_of(values), Truth()
+    setup, truth = setup_of(parameters_of(options)), Truth()
     pipeline = Pipeline(setup.config, setup.seed)
     replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.frame)
     result = summary(pipeline, replayed, truth)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return DONE if replayed.predictions else FAILED
+
+
+def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Settings by name from the options --params, --set and --seed, the later ones over the earlier."""
+    values = parameter_file.given(options, "estimator", SETTINGS)
+    return values if options.seed is None else {**values, SEED.name: options.seed}
 
 
 class Replayed(NamedTuple):

@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Protocol
 
 import numpy as np
 
-from .core import Config, Estimate
+from .core import Config
 from .core.train import KMH
 
 CONVERGED_AFTER_MPS = 30.0 * KMH
 """Speed lost under the brake after which the paper's estimates count as converged."""
+
+
+class Identified(Protocol):
+    """An adhesion and its time: an estimate, or what a recording holds of one."""
+
+    @property
+    def t_ns(self) -> int: ...
+
+    @property
+    def mu(self) -> float: ...
 
 
 class Truth:
@@ -36,7 +47,7 @@ class Truth:
         return self.speed_mps.get(min(braked, default=-1), 0.0) - CONVERGED_AFTER_MPS
 
 
-def mean_relative_error_percent(config: Config, truth: Truth, estimates: Iterable[Estimate]) -> float | None:
+def mean_relative_error_percent(config: Config, truth: Truth, estimates: Iterable[Identified]) -> float | None:
     """Mean of abs(mu - true mu)/true mu in % over all estimates while adhesion limits, after the first 30 km/h.
 
     Every estimate counts, whatever regime it claims. None where there is no truth to compare with.

@@ -60,7 +60,7 @@ def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
     assert result["mu_final"] == pytest.approx(0.0726 + 0.002, abs=0.02)  # wet at 280 km/h
     assert Path(result["bag"]) == tmp_path / "demo" / "bag"
     _check_bag(Path(result["bag"]))
-    assert imread(result["picture"]).shape[:2] == (990, 1210)
+    assert imread(result["picture"]).shape[:2] == (1320, 1210)
     assert Path(result["picture"]).parent == tmp_path / "demo"
     assert result["atp"].split(" > ")[0] in {"EMERGENCY_BRAKE", "NORMAL"}
     assert "to the last bit" in out

@@ -115,7 +115,7 @@ def test_a_console_script_has_its_main(name: str) -> None:
 
 def test_the_executables_of_the_design_are_there() -> None:
     nodes = {"simulator", "slip_simulator", "estimator", "creep_estimator", "atp_monitor"}
-    tools = {"recorder", "replay", "recover", "import_csv", "demo", "study", "bench"}
+    tools = {"recorder", "replay", "recover", "import_csv", "demo", "report", "study", "bench"}
     assert set(console_scripts()) == nodes | tools
 
 

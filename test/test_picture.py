@@ -96,7 +96,7 @@ def test_the_series_are_those_of_the_recording(recorded: Run) -> None:
 def test_a_picture_is_drawn_of_what_there_is(left_out: tuple[Topic, ...], tmp_path: Path) -> None:
     path = tmp_path / "run.png"
     picture.draw(read(record(tmp_path / "bag", *left_out)), path, "a run", 100.0)
-    assert png_size(path) == (1210, 990)
+    assert png_size(path) == (1210, 1320)
     assert pixels_of(path, picture.ORANGE) > 1000, "the identified curves are missing"
     assert pixels_of(path, picture.BLUE) > 300, "the lower bounds are missing"
     shaded = pixels_of(path, picture.SHADES["ADHESION_LIMITED"])
@@ -114,7 +114,7 @@ def test_the_truth_is_drawn_where_there_is_one(tmp_path: Path) -> None:
 
 def test_a_single_estimate_is_drawn(tmp_path: Path) -> None:
     picture.draw(read(record(tmp_path / "bag", seconds=1)), tmp_path / "run.png", "short", 0.0)
-    assert png_size(tmp_path / "run.png") == (1210, 990)
+    assert png_size(tmp_path / "run.png") == (1210, 1320)
 
 
 @pytest.mark.parametrize("left_out", [(MU,), (STATE,), (MU, MU_LOWER, STATE)])

@@ -43,7 +43,8 @@ def _values(pipeline: Pipeline) -> dict[str, str]:
         "resets": str(pipeline.state.counts[Outcome.RESET]),
         "windows": str(pipeline.windows),
     }
-    return {**_estimate_values(pipeline.last), **counts, **drops, "digest": pipeline.digest}
+    told = {"confidence": f"{pipeline.config.confidence:g}", "digest": pipeline.digest}
+    return {**_estimate_values(pipeline.last), **counts, **drops, **told}
 
 
 def _estimate_values(last: Estimate | None) -> dict[str, str]:

@@ -1,19 +1,58 @@
-"""A recorded run as series over time: what its picture and its table are made from."""
+"""A recorded run as series over time: what its pictures, tables and pages are made from."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Mapping
+from itertools import groupby, islice
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
+from .. import reading
 from ..bag import BagReader
-from ..core import braking
+from ..core import Regime, braking
 from ..core.train import Array, Train
-from ..topics import BRAKE_PRESSURE, DIAGNOSTICS, MU, MU_LOWER, STATE, TRUTH_MU, TRUTH_STATE
-from .series import Series, read_series, read_status
+from ..topics import (
+    ATP_STATUS,
+    BRAKE_PRESSURE,
+    BRAKING_CURVE,
+    BRAKING_CURVE_NOMINAL,
+    DIAGNOSTICS,
+    MU,
+    MU_LOWER,
+    STATE,
+    TRUTH_MU,
+    TRUTH_STATE,
+    Topic,
+)
+from .series import Series, Times, read_last_status, read_remarks, read_series, read_status
 
 FIXED_MU = 0.0726
 """The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""
+
+RESULTS = (MU, MU_LOWER, STATE)
+"""Without these a recording holds no results."""
+
+
+MOST_CURVES = 300
+"""Braking curves read of a recording, about."""
+
+
+class Curve(NamedTuple):
+    """A predicted braking: at which places, m along the track, the train has which speeds, m/s; arrays of (n,)."""
+
+    t_ns: int
+    position_m: Array
+    speed_mps: Array
+
+
+class Band(NamedTuple):
+    """A regime and the time for which it held, seconds from the start of the run."""
+
+    start_s: float
+    end_s: float
+    regime: str
 
 
 class Run(NamedTuple):
@@ -26,34 +65,112 @@ class Run(NamedTuple):
     """Absolute, Pa."""
     mu: Series
     mu_lower: Series
+    position: Series
     speed: Series
     regime: Series
+    safe: tuple[Curve, ...]
+    """On mu_lower."""
+    nominal: tuple[Curve, ...]
+    """On mu."""
+    remarks: Series
+    """What the estimator said while all was not well."""
+    levels: Series
+    """Of the ATP monitor."""
+    counts: Mapping[str, str]
+    """Last diagnostics by key."""
+
+    @property
+    def confidence(self) -> float | None:
+        """Of the lower bound; None where the recording does not tell."""
+        return float(self.counts["confidence"]) if "confidence" in self.counts else None
+
+    @property
+    def learnt(self) -> NDArray[np.bool_]:
+        """At which estimates the train braked and its adhesion could be seen, or that it is enough; shape (n,)."""
+        nothing = set(self.regime.t_ns[self.regime.values == Regime.COASTING.name].tolist())
+        return np.array([t_ns not in nothing for t_ns in self.speed.t_ns.tolist()])
+
+    @property
+    def origin_ns(self) -> int:
+        """When the run starts."""
+        return int(min(series.t_ns[0] for series in (self.speed, self.true_speed) if series.t_ns.size))
+
+    def seconds(self, t_ns: Times) -> Array:
+        """Times as seconds from the start of the run."""
+        return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
 
 
 def read_run(reader: BagReader) -> Run:
     """Read the series. Raises ValueError when the recording holds no estimates."""
+    speed = read_series(reader, STATE, speed_of)
     run = Run(
         true_mu=read_series(reader, TRUTH_MU, lambda message: message.data),
-        true_position=read_series(reader, TRUTH_STATE, lambda message: message.pose.pose.position.x),
-        true_speed=read_series(reader, TRUTH_STATE, lambda message: message.twist.twist.linear.x),
+        true_position=read_series(reader, TRUTH_STATE, position_of),
+        true_speed=read_series(reader, TRUTH_STATE, speed_of),
         pressure=read_series(reader, BRAKE_PRESSURE, lambda message: message.fluid_pressure),
-        mu=read_series(reader, MU, lambda message: message.data),
-        mu_lower=read_series(reader, MU_LOWER, lambda message: message.data),
-        speed=read_series(reader, STATE, lambda message: message.twist.twist.linear.x),
+        mu=_stamped(read_series(reader, MU, lambda message: message.data), speed),
+        mu_lower=_stamped(read_series(reader, MU_LOWER, lambda message: message.data), speed),
+        position=read_series(reader, STATE, position_of),
+        speed=speed,
         regime=read_status(reader, DIAGNOSTICS, "regime"),
+        safe=_read_curves(reader, BRAKING_CURVE),
+        nominal=_read_curves(reader, BRAKING_CURVE_NOMINAL),
+        remarks=read_remarks(reader, DIAGNOSTICS, "regime"),
+        levels=read_status(reader, ATP_STATUS, "level"),
+        counts=read_last_status(reader, DIAGNOSTICS, "regime"),
     )
-    for topic, series in ((MU, run.mu), (MU_LOWER, run.mu_lower), (STATE, run.speed)):
+    for topic, series in zip(RESULTS, (run.mu, run.mu_lower, run.speed), strict=True):
         if not series.t_ns.size:
             raise ValueError(f"bag = {reader.path}: holds no {topic.name}: record while the estimator runs")
     return run
 
 
+def bands(run: Run) -> list[Band]:
+    """Regimes over time: an estimate's regime holds since the estimate before it."""
+    ends = run.seconds(run.regime.t_ns)
+    starts = np.concatenate(([0.0], ends))[:-1]
+    rows = [row for row in zip(starts, ends, run.regime.values, strict=True) if row[2]]
+    grouped = (list(group) for _, group in groupby(rows, key=lambda row: str(row[2])))
+    return [Band(float(group[0][0]), float(group[-1][1]), str(group[0][2])) for group in grouped]
+
+
 def distance_to_target(run: Run, mu: Array | float, target_mps: float, train: Train) -> Array:
-    """Braking distance, m, from the speed at each estimate to the target speed with adhesion `mu`; 0 below it."""
+    """Braking distance, m, from the speed at each estimate to the target speed with adhesion `mu`; 0 below it.
+
+    On a level track; a bound below 0 counts as no adhesion.
+    """
     speeds = run.speed.values
     return np.array(
         [
-            float(braking.curve(train, float(speed), float(value), min(target_mps, float(speed))).distance_m[-1])
-            for speed, value in zip(speeds, np.broadcast_to(mu, speeds.shape), strict=True)
+            float(braking.curve(train, float(speed), max(value, 0.0), min(target_mps, float(speed))).distance_m[-1])
+            for speed, value in zip(speeds, np.broadcast_to(mu, speeds.shape).tolist(), strict=True)
         ]
     )
+
+
+def position_of(message: Any) -> float:
+    """Place along the track, m, of an Odometry."""
+    return float(message.pose.pose.position.x)
+
+
+def speed_of(message: Any) -> float:
+    """Speed along the track, m/s, of an Odometry."""
+    return float(message.twist.twist.linear.x)
+
+
+def _stamped(series: Series, states: Series) -> Series:
+    """An adhesion has no header but comes with a state: where none of either is lost, it takes the state's stamp."""
+    return series._replace(t_ns=states.t_ns) if series.t_ns.size == states.t_ns.size else series
+
+
+def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
+    """Read about `MOST_CURVES` of the curves, evenly spread: decoding one takes as long as a hundred numbers."""
+    recorded = reader.resolve(topic.name)
+    stride = max(reader.counts[recorded] // MOST_CURVES, 1) if recorded else 1
+    return tuple(_curve(record.message) for record in islice(reader.messages([topic.name]), None, None, stride))
+
+
+def _curve(message: Any) -> Curve:
+    rows = [(point.positions[0], point.velocities[0]) for point in message.points]
+    place, speed = np.array(rows).T
+    return Curve(reading.stamp_ns(message.header), place, speed)

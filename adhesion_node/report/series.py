@@ -42,6 +42,28 @@ def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
     return read_series(reader, topic, lambda message: _status_value(message, key))
 
 
+def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
+    """Read what the statuses that have `key` say while they are not OK; "" while they are."""
+    return read_series(
+        reader,
+        topic,
+        lambda message: "; ".join(status.message for status in _with_key(message, key) if status.level != 0),
+    )
+
+
+def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str]:
+    """Read the last values, by their keys, of the status that has `key`; {} where there is none."""
+    last: dict[str, str] = {}
+    for record in reader.messages([topic.name]):
+        for status in _with_key(record.message, key):
+            last = {pair.key: pair.value for pair in status.values}
+    return last
+
+
+def _with_key(message: Any, key: str) -> list[Any]:
+    return [status for status in message.status if any(pair.key == key for pair in status.values)]
+
+
 def _time(message: Any, log_ns: int) -> int:
     header = getattr(message, "header", None)
     return log_ns if header is None else reading.stamp_ns(header)

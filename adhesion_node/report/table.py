@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,30 +19,53 @@ HEADER = (
 )
 
 
-def table(run: Run, target_kmh: float, train: Train = CRH3) -> str:
-    """The table as text; columns of the truth stay empty where the recording holds none."""
-    lines = [HEADER.format(target=target_kmh, fixed=FIXED_MU)]
-    return "\n".join([*lines, *_rows(run, target_kmh * KMH, train)])
+class Row(NamedTuple):
+    """An estimate, and the braking distances, m, from its speed; the truth is None where the recording lacks it."""
+
+    speed_kmh: float
+    true_mu: float | None
+    mu: float
+    mu_lower: float
+    true_m: float | None
+    identified_m: float
+    at_least_m: float
+    """By the lower bound of mu: the longest."""
+    fixed_m: float
 
 
-def _rows(run: Run, target_mps: float, train: Train) -> Iterator[str]:
-    braking = run.speed.values < run.speed.values.max() - 10.0 * KMH
-    shown = np.flatnonzero(braking & (run.speed.values > target_mps + 10.0 * KMH))
+def rows(run: Run, target_kmh: float, train: Train = CRH3) -> Iterator[Row]:
+    """Yield rows from 10 km/h below the highest speed down to 10 km/h above the target."""
+    speeds, target_mps = run.speed.values, target_kmh * KMH
+    shown = np.flatnonzero((speeds < speeds.max() - 10.0 * KMH) & (speeds > target_mps + 10.0 * KMH))
     if shown.size > ROWS:
         shown = shown[np.linspace(0, shown.size - 1, ROWS).round().astype(int)]
     mu, lower = run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns)
     distances = [distance_to_target(run, value, target_mps, train) for value in (mu, lower, FIXED_MU)]
     for i in shown:
-        true_mu, left = _truth(run, int(run.speed.t_ns[i]), target_mps)
-        planned = "".join(f"{column[i]:10.0f}" for column in distances)
-        yield f"{run.speed.values[i] / KMH:9.0f} {true_mu:>6} {mu[i]:10.4f} {lower[i]:9.4f} {left:>7} {planned}"
+        true_mu, true_m = _truth(run, int(run.speed.t_ns[i]), target_mps)
+        planned = (float(column[i]) for column in distances)
+        yield Row(float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *planned)
 
 
-def _truth(run: Run, t_ns: int, target_mps: float) -> tuple[str, str]:
+def table(run: Run, target_kmh: float, train: Train = CRH3) -> str:
+    """The table as text; columns of the truth stay empty where the recording holds none."""
+    return "\n".join([HEADER.format(target=target_kmh, fixed=FIXED_MU), *map(_line, rows(run, target_kmh, train))])
+
+
+def _line(row: Row) -> str:
+    true_mu = "" if row.true_mu is None else f"{row.true_mu:.4f}"
+    true_m = "" if row.true_m is None else f"{row.true_m:.0f}"
+    return (
+        f"{row.speed_kmh:9.0f} {true_mu:>6} {row.mu:10.4f} {row.mu_lower:9.4f} {true_m:>7} "
+        f"{row.identified_m:10.0f}{row.at_least_m:10.0f}{row.fixed_m:10.0f}"
+    )
+
+
+def _truth(run: Run, t_ns: int, target_mps: float) -> tuple[float | None, float | None]:
     """True adhesion at a time, and the distance that the train then went until it had the target speed."""
+    now = np.array([t_ns])
     slow = np.flatnonzero(run.true_speed.values <= target_mps)
     if not run.true_mu.t_ns.size or not slow.size:
-        return "", ""
-    now = np.array([t_ns])
+        return None, None
     left = run.true_position.values[slow[0]] - run.true_position.at(now)[0]
-    return f"{run.true_mu.at(now)[0]:.4f}", f"{left:.0f}"
+    return float(run.true_mu.at(now)[0]), float(left)

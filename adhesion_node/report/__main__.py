@@ -1,0 +1,113 @@
+"""`report BAG`: what a recording shows, as one HTML page that needs no network, and as PNG and PDF pictures.
+
+A recording that holds the results of the estimator is shown as recorded; of one that holds sensor messages alone the
+results are estimated first, with --set and --params. Several recordings stand side by side.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..bag import BagReader, parse_remap, select
+from ..cli import DONE, json_option, report, run_tool
+from ..offline import parameters_of
+from ..settings import Setup, setup_of
+from .curves import Subject
+from .estimated import estimate_run
+from .findings import findings
+from .page import report_page
+from .picture import draw
+from .run import RESULTS, read_run
+from .table import table
+
+PICTURES = (".png", ".pdf")
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run `report BAG... --output DIR`."""
+    return run_tool(_parser(), _work, args)
+
+
+def _work(options: argparse.Namespace) -> int:
+    if not 0.0 <= options.target <= 500.0:
+        raise ValueError(f"target = {options.target}: give a speed from 0 to 500 km/h")
+    given = parameters_of(options)
+    setup, output = setup_of(given), Path(options.output)
+    subjects = [_subject(path, name, options, setup) for path, name in _named(options.bags)]
+    html = report_page(", ".join(subject.name for subject in subjects), subjects, options.target, given)
+    output.mkdir(parents=True, exist_ok=True)
+    page = output / "report.html"
+    page.write_text(html, encoding="utf-8")
+    result: dict[str, Any] = {"page": str(page), "runs": []}
+    for subject in subjects:
+        pictures = list(_pictures(subject, output, options.target))
+        found = findings(subject.run, setup.config, options.target)
+        result["runs"].append({"name": subject.name, "source": subject.source, "pictures": pictures, **found})
+    report(options.json, result, "\n\n".join([*(_text(subject, options.target) for subject in subjects), str(page)]))
+    return DONE
+
+
+def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:
+    with BagReader(path) as reader:
+        for loss in reader.damage:
+            print(f"report: {loss}", file=sys.stderr)
+        if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
+            return Subject(name, "as recorded", read_run(reader), setup.config)
+        run = estimate_run(reader, _selection(reader, options), setup)
+        return Subject(name, "estimated from the recorded sensors", run, setup.config)
+
+
+def _selection(reader: BagReader, options: argparse.Namespace) -> Mapping[str, str]:
+    try:
+        return select(reader.topics, [parse_remap(text) for text in options.remap])
+    except ValueError as error:
+        raise ValueError(f"bag = {reader.path}: {error}") from error
+
+
+def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:
+    """Yield the recordings under the last part of their path, numbered where that is there already."""
+    taken: list[str] = []
+    for path in map(Path, paths):
+        name = path.resolve().stem
+        taken.append(name)
+        yield path, name if taken.count(name) == 1 else f"{name} ({taken.count(name)})"
+
+
+def _pictures(subject: Subject, output: Path, target_kmh: float) -> Iterator[str]:
+    for ending in PICTURES:
+        path = output / f"{subject.name}{ending}"
+        draw(subject.run, path, subject.name, target_kmh, subject.config.train)
+        yield str(path)
+
+
+def _text(subject: Subject, target_kmh: float) -> str:
+    return f"{subject.name}, {subject.source}\n{table(subject.run, target_kmh, subject.config.train)}"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser("report", description=__doc__, parents=[json_option()])
+    add = parser.add_argument
+    add("bags", metavar="BAG", nargs="+", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
+    add("--output", metavar="DIR", required=True, help="folder of the report; one that is there is written over")
+    add("--target", metavar="KMH", type=float, default=0.0, help="speed to which distances count (default: 0)")
+    add("--estimate", action="store_true", help="estimate anew, whatever results the recording holds")
+    add(
+        "--remap",
+        metavar="FROM:=TO",
+        action="extend",
+        nargs="+",
+        default=[],
+        help="which recorded topic is which of ours, for instance /odometry/position:=position",
+    )
+    add("--seed", type=int, help="seed of the estimator")
+    add("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
+    add("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
+    return parser
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

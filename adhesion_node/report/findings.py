@@ -1,0 +1,105 @@
+"""What a run shows, in numbers: how the adhesion was identified and what braking distance that saves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core import Config, Regime
+from ..core.train import KMH, Array, Train
+from ..reading import ATMOSPHERE_PA
+from ..score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
+from .run import FIXED_MU, Run, distance_to_target
+from .series import Series
+
+
+class Distances(NamedTuple):
+    """Braking distances, m, at every estimate; arrays of the estimates' shape."""
+
+    fixed: Array
+    """By the fixed worst case."""
+    identified: Array
+    longest: Array
+    """By the lower bound of mu: not exceeded, with the confidence of that bound."""
+
+    @property
+    def saved(self) -> Array:
+        """Saved by the identified adhesion against the fixed one; negative where it is lower."""
+        return self.fixed - self.identified
+
+    @property
+    def saved_at_least(self) -> Array:
+        """Saved at least, with the confidence of the bound."""
+        return self.fixed - self.longest
+
+
+class _Point(NamedTuple):
+    t_ns: int
+    mu: float
+
+
+def distances(run: Run, target_mps: float, train: Train) -> Distances:
+    """Braking distances from the speed at each estimate to the target speed, on a level track."""
+    fixed, identified, longest = (
+        distance_to_target(run, mu, target_mps, train)
+        for mu in (FIXED_MU, run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns))
+    )
+    return Distances(fixed, identified, longest)
+
+
+def first_identified(run: Run) -> int | None:
+    """Index of the first estimate of an adhesion that limits, after 30 km/h of braking; None where there is none."""
+    limits = dict(zip(run.regime.t_ns.tolist(), run.regime.values.tolist(), strict=True))
+    slow = run.speed.values < np.maximum.accumulate(run.speed.values) - CONVERGED_AFTER_MPS
+    shown = (i for i in np.flatnonzero(slow) if limits.get(int(run.speed.t_ns[i])) == Regime.ADHESION_LIMITED.name)
+    return next((int(i) for i in shown), None)
+
+
+def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
+    """Return the findings by name; None where the run cannot tell.
+
+    `saved_m` and the like are those at the first estimate that counts as identified, `identified_at_kmh`.
+    """
+    speeds = run.speed.values / KMH
+    found: dict[str, Any] = {
+        "seconds": float(run.seconds(run.speed.t_ns)[-1]),
+        "from_kmh": float(speeds.max()),
+        "to_kmh": float(speeds[-1]),
+        "mean_relative_error_percent": _error(run, config),
+        "target_kmh": target_kmh,
+        **dict.fromkeys(("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")),
+        "dropped": dropped(run.counts),
+    }
+    at = first_identified(run)
+    if at is not None:
+        planned = distances(run, target_kmh * KMH, config.train)
+        time = run.speed.t_ns[at : at + 1]
+        values = (speeds[at], run.mu.at(time)[0], run.mu_lower.at(time)[0], planned.fixed[at])
+        saved = planned.saved[at], planned.saved_at_least[at]
+        names = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
+        found |= {name: float(value) for name, value in zip(names, (*values, *saved), strict=True)}
+    return found
+
+
+def dropped(counts: Mapping[str, str]) -> dict[str, int]:
+    """Messages that were not used, by reason.
+
+    >>> dropped({"windows": "65", "dropped.LATE": "2"})
+    {'LATE': 2}
+    """
+    return {key.removeprefix("dropped."): int(value) for key, value in counts.items() if key.startswith("dropped.")}
+
+
+def _error(run: Run, config: Config) -> float | None:
+    """The score of an offline replay; None where the recording holds no truth of the estimates' stamps."""
+    truth = Truth()
+    truth.mu = _by_time(run.true_mu)
+    truth.speed_mps = _by_time(run.true_speed)
+    truth.pressure_pa = {t_ns: max(absolute - ATMOSPHERE_PA, 0.0) for t_ns, absolute in _by_time(run.pressure).items()}
+    return mean_relative_error_percent(config, truth, [_Point(*row) for row in _by_time(run.mu).items()])
+
+
+def _by_time(series: Series) -> dict[int, float]:
+    return dict(zip(series.t_ns.tolist(), series.values.tolist(), strict=True))

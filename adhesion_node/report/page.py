@@ -1,0 +1,161 @@
+"""The report as one HTML page: findings, charts with a slider, drops, diagnostics, parameters and versions."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+from ..settings import SETTINGS
+from ..web import page
+from .curves import Subject, changes, chart_data
+from .findings import findings
+from .run import FIXED_MU
+from .table import Row, rows
+
+MOST_CHANGES = 40
+"""Lines of a list of changes; the rest is counted."""
+
+_Write = Callable[[Mapping[str, Any], Subject], str]
+
+FINDINGS: tuple[tuple[str, _Write], ...] = (
+    ("Estimates", lambda f, s: escape(s.source)),
+    ("Duration", lambda f, s: f"{f['seconds']:.0f} s"),
+    ("Speed", lambda f, s: f"{f['from_kmh']:.0f} → {f['to_kmh']:.0f} km/h"),
+    ("Adhesion identified at", lambda f, s: _value(f["identified_at_kmh"], "{:.0f} km/h", "not identified")),
+    ("μ̂ there", lambda f, s: _value(f["mu"], "{:.4f}")),
+    ("at least", lambda f, s: _value(f["mu_lower"], "{:.4f}") + _confidence(s)),
+    ("Braking distance by the fixed worst case", lambda f, s: _value(f["fixed_m"], "{:.0f} m")),
+    ("saved by the identified μ̂", lambda f, s: _saved(f, "saved_m")),
+    ("saved at least", lambda f, s: _saved(f, "saved_at_least_m") + _confidence(s)),
+    (
+        "Mean relative error while the adhesion limits",
+        lambda f, s: _value(f["mean_relative_error_percent"], "{:.2f} %"),
+    ),
+    ("Messages not used", lambda f, s: escape(_listed(f["dropped"]) or "none")),
+)
+"""Lines of the table of findings: their names and how they are written."""
+
+
+def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, parameters: Mapping[str, Any]) -> str:
+    """Return the page. `parameters` are the settings that were given; all others have their defaults.
+
+    Raises ValueError when a recorded number is not finite.
+    """
+    data = {
+        "runs": [chart_data(subject, target_kmh) for subject in subjects],
+        "target_kmh": target_kmh,
+        "fixed_mu": FIXED_MU,
+    }
+    subtitle = (
+        f"Wheel–rail adhesion and emergency braking to {target_kmh:g} km/h, beside the fixed worst case "
+        f"μ\u00a0=\u00a0{FIXED_MU}. Bands: nothing to learn (grey), the brake limits (blue), "
+        "the adhesion limits (orange)."
+    )
+    details = [_section("Distances", subjects, lambda subject: _distances(subject, target_kmh))]
+    details += [_section("Drops and diagnostics", subjects, _diagnostics)]
+    details += [_parameters(parameters), _versions()]
+    return page(
+        "report",
+        escape(title),
+        data,
+        subtitle=escape(subtitle),
+        findings=_findings(subjects, target_kmh),
+        details="\n".join(details),
+    )
+
+
+def _findings(subjects: Sequence[Subject], target_kmh: float) -> str:
+    found = [findings(subject.run, subject.config, target_kmh) for subject in subjects]
+    body = (
+        [escape(name), *(write(one, subject) for one, subject in zip(found, subjects, strict=True))]
+        for name, write in FINDINGS
+    )
+    return _table(["", *(escape(subject.name) for subject in subjects)], body)
+
+
+def _value(value: float | None, form: str, absent: str = "–") -> str:
+    return absent if value is None else form.format(value)
+
+
+def _saved(found: Mapping[str, Any], name: str) -> str:
+    if found[name] is None or not found["fixed_m"]:
+        return "–"
+    return f"{found[name]:.0f} m ({100 * found[name] / found['fixed_m']:.1f} %)"
+
+
+def _confidence(subject: Subject) -> str:
+    confidence = subject.run.confidence
+    return " (confidence not recorded)" if confidence is None else f" ({confidence:.0%} confidence)"
+
+
+def _listed(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {reason}" for reason, count in counts.items())
+
+
+def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject], str]) -> str:
+    columns = "".join(f"<section><h3>{escape(subject.name)}</h3>{write(subject)}</section>" for subject in subjects)
+    return f'<h2>{escape(title)}</h2><div class="columns">{columns}</div>'
+
+
+def _distances(subject: Subject, target_kmh: float) -> str:
+    header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "by bound m", f"fixed {FIXED_MU} m"]
+    body = [_distance_cells(row) for row in rows(subject.run, target_kmh, subject.config.train)]
+    return _table(header, body, "number") if body else "<p>The train did not slow down.</p>"
+
+
+def _distance_cells(row: Row) -> list[str]:
+    adhesions = (_value(mu, "{:.4f}") for mu in (row.true_mu, row.mu, row.mu_lower))
+    lengths = (_value(m, "{:.0f}") for m in (row.true_m, row.identified_m, row.at_least_m, row.fixed_m))
+    return [f"{row.speed_kmh:.0f}", *adhesions, *lengths]
+
+
+def _diagnostics(subject: Subject) -> str:
+    run = subject.run
+    counts = _table(["", ""], ([escape(key), f"<code>{escape(value)}</code>"] for key, value in run.counts.items()))
+    lists = (("The estimator said", run.remarks), ("The ATP monitor said", run.levels))
+    return counts + "".join(_changes(subject, title, changes(series)) for title, series in lists if series.t_ns.size)
+
+
+def _changes(subject: Subject, title: str, found: list[tuple[int, str]]) -> str:
+    origin_ns = subject.run.origin_ns
+    body = [[f"{(t_ns - origin_ns) * 1e-9:.1f} s", escape(text)] for t_ns, text in found[:MOST_CHANGES]]
+    more = f"<p>and {len(found) - MOST_CHANGES} more changes</p>" if len(found) > MOST_CHANGES else ""
+    return (_table([title, ""], body) + more) if body else ""
+
+
+def _parameters(given: Mapping[str, Any]) -> str:
+    """The given settings in sight, all of them on demand."""
+    changed = ", ".join(f"<code>{escape(f'{name} = {value}')}</code>" for name, value in given.items())
+    body = (
+        [f"<code>{s.name}</code>", escape(str(given.get(s.name, s.default))), escape(s.unit), escape(s.description)]
+        for s in SETTINGS
+    )
+    return (
+        f"<h2>Parameters</h2><p>{changed or 'All at their defaults.'} A recording does not hold the parameters of the "
+        "estimator that ran beside it; what is drawn of its forces and distances takes the train from here.</p>"
+        f"<details><summary>All parameters</summary>{_table(['name', 'value', 'unit', 'meaning'], body)}</details>"
+    )
+
+
+def _versions() -> str:
+    names = ("adhesion_node", "numpy", "scipy")
+    listed = [f"{name} {_version(name)}" for name in names] + [f"Python {platform.python_version()}"]
+    return f"<h2>Versions</h2><p>{escape(', '.join(listed))}</p>"
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:  # run from the source tree
+        return "not installed"
+
+
+def _table(header: Sequence[str], body: Iterable[Sequence[str]], kind: str = "") -> str:
+    """A table of cells that are HTML already."""
+    of_kind = f' class="{kind}"' if kind else ""
+    head = "".join(f"<th{of_kind}>{cell}</th>" for cell in header)
+    lines = "".join("<tr>" + "".join(f"<td{of_kind}>{cell}</td>" for cell in row) + "</tr>" for row in body)
+    return f'<div class="scroll"><table><tr>{head}</tr>{lines}</table></div>'

@@ -1,0 +1,82 @@
+"use strict";
+// The report: a column of charts for every run, and one slider that moves the present through all of them.
+
+const { runs, target_kmh: target, fixed_mu: fixedMu } = JSON.parse(document.getElementById("data").textContent);
+const slider = document.getElementById("slider"), shownTime = document.getElementById("time");
+const all = (pick) => runs.flatMap(pick);
+const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => run.true_mu.t.at(-1) ?? 0));
+
+// Equal axes in all columns: runs side by side are to be compared by eye.
+const NAMES = ["mu", "mu_lower", "true_mu", "speed", "true_speed", "brake", "identified_force", "true_force", "saved", "saved_at_least"];
+const ranges = Object.fromEntries(NAMES.map((name) => [name, rangeOf(all((run) => run[name].v))]));
+const upTo = (...names) => [0, 1.08 * Math.max(...names.map((name) => ranges[name][1]))];
+const around = (...names) => {
+  const [low, high] = rangeOf([0, ...names.flatMap((name) => ranges[name])]), air = 0.06 * (high - low);
+  return [low - air, high + air];
+};
+const time = { label: "time, s", range: [0, longest] };
+const way = { label: "position from the start, m", range: [0, Math.max(...all((run) => run.moments.flatMap((m) => [m.safe?.x.at(-1) ?? 0, m.nominal?.x.at(-1) ?? 0])), 1)] };
+
+const line = (label, kind, series, dots = false) => ({ label, kind, x: series.t, y: series.v, dots });
+const known = (lines) => lines.filter((candidate) => candidate.x.length);
+
+function timeCharts(run) {
+  return [
+    { title: "Adhesion coefficient", y: { range: upTo("mu", "true_mu") }, lines: known([
+      { label: `fixed worst case ${fixedMu}`, kind: "fixed", x: time.range, y: [fixedMu, fixedMu] }, line("true", "truth", run.true_mu),
+      line(`lower bound${run.confidence}`, "bound", run.mu_lower), line("identified μ̂", "identified", run.mu, true)]) },
+    { title: "Speed, km/h", y: { range: upTo("speed", "true_speed") }, lines: known([line("true", "truth", run.true_speed), line("estimated", "identified", run.speed, true)]) },
+    { title: "Forces, kN", y: { range: upTo("brake", "identified_force", "true_force") }, lines: known([
+      line("brake B", "fixed", run.brake), line("adhesion F, true", "truth", run.true_force), line("adhesion F, identified", "identified", run.identified_force, true)]) },
+    { title: `Braking distance to ${target} km/h saved against μ = ${fixedMu}, m`, y: { range: around("saved", "saved_at_least") }, lines: known([
+      line(`at least${run.confidence}`, "bound", run.saved_at_least), line("by the identified μ̂", "identified", run.saved, true)]) },
+  ];
+}
+
+function curveChart(run, moment) {
+  const lines = [{ label: `by the fixed ${fixedMu}`, kind: "fixed", ...moment.fixed }, { label: "what the train did", kind: "truth", ...run.path }];
+  if (moment.safe) lines.push({ label: "safe: by the lower bound", kind: "bound", ...moment.safe });
+  if (moment.nominal) lines.push({ label: "by the identified μ̂", kind: "identified", ...moment.nominal });
+  return { title: "Braking curve at this time, km/h", x: way, y: { range: upTo("speed", "true_speed") }, lines,
+           marks: [{ x: moment.fixed.x[0], y: moment.fixed.y[0], kind: "now", label: "" }] };
+}
+
+const number = (value, digits, unit = "") => (value === null ? "–" : value.toFixed(digits) + unit);
+
+function readout(moment) {
+  return `${number(moment.speed, 1)} km/h, μ̂ ${number(moment.mu, 4)}, at least ${number(moment.mu_lower, 4)}, ${moment.regime}; ` +
+    `to ${target} km/h ${number(moment.distance, 0)} m, saved ${number(moment.saved, 0)} m, at least ${number(moment.saved_at_least, 0)} m`;
+}
+
+// The newest moment at a time; the first one before it.
+const momentAt = (run, t) => run.moments.findLast((moment) => moment.t <= t) ?? run.moments[0];
+
+const columns = runs.map((run) => {
+  const host = document.getElementById("runs").appendChild(element("section", { class: "run" }));
+  host.append(element("h2", {}, run.name), element("p", { class: "soft" }, run.source));
+  const text = host.appendChild(element("p", { class: "readout" })), grid = host.appendChild(element("div", { class: "columns" }));
+  const curve = chart(grid), charts = timeCharts(run).map((spec) => {
+    const made = chart(grid, (t) => show(t));
+    made.draw({ ...spec, x: time, bands: run.bands });
+    return made;
+  });
+  return (t) => {
+    const moment = momentAt(run, t);
+    text.textContent = readout(moment);
+    charts.forEach((made) => made.cursor(Math.min(t, longest)));
+    curve.draw(curveChart(run, moment));
+  };
+});
+
+function show(t) {
+  const shown = Math.min(Math.max(t, 0), longest);
+  slider.value = String(shown);
+  shownTime.textContent = `${shown.toFixed(0)} s`;
+  columns.forEach((update) => update(shown));
+}
+
+slider.max = String(Math.ceil(longest));
+slider.addEventListener("input", () => show(Number(slider.value)));
+// The report opens where adhesion is first identified; #t=42 in the address opens another time.
+const asked = /t=([\d.]+)/.exec(location.hash);
+show(asked ? Number(asked[1]) : Math.min(...runs.map((run) => run.opens_at)));
