@@ -18,6 +18,7 @@ PROGRAMS = {
     "recover": "adhesion_node.recover",
     "demo": "adhesion_node.demo",
     "report": "adhesion_node.report.__main__",
+    "live": "adhesion_node.live.__main__",
     "study": "adhesion_node.study.__main__",
     "bench": "adhesion_node.bench.__main__",
 }
@@ -65,8 +66,15 @@ setup(
     extras_require={
         # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
         "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],
+        "live": ["aiohttp>=3.9,<4"],
         "cluster": CLUSTER,
-        "test": ["pytest>=8,<10", "hypothesis>=6.100,<7", "mcap-ros2-support>=0.5.5,<1", *CLUSTER],
+        "test": [
+            "pytest>=8,<10",
+            "hypothesis>=6.100,<7",
+            "mcap-ros2-support>=0.5.5,<1",
+            "playwright>=1.48,<2",
+            *CLUSTER,
+        ],
         "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
         # What `bench` measures against; particles wants numpy below 2.

@@ -1,7 +1,7 @@
-"""`demo`: simulator, estimator, ATP monitor and recorder in one process, faster than real time, then the result.
+"""`demo`: simulator, estimator, ATP monitor and recorder in one process, then the result.
 
-Leaves a recording and a picture and prints what was identified. The simulated clock waits for the estimator, so the
-run does not depend on the machine's speed.
+Leaves a recording and a picture and prints what was identified. It runs as fast as it can, or with --live at real time
+and with a page in the browser.
 """
 
 from __future__ import annotations
@@ -9,20 +9,14 @@ from __future__ import annotations
 import argparse
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from functools import partial
+from collections.abc import Iterator, Sequence
+from contextlib import closing
 from itertools import count, pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
-import rclpy
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.logging import LoggingSeverity, set_logger_level
-from rclpy.parameter import Parameter
-from rclpy.signals import SignalHandlerOptions
 
-from sim_node.node import Simulator
 from sim_node.scenario import SCENARIOS
 
 from . import offline
@@ -30,24 +24,24 @@ from .bag import BagReader, select
 from .cli import DONE, FAILED, help_texts, json_option, report, run_tool
 from .core import Config, Estimate
 from .core.train import KMH
-from .nodes.atp_monitor import AtpMonitor
-from .nodes.estimator import Estimator
-from .nodes.recorder import Recorder
+from .line import Pace, executor_of_line, play
+from .line_live import LivePage
+from .live.address import address_options
+from .nodes.runtime import stop_on_signals
 from .pipeline import Pipeline
 from .report.picture import draw
 from .report.run import read_run
 from .report.series import read_status
 from .report.table import table
 from .score import Truth
-from .topics import ATP_STATUS, POSITION
+from .topics import ATP_STATUS
 
-EXAMPLES = ("demo", "demo --scenario low_adhesion_patch --seed 3 --output my_demo", "demo --json - > result.json")
-
-PATIENCE_S = 10.0
-"""Longest wait for a message between two nodes of the process."""
-
-NODES = ("recorder", "estimator", "atp_monitor", "simulator")
-"""Their errors are shown, the rest of their log is not: the demo says itself how far it is."""
+EXAMPLES = (
+    "demo",
+    "demo --live",
+    "demo --scenario low_adhesion_patch --seed 3 --output my_demo",
+    "demo --json - > result.json",
+)
 
 SHOWN_EVERY_S = 5.0
 """Simulated time between two lines of progress."""
@@ -55,7 +49,9 @@ SHOWN_EVERY_S = 5.0
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the demo."""
-    parser = argparse.ArgumentParser("demo", parents=[json_option()], **help_texts(__doc__, *EXAMPLES))
+    parents = [json_option(), address_options()]
+    parser = argparse.ArgumentParser("demo", parents=parents, **help_texts(__doc__, *EXAMPLES))
+    parser.add_argument("--live", action="store_true", help="at real time, with a page in the browser")
     parser.add_argument("--scenario", default="tunnel_entry", choices=tuple(SCENARIOS), help="what happens")
     parser.add_argument("--seed", type=int, default=1, help="seed of the noise (default: 1)")
     parser.add_argument(
@@ -64,17 +60,47 @@ def main(args: Sequence[str] | None = None) -> int:
     return run_tool(parser, _demo, args)
 
 
+class _Played(NamedTuple):
+    """A run: the folder of its recording, the digest of what the estimator published, and its monotonic start."""
+
+    output: Path
+    digest: str
+    started_s: float
+
+
 def _demo(options: argparse.Namespace) -> int:
-    output = _free(options.output)
-    started = time.monotonic()
-    digest = _play(options.scenario, output / "bag", options.seed)
+    progress = _Progress()
+    with executor_of_line() as executor:
+        if not options.live:
+            return _tell(options, _play(options, executor, lambda _, estimate: progress.show(estimate)))
+        with stop_on_signals() as stop, closing(LivePage(executor, options.host, options.port, stop)) as page:
+            _say(f"open {page.url}: the train starts when the page is open; Ctrl-C ends")
+            if not page.wait_for_viewer():
+                return DONE
+            played = _play(options, executor, lambda samples, estimate: progress.show(estimate) and page.pace(samples))
+            page.freeze()
+            code = _tell(options, played)
+            page.hold()
+            return code
+
+
+def _play(options: argparse.Namespace, executor: SingleThreadedExecutor, pace: Pace) -> _Played:
+    output, started_s = _free(options.output), time.monotonic()
+    target_kmh = _target_kmh(options.scenario)
+    digest = play(executor, options.scenario, target_kmh, output / "bag", options.seed, pace)
+    return _Played(output, digest, started_s)
+
+
+def _tell(options: argparse.Namespace, played: _Played) -> int:
+    """Evaluate the recording and report; the exit code."""
+    output, digest, started_s = played
+    target_kmh = _target_kmh(options.scenario)
     with BagReader(output / "bag") as reader:
         result, run = _evaluate(reader, options.seed), read_run(reader)
-    target_kmh = _target_kmh(options.scenario)
     draw(run, output / "run.png", f"{options.scenario}, seed {options.seed}", target_kmh)
     result |= {"live_digest": digest, "live_equals_offline": digest == result["digest"]}
     result |= {"bag": str(output / "bag"), "picture": str(output / "run.png")}
-    result["seconds"] = round(time.monotonic() - started, 1)
+    result["seconds"] = round(time.monotonic() - started_s, 1)
     report(options.json, result, "\n".join(["", table(run, target_kmh), "", *_said(result)]))
     return DONE if result["live_equals_offline"] else FAILED
 
@@ -101,86 +127,25 @@ def _free(wanted: Path) -> Path:
     return wanted if not wanted.exists() else next(path for path in numbered if not path.exists())
 
 
-def _play(scenario: str, bag: Path, seed: int) -> str:
-    """Run the nodes until the scenario ends; the digest of what the estimator published."""
-    with _executor() as executor:
-        common: dict[str, Any] = {"context": executor.context}
-        settings = [Parameter("scenario", value=scenario), Parameter("seed", value=seed)]
-        # First: a bad seed ends here, before anything is written.
-        simulator = Simulator(paced=False, parameter_overrides=settings, **common)
-        simulated = [Parameter("use_sim_time", value=True)]
-        recorder = Recorder(bag, parameter_overrides=simulated, **common)
-        estimator = Estimator(parameter_overrides=[*simulated, Parameter("seed", value=seed)], **common)
-        monitor = AtpMonitor(
-            parameter_overrides=[
-                *simulated,
-                Parameter("target_position_m", value=6000.0),
-                Parameter("target_speed_kmh", value=_target_kmh(scenario)),
-            ],
-            **common,
-        )
-        for node in (recorder, estimator, monitor, simulator):
-            executor.add_node(node)
-        progress = _Progress()
-        for ticks in count(1):
-            if not simulator.tick():
-                break
-            _spin_until(executor, partial(_have_heard, ticks, estimator, recorder))
-            progress.show(estimator.latest)
-        estimator.close()
-        _spin_until(executor, lambda: all(recorder.heard[topic] == sent for topic, sent in estimator.published.items()))
-        recorder.close()
-        return estimator.digest
-
-
-@contextmanager
-def _executor() -> Iterator[SingleThreadedExecutor]:
-    """An executor in a context of its own; its nodes are destroyed at the end."""
-    context = rclpy.Context()
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
-    executor = SingleThreadedExecutor(context=context)
-    for name in NODES:
-        set_logger_level(name, LoggingSeverity.ERROR)
-    try:
-        yield executor
-    finally:
-        for name in NODES:
-            set_logger_level(name, LoggingSeverity.UNSET)
-        nodes = list(executor.get_nodes())
-        executor.shutdown()
-        for node in nodes:
-            node.destroy_node()
-        context.try_shutdown()
-
-
-def _have_heard(positions: int, *nodes: Estimator | Recorder) -> bool:
-    return all(node.heard[POSITION] == positions for node in nodes)
-
-
-def _spin_until(executor: SingleThreadedExecutor, done: Callable[[], bool]) -> None:
-    deadline = time.monotonic() + PATIENCE_S
-    while not done():
-        if time.monotonic() > deadline:
-            raise OSError(f"no message between the nodes for {PATIENCE_S:g} s: is the loopback network there?")
-        executor.spin_once(timeout_sec=0.1)
-
-
 class _Progress:
     """Prints a line about every `SHOWN_EVERY_S` of simulated time on standard error."""
 
     def __init__(self) -> None:
-        self._due_ns = 0
-        _say(f"{'time':>7} {'speed':>10} {'mu':>7} {'at least':>9}  regime")
+        self._due_ns = -1
 
-    def show(self, estimate: Estimate | None) -> None:
-        """Print the estimate if a line is due."""
+    def show(self, estimate: Estimate | None) -> bool:
+        """Print the estimate if a line is due; True: the run goes on."""
+        if self._due_ns < 0:
+            self._due_ns = 0
+            _say(f"{'time':>7} {'speed':>10} {'mu':>7} {'at least':>9}  regime")
         if estimate is None or estimate.t_ns < self._due_ns:
-            return
+            return True
         self._due_ns = estimate.t_ns + round(SHOWN_EVERY_S * 1e9)
         _say(
             f"{estimate.t_ns * 1e-9:5.0f} s {estimate.speed_mps / KMH:5.0f} km/h {estimate.mu:7.4f} "
             f"{estimate.mu_lower:9.4f}  {estimate.regime.name}"
         )
+        return True
 
 
 def _say(text: str) -> None:

@@ -33,6 +33,7 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "mcap": ("mcap", "mcap-ros2-support"),
     "lz4": ("lz4", "mcap-ros2-support"),
     "zstandard": ("zstandard", "mcap-ros2-support"),
+    "aiohttp": ("aiohttp", "python3-aiohttp"),
 }
 PEERS = {"filterpy", "particles"}
 """What `bench` measures against: an extra, imported only by files of its own."""
@@ -114,7 +115,7 @@ def test_a_console_script_has_its_main(name: str) -> None:
 
 
 def test_the_executables_of_the_design_are_there() -> None:
-    nodes = {"simulator", "slip_simulator", "estimator", "creep_estimator", "atp_monitor"}
+    nodes = {"simulator", "slip_simulator", "estimator", "creep_estimator", "atp_monitor", "live"}
     tools = {"recorder", "replay", "recover", "import_csv", "demo", "report", "study", "bench"}
     assert set(console_scripts()) == nodes | tools
 
@@ -123,8 +124,9 @@ def test_what_is_imported_is_declared() -> None:
     depends = {depend.text for depend in manifest().findall("exec_depend")}
     ros_packages = {name for name in imported() if ROS.fullmatch(name)}
     assert ros_packages <= depends
-    required = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in setup_arguments()["install_requires"]}
     extras = setup_arguments()["extras_require"]
+    requirements = [*setup_arguments()["install_requires"], *extras["live"]]
+    required = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in requirements}
     assert all(requirement.startswith(name) for name, extra in OPTIONAL.items() for requirement in extras[extra])
     for name in imported() - ros_packages - PEERS - OPTIONAL.keys():
         distribution, rosdep_key = FROM_PYPI[name]

@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..settings import SETTINGS
-from ..web import page
+from ..web import as_json, page
 from .curves import Subject, changes, chart_data
 from .findings import findings
 from .run import FIXED_MU
@@ -59,8 +59,8 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
     details += [_parameters(parameters), _versions()]
     return page(
         "report",
-        escape(title),
-        data,
+        title=escape(title),
+        data=as_json(data),
         subtitle=escape(subtitle),
         findings=_findings(subjects, target_kmh),
         details="\n".join(details),

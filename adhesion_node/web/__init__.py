@@ -7,21 +7,22 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
+STYLES = {"report": ("style.css",), "live": ("style.css", "live.css")}
+SCRIPTS = {"report": ("chart.js", "report.js"), "live": ("chart.js", "dial.js", "live.js")}
+"""What stands in each page, in this order."""
 
-def page(name: str, title: str, data: Any, **parts: str) -> str:
-    """Return the page `name`.html with its style, its scripts and `data` inlined.
 
-    `title` and `parts` fill the $placeholders and must be HTML already; the scripts find `data` in the element
-    `data`. Raises ValueError for a number that is not finite, which JSON cannot hold.
+def page(name: str, **parts: str) -> str:
+    """Return the page `name`.html with its styles and scripts inlined.
+
+    `parts` fill its $placeholders and must be HTML already, or JSON by `as_json` inside a script element.
     """
-    scripts = "\n".join(_read(script) for script in ("chart.js", f"{name}.js"))
-    return Template(_read(f"{name}.html")).substitute(
-        title=title, style=_read("style.css"), script=scripts, data=as_json(data), **parts
-    )
+    style, script = ("\n".join(map(_read, kind[name])) for kind in (STYLES, SCRIPTS))
+    return Template(_read(f"{name}.html")).substitute(style=style, script=script, **parts)
 
 
 def as_json(data: Any) -> str:
-    r"""Return compact JSON that may stand inside a script element.
+    r"""Return compact JSON that may stand inside a script element. Raises ValueError for a number that is not finite.
 
     >>> as_json({"name": "</script>"})
     '{"name":"\\u003c/script>"}'

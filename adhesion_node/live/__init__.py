@@ -1,0 +1,1 @@
+"""The live page: what the nodes say, in a browser, while they run."""
