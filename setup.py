@@ -28,12 +28,14 @@ CLUSTER = ["distributed>=2024.8,<2027"]
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
-    """List what goes under share/: marker, manifest, default parameters and reference recordings."""
+    """List what goes under share/: marker, manifest, parameters, layouts and recordings."""
     share = Path("share", NAME)
     files = [
         (Path("share/ament_index/resource_index/packages"), f"resource/{NAME}"),
         (share, "package.xml"),
         (share / "config", "adhesion_node/nodes/defaults.yaml"),
+        (share / "layouts", "adhesion_node/layouts/foxglove.json"),
+        (share / "layouts", "adhesion_node/layouts/plotjuggler.xml"),
     ]
     recordings = [path.relative_to(HERE) for path in sorted(HERE.glob("bags/**/*")) if path.is_file()]
     files += [(share / path.parent, str(path)) for path in recordings]
@@ -48,7 +50,7 @@ setup(
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=["adhesion_node*", "sim_node*"]),
-    package_data={"adhesion_node": ["py.typed", "nodes/*.yaml", "web/*"], "sim_node": ["py.typed"]},
+    package_data={"adhesion_node": ["py.typed", "nodes/*.yaml", "web/*", "layouts/*"], "sim_node": ["py.typed"]},
     data_files=shared_files(),
     zip_safe=False,
     python_requires=">=3.11",
