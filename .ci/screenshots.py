@@ -33,7 +33,7 @@ def picture_live(folder: Path) -> None:
         assert demo.stderr is not None
         demo.stderr.readline()  # "open http://...": it is served
         with open_page() as (page, _):
-            page.set_viewport_size({"width": 1250, "height": 905})
+            page.set_viewport_size({"width": 1250, "height": 985})
             page.goto(f"http://127.0.0.1:{port}/")
             page.locator("#state").get_by_text(SHOWN_AT, exact=True).wait_for(timeout=PATIENCE_MS)
             page.screenshot(path=BAGS / "live.png")
@@ -47,7 +47,7 @@ def picture_report(folder: Path) -> None:
     recordings = [str(BAGS / name) for name in ("tunnel_entry", "tunnel_exit")]
     report([*recordings, "--output", str(folder / "report"), "--target", "100"])
     with open_page() as (page, _):
-        page.set_viewport_size({"width": 1250, "height": 1240})
+        page.set_viewport_size({"width": 1250, "height": 1350})
         page.goto(f"{(folder / 'report' / 'report.html').as_uri()}#t=40")
         page.screenshot(path=BAGS / "report.png")
 

@@ -93,7 +93,7 @@ function chart(host, onPick = null) {
       line.x.forEach((x, i) => line.y[i] === null || drawn.append(shape("circle", { cx: sx(x), cy: sy(line.y[i]), r: 2, class: line.kind })));
     }
     for (const mark of spec.marks ?? []) {
-      const right = sx(mark.x) > width / 2;
+      const right = sx(mark.x) > width - 8 * mark.label.length - 30;
       drawn.append(shape("circle", { cx: sx(mark.x), cy: sy(mark.y), r: 5, class: `mark ${mark.kind}` }));
       drawn.append(shape("text", { x: sx(mark.x) + (right ? -9 : 9), y: sy(mark.y) - 8, "text-anchor": right ? "end" : "start", class: "mark" }, mark.label));
     }

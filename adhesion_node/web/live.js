@@ -26,7 +26,7 @@ function drawCab() {
   rows(byId("limits"), [
     ["target", `${number(limits.target_kmh, 0, " km/h")} in ${number(left, 0, " m")}`], ["permitted speed", number(limits.permitted, 0, " km/h")],
     ["warning from", number(limits.warning, 0, " km/h")], ["service brake from", number(limits.sbi, 0, " km/h")],
-    ["emergency brake from", number(limits.ebi, 0, " km/h")], ["left before the emergency brake", number(limits.margin_m, 0, " m")]]);
+    ["emergency brake from", number(limits.ebi, 0, " km/h")], ["emergency brake in", number(limits.margin_m, 0, " m")]]);
 }
 
 function drawWay() {
@@ -40,7 +40,7 @@ function drawWay() {
   if (curves.nominal) lines.push({ label: "braking by μ̂", kind: "identified", ...curves.nominal });
   const marks = [{ x: here, y: train.speed, kind: "now", label: "" }];
   if (supervision?.target_m != null) marks.push({ x: supervision.target_m, y: supervision.target_kmh, kind: "target", label: `target ${number(supervision.target_kmh, 0)} km/h` });
-  way.draw({ title: "Speed along the track, km/h", x: { label: "position, m", range: [here - BEHIND_M, Math.max(...ends) + 300] }, y: { range: [0, 1.08 * top] }, lines, marks });
+  way.draw({ title: "Speed along the track, km/h", x: { label: "position, m", range: [here - BEHIND_M, Math.max(...ends) + 1000] }, y: { range: [0, 1.08 * top] }, lines, marks });
 }
 
 // Each regime holds since the estimate before; equal neighbours are one band.
