@@ -42,6 +42,19 @@ def test_the_report_draws_every_chart_of_every_run(report: str) -> None:
         assert troubles == []
 
 
+def test_a_chart_is_drawn_in_the_size_that_it_has_and_over_the_range_of_its_values(tmp_path: Path) -> None:
+    assert main([str(record(tmp_path / "bag", *TRUTH)), "--output", str(tmp_path / "report")]) == 0
+    with browser.open_page() as (page, troubles):
+        page.goto((tmp_path / "report" / "report.html").as_uri())
+        for picture in page.locator("figure.chart > svg").all():
+            box = picture.bounding_box()
+            assert box is not None
+            assert float((picture.get_attribute("viewBox") or "").split()[2]) == pytest.approx(box["width"], abs=1.5)
+        adhesion = page.locator("figure.chart", has_text="Adhesion coefficient")
+        assert max(map(float, adhesion.locator("text.y").all_text_contents())) == 0.08  # 0.09 is the largest value
+        assert troubles == []
+
+
 def test_the_slider_moves_the_present_of_all_runs(report: str) -> None:
     with browser.open_page() as (page, troubles):
         page.goto(f"{report}#t=12")

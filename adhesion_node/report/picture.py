@@ -14,7 +14,7 @@ from ..reading import ATMOSPHERE_PA
 from .findings import Distances, distances
 from .run import FIXED_MU, Run, bands
 
-SHADES = {"COASTING": "0.93", "BRAKE_LIMITED": "#dbe9f6", "ADHESION_LIMITED": "#fdebd0"}
+SHADES = {"COASTING": "0.85", "BRAKE_LIMITED": "#d3e5f7", "ADHESION_LIMITED": "#fff1dc"}
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0b5fa5", "#c75b00", "0.45"
 
 CURVES = 8

@@ -61,11 +61,11 @@ function chart(host, onPick = null) {
     const drawn = shape("g", { class: "axes" }), bottom = HEIGHT - MARGIN.bottom;
     for (const x of ticks(...spec.x.range, Math.max(width / 90, 2))) {
       drawn.append(shape("path", { d: `M${sx(x)},${MARGIN.top}V${bottom}` }));
-      drawn.append(shape("text", { x: sx(x), y: bottom + 15, "text-anchor": "middle" }, String(x)));
+      drawn.append(shape("text", { x: sx(x), y: bottom + 15, "text-anchor": sx(x) > width - 25 ? "end" : "middle" }, String(x)));
     }
     for (const y of ticks(...spec.y.range, 5)) {
       drawn.append(shape("path", { d: `M${MARGIN.left},${sy(y)}H${width - MARGIN.right}`, class: y === 0 ? "zero" : "" }));
-      drawn.append(shape("text", { x: MARGIN.left - 6, y: sy(y) + 4, "text-anchor": "end" }, String(y)));
+      drawn.append(shape("text", { x: MARGIN.left - 6, y: sy(y) + 4, "text-anchor": "end", class: "y" }, String(y)));
     }
     drawn.append(shape("text", { x: width - MARGIN.right, y: HEIGHT - 4, "text-anchor": "end" }, spec.x.label));
     return drawn;
@@ -114,7 +114,7 @@ function chart(host, onPick = null) {
 
   function draw(wanted = spec) {
     spec = wanted;
-    width = host.clientWidth || 640;
+    width = figure.clientWidth || 640;
     if (spec === null) return;
     caption.textContent = spec.title;
     svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
@@ -139,6 +139,6 @@ function chart(host, onPick = null) {
   }
 
   if (onPick !== null) for (const kind of ["pointerdown", "pointermove"]) svg.addEventListener(kind, pick);
-  new ResizeObserver(() => { if (host.clientWidth !== width) draw(); }).observe(host);
+  new ResizeObserver(() => { if (figure.clientWidth !== width) draw(); }).observe(figure);
   return { draw, cursor };
 }

@@ -7,11 +7,10 @@ const all = (pick) => runs.flatMap(pick);
 const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => run.true_mu.t.at(-1) ?? 0));
 
 // Equal axes in all columns: runs side by side are to be compared by eye.
-const NAMES = ["mu", "mu_lower", "true_mu", "speed", "true_speed", "brake", "identified_force", "true_force", "saved", "saved_at_least"];
-const ranges = Object.fromEntries(NAMES.map((name) => [name, rangeOf(all((run) => run[name].v))]));
-const upTo = (...names) => [0, 1.08 * Math.max(...names.map((name) => ranges[name][1]))];
+const rangeIn = (names) => rangeOf([0, ...all((run) => names.flatMap((name) => run[name].v))]);
+const upTo = (...names) => [0, 1.08 * rangeIn(names)[1]];
 const around = (...names) => {
-  const [low, high] = rangeOf([0, ...names.flatMap((name) => ranges[name])]), air = 0.06 * (high - low);
+  const [low, high] = rangeIn(names), air = 0.06 * (high - low);
   return [low - air, high + air];
 };
 const time = { label: "time, s", range: [0, longest] };
