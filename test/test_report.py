@@ -10,9 +10,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64
 from test_offline import samples, write_run
-from test_picture import FREE, TRUTH, read, record
+from test_picture import FREE, START_NS, TRUTH, S, read, record, rows
 
+from adhesion_node.bag import BagWriter
 from adhesion_node.core import Config
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
@@ -20,7 +23,7 @@ from adhesion_node.report.curves import changes
 from adhesion_node.report.findings import distances, findings, first_identified
 from adhesion_node.report.run import Band, bands
 from adhesion_node.report.series import Series
-from adhesion_node.topics import DIAGNOSTICS
+from adhesion_node.topics import DIAGNOSTICS, TRUTH_MU
 
 QUICK = ("--set", "iterations=3")
 
@@ -114,6 +117,18 @@ def test_recordings_stand_side_by_side_under_their_own_names(tmp_path: Path) -> 
     assert [len(run["true_mu"]["t"]) for run in page.data["runs"]] == [20, 0]
     assert page.data["target_kmh"] == 180.0
     assert all(Path(path).is_file() for run in result["runs"] for path in run["pictures"])
+
+
+def test_a_recorded_number_that_is_none_leaves_a_gap(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            for topic, cdr in rows(second):
+                broken = topic is TRUTH_MU and second == 7
+                cdr_ = serialize_message(Float64(data=float("nan"))) if broken else cdr
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr_, START_NS + second * S)
+    _, page = make(tmp_path, str(tmp_path / "bag"))
+    values = page.data["runs"][0]["true_mu"]["v"]
+    assert [second for second, value in enumerate(values) if value is None] == [7]
 
 
 def test_a_name_cannot_break_the_page(tmp_path: Path) -> None:

@@ -1,1 +1,1 @@
-"""What a recording shows: its series, their picture and their table."""
+"""What a recording shows: its series, and the page, the pictures and the table of them."""

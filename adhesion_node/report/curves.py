@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -101,7 +102,7 @@ def _start_m(run: Run) -> float:
     return float(place.values[0])
 
 
-def _path(run: Run) -> dict[str, list[float]]:
+def _path(run: Run) -> dict[str, list[float | None]]:
     """The way of the train: the true one where it is known."""
     known = run.true_position.t_ns.size > 0
     place, speed = (run.true_position, run.true_speed) if known else (run.position, run.speed)
@@ -109,11 +110,11 @@ def _path(run: Run) -> dict[str, list[float]]:
     return _way(Curve(0, place.values[kept], speed.values[kept]), _start_m(run))
 
 
-def _way(curve: Curve, start_m: float) -> dict[str, list[float]]:
+def _way(curve: Curve, start_m: float) -> dict[str, list[float | None]]:
     return {"x": _rounded(curve.position_m - start_m, 1), "y": _rounded(curve.speed_mps / KMH, 2)}
 
 
-def _over_time(run: Run, t_ns: Times, values: Array, digits: int) -> dict[str, list[float]]:
+def _over_time(run: Run, t_ns: Times, values: Array, digits: int) -> dict[str, list[float | None]]:
     kept = _thinned(t_ns.size, MOST_POINTS)
     return {"t": _rounded(run.seconds(t_ns[kept]), 3), "v": _rounded(values[kept], digits)}
 
@@ -123,9 +124,10 @@ def _thinned(size: int, most: int) -> Times:
     return np.unique(np.linspace(0, size - 1, min(size, most)).round().astype(np.int64)) if size else np.arange(0)
 
 
-def _rounded(values: ArrayLike, digits: int) -> list[float]:
+def _rounded(values: ArrayLike, digits: int) -> list[float | None]:
+    """Numbers for JSON; None, a gap in the chart, for what is not finite."""
     rounded: list[float] = np.round(np.asarray(values, dtype=np.float64), digits).tolist()
-    return rounded
+    return [number if math.isfinite(number) else None for number in rounded]
 
 
 def _round(value: float, digits: int) -> float:

@@ -14,6 +14,9 @@ from ..score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
 from .run import FIXED_MU, Run, distance_to_target
 from .series import Series
 
+AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
+"""Findings at the first estimate that counts as identified: speed, adhesion, braking distances."""
+
 
 class Distances(NamedTuple):
     """Braking distances, m, at every estimate; arrays of the estimates' shape."""
@@ -58,10 +61,7 @@ def first_identified(run: Run) -> int | None:
 
 
 def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
-    """Return the findings by name; None where the run cannot tell.
-
-    `saved_m` and the like are those at the first estimate that counts as identified, `identified_at_kmh`.
-    """
+    """Return the findings by name; None where the run cannot tell."""
     speeds = run.speed.values / KMH
     found: dict[str, Any] = {
         "seconds": float(run.seconds(run.speed.t_ns)[-1]),
@@ -69,17 +69,16 @@ def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
         "to_kmh": float(speeds[-1]),
         "mean_relative_error_percent": _error(run, config),
         "target_kmh": target_kmh,
-        **dict.fromkeys(("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")),
+        **dict.fromkeys(AT_FIRST),
         "dropped": dropped(run.counts),
     }
     at = first_identified(run)
     if at is not None:
         planned = distances(run, target_kmh * KMH, config.train)
         time = run.speed.t_ns[at : at + 1]
-        values = (speeds[at], run.mu.at(time)[0], run.mu_lower.at(time)[0], planned.fixed[at])
-        saved = planned.saved[at], planned.saved_at_least[at]
-        names = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
-        found |= {name: float(value) for name, value in zip(names, (*values, *saved), strict=True)}
+        identified = (speeds[at], run.mu.at(time)[0], run.mu_lower.at(time)[0])
+        lengths = (planned.fixed[at], planned.saved[at], planned.saved_at_least[at])
+        found |= {name: float(value) for name, value in zip(AT_FIRST, (*identified, *lengths), strict=True)}
     return found
 
 

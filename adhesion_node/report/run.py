@@ -167,7 +167,8 @@ def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
     """Read about `MOST_CURVES` of the curves, evenly spread: decoding one takes as long as a hundred numbers."""
     recorded = reader.resolve(topic.name)
     stride = max(reader.counts[recorded] // MOST_CURVES, 1) if recorded else 1
-    return tuple(_curve(record.message) for record in islice(reader.messages([topic.name]), None, None, stride))
+    chosen = (record.message for record in islice(reader.messages([topic.name]), None, None, stride))
+    return tuple(_curve(message) for message in chosen if message.points)
 
 
 def _curve(message: Any) -> Curve:
