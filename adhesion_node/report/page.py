@@ -51,8 +51,8 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
     }
     subtitle = (
         f"Wheel–rail adhesion and emergency braking to {target_kmh:g} km/h, beside the fixed worst case "
-        f"μ\u00a0=\u00a0{FIXED_MU}. Bands: nothing to learn (grey), the brake limits (blue), "
-        "the adhesion limits (orange)."
+        f"μ\u00a0=\u00a0{FIXED_MU}. Distances hold each μ at its present value. "
+        "Bands: nothing to learn (grey), the brake limits (blue), the adhesion limits (orange)."
     )
     details = [_section("Distances", subjects, lambda subject: _distances(subject, target_kmh))]
     details += [_section("Drops and diagnostics", subjects, _diagnostics)]

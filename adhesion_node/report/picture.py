@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
@@ -83,6 +84,8 @@ def _draw_distance(axis: Any, run: Run, planned: Distances, target_kmh: float) -
     axis.plot(seconds, planned.longest, color=BLUE, ls="--", label="lower bound of mu (safe curve)")
     axis.plot(seconds, planned.identified, color=ORANGE, label="identified mu")
     axis.set_ylabel(f"braking distance to {target_kmh:.0f} km/h, m")
+    # A bound near 0 needs any distance: beyond the worst case there is nothing to compare.
+    axis.set_ylim(top=2.0 * max(float(planned.fixed.max()), 1.0))
 
 
 def _draw_saving(axis: Any, run: Run, planned: Distances, target_kmh: float) -> None:
@@ -92,6 +95,7 @@ def _draw_saving(axis: Any, run: Run, planned: Distances, target_kmh: float) -> 
     axis.plot(seconds, planned.saved_at_least[run.learnt], color=BLUE, ls="--", label="at least, by the lower bound")
     axis.plot(seconds, planned.saved[run.learnt], color=ORANGE, label="by the identified mu")
     axis.set_ylabel(f"distance to {target_kmh:.0f} km/h saved, m")
+    axis.set_ylim(bottom=-2.0 * max(float(np.abs(planned.saved[run.learnt]).max(initial=0.0)), 1.0))
 
 
 def _draw_curves(axis: Any, run: Run) -> None:
@@ -105,6 +109,7 @@ def _draw_curves(axis: Any, run: Run) -> None:
     known = run.true_position.t_ns.size > 0
     place, speed = (run.true_position, run.true_speed) if known else (run.position, run.speed)
     axis.plot(place.values, speed.values / KMH, color=BLACK, lw=2, label="what the train did")
+    axis.set_xlim(place.values[0], place.values[0] + 2.0 * max(float(place.values[-1] - place.values[0]), 1.0))
     axis.set_xlabel("position, m")
     axis.set_ylabel("braking curves, km/h")
 

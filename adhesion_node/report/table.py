@@ -34,9 +34,9 @@ class Row(NamedTuple):
 
 
 def rows(run: Run, target_kmh: float, train: Train = CRH3) -> Iterator[Row]:
-    """Yield rows from 10 km/h below the highest speed down to 10 km/h above the target."""
+    """Yield rows from 10 km/h below the highest speed before down to 10 km/h above the target."""
     speeds, target_mps = run.speed.values, target_kmh * KMH
-    shown = np.flatnonzero((speeds < speeds.max() - 10.0 * KMH) & (speeds > target_mps + 10.0 * KMH))
+    shown = np.flatnonzero((speeds < np.maximum.accumulate(speeds) - 10.0 * KMH) & (speeds > target_mps + 10.0 * KMH))
     if shown.size > ROWS:
         shown = shown[np.linspace(0, shown.size - 1, ROWS).round().astype(int)]
     mu, lower = run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns)

@@ -33,7 +33,7 @@ function drawWay() {
   const { train, curves, passed, history, supervision } = state;
   if (train === null) return;
   const here = state.place_m ?? train.position, along = (name) => passed.map((row) => row[name]), positions = passed.map((row) => row.position);
-  const ends = [here + 1000, supervision?.target_m ?? 0, curves.safe?.x.at(-1) ?? 0], top = Math.max(train.speed, ...passed.map((row) => row.ebi ?? 0), ...history.map((row) => row.speed));
+  const ends = [here + 1000, supervision?.target_m ?? 0, curves.nominal?.x.at(-1) ?? 0], top = Math.max(train.speed, ...passed.map((row) => row.ebi ?? 0), ...history.map((row) => row.speed));
   const lines = [{ label: "emergency brake from", kind: "intervention", x: positions, y: along("ebi") }, { label: "permitted", kind: "permitted", x: positions, y: along("permitted") },
     { label: "run", kind: "truth", x: history.map((row) => row.position), y: history.map((row) => row.speed) }];
   if (curves.safe) lines.push({ label: "braking by the lower bound", kind: "bound", ...curves.safe });

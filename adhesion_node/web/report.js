@@ -10,11 +10,12 @@ const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => 
 const rangeIn = (names) => rangeOf([0, ...all((run) => names.flatMap((name) => run[name].v))]);
 const upTo = (...names) => [0, 1.08 * rangeIn(names)[1]];
 const around = (...names) => {
-  const [low, high] = rangeIn(names), air = 0.06 * (high - low);
+  const [lowest, high] = rangeIn(names), low = high > 0 ? Math.max(lowest, -2 * high) : lowest, air = 0.06 * (high - low);
   return [low - air, high + air];
 };
 const time = { label: "time, s", range: [0, longest] };
-const way = { label: "position from the start, m", range: [0, Math.max(...all((run) => run.moments.flatMap((m) => [m.safe?.x.at(-1) ?? 0, m.nominal?.x.at(-1) ?? 0])), 1)] };
+// A bound near 0 needs any distance: as far as the fixed worst case tells all there is to compare.
+const way = { label: "position from the start, m", range: [0, 1.08 * Math.max(1, ...all((run) => run.path.x), ...all((run) => run.moments.map((m) => m.fixed.x.at(-1))))] };
 
 const line = (label, kind, series, dots = false) => ({ label, kind, x: series.t, y: series.v, dots });
 const known = (lines) => lines.filter((candidate) => candidate.x.length);
