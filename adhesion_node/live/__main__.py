@@ -6,18 +6,19 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from ..cli import run_tool
+from ..cli import help_texts, run_tool
 from ..nodes import runtime
 from .address import address_options
 from .node import Live
+
+EXAMPLES = ("live", "live --port 9000 --ros-args -r __ns:=/train1")
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run `live [--host H] [--port N] [--ros-args ...]` until a signal."""
     own, ros = runtime.split_ros_arguments(sys.argv[1:] if args is None else args)
-    parser = argparse.ArgumentParser(
-        "live", description=__doc__, parents=[address_options()], usage="%(prog)s [options] [--ros-args ...]"
-    )
+    usage = "%(prog)s [options] [--ros-args ...]"
+    parser = argparse.ArgumentParser("live", parents=[address_options()], usage=usage, **help_texts(__doc__, *EXAMPLES))
     return run_tool(parser, lambda options: runtime.run(lambda: Live(options.host, options.port), ros), own)
 
 

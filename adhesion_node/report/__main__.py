@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bag import BagReader, parse_remap, select
-from ..cli import DONE, json_option, report, run_tool
+from ..cli import DONE, help_texts, json_option, report, run_tool
 from ..offline import parameters_of
 from ..settings import Setup, setup_of
 from .curves import Subject
@@ -25,6 +25,11 @@ from .run import RESULTS, read_run
 from .table import table
 
 PICTURES = (".png", ".pdf")
+
+EXAMPLES = (
+    "report my_run --output my_report",
+    "report before after --output both --target 100 --set train.mass_kg=400000",
+)
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -89,7 +94,7 @@ def _text(subject: Subject, target_kmh: float) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser("report", description=__doc__, parents=[json_option()])
+    parser = argparse.ArgumentParser("report", parents=[json_option()], **help_texts(__doc__, *EXAMPLES))
     add = parser.add_argument
     add("bags", metavar="BAG", nargs="+", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
     add("--output", metavar="DIR", required=True, help="folder of the report; one that is there is written over")
