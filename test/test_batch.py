@@ -19,8 +19,8 @@ from adhesion_node.core.train import Train
 from adhesion_node.core.window import Window
 from adhesion_node.study import batch, lockstep
 from adhesion_node.study.batch_filter import filter_windows
-from adhesion_node.study.batch_particles import draw, stack
-from adhesion_node.study.batch_smoother import Expectations, expectations
+from adhesion_node.study.batch_particles import Draws, draw, stack
+from adhesion_node.study.batch_smoother import Expectations, Room, expectations
 
 PRIOR = Gaussian(np.array([1000.0, 75.0]), np.array([[0.04, 0.02], [0.02, 0.05]]))
 SLOPED = Motion(Train(rotating_mass_fraction=0.08), Track((Grade(1010.0, 1400.0, 3.0),)), 0.004, 3e-4)
@@ -90,7 +90,9 @@ def test_a_window_that_no_particle_explains_is_still_a_law() -> None:
     case = _cases(Linear().motion)[0]
     stacked = stack([far, case.prior], [case.window, case.window])
     rngs = [np.random.default_rng(1), np.random.default_rng(1)]
-    found = expectations(Linear().motion, stacked, np.array([0.05, 0.05]), draw(rngs, case.window.steps, 20))
+    room = Room.of(2, case.window.steps, 20)
+    draw(rngs, room.draws)
+    found = expectations(Linear().motion, stacked, np.array([0.05, 0.05]), room)
     core = ParticleSmoother(20)(Linear().motion, far, case.window, 0.05, np.random.default_rng(1))
     np.testing.assert_allclose(found.used[0], core.used, rtol=1e-9, atol=1e-9)
     assert np.all(np.isfinite(found.used))
@@ -165,7 +167,9 @@ def test_a_run_does_not_depend_on_its_company() -> None:
 
 def test_windows_that_share_a_generator_share_its_numbers() -> None:
     shared, other = np.random.default_rng(7), np.random.default_rng(8)
-    draws = draw([shared, other, shared], 4, 3)
+    draws, alone = Draws.empty(3, 4, 3), Draws.empty(1, 4, 3)
+    draw([shared, other, shared], draws)
+    draw([np.random.default_rng(8)], alone)
     assert np.array_equal(draws.normal[0], draws.normal[2])
     assert not np.array_equal(draws.normal[0], draws.normal[1])
-    assert np.array_equal(draws.normal[1], draw([np.random.default_rng(8)], 4, 3).normal[0])
+    assert np.array_equal(draws.normal[1], alone.normal[0])

@@ -10,7 +10,7 @@ from ..core.em import Identified, Search
 from ..core.motion import Motion
 from ..core.train import Array
 from .batch_particles import Windows, draw
-from .batch_smoother import Expectations, expectations
+from .batch_smoother import Expectations, Room, expectations
 
 
 def maximise(expected: Expectations, lowest: Array) -> Array:
@@ -41,9 +41,12 @@ def identify(
     mu = np.array([search.start for search in searches])
     iterations, tolerance, lowest = (np.array(column) for column in list(zip(*searches, strict=True))[1:])
     going, done = np.arange(len(searches)), 0
+    room = Room.of(going.size, len(windows.dt_s), count)
     while going.size:
-        draws = draw([rngs[int(run)] for run in going], windows.dt_s.shape[0], count)
-        expected = expectations(motion, windows.of(going), mu[going], draws)
+        if going.size != len(room.draws.start):
+            room = Room.of(going.size, len(windows.dt_s), count)
+        draw([rngs[int(run)] for run in going], room.draws)
+        expected = expectations(motion, windows.of(going), mu[going], room)
         previous, mu[going] = mu[going], maximise(expected, lowest[going])
         top = expected.limit.max(axis=1)
         inside = (lowest[going] < mu[going]) & (mu[going] < top)

@@ -58,6 +58,11 @@ class Draws(NamedTuple):
     start: Array
     """First states, (R, N, 2)."""
 
+    @classmethod
+    def empty(cls, runs: int, steps: int, count: int) -> Draws:
+        """Room for those of R runs, K steps and N particles."""
+        return cls(np.empty((runs, 2, steps, count)), np.empty((runs, steps)), np.empty((runs, count, 2)))
+
 
 def stack(priors: Sequence[Gaussian], windows: Sequence[Window]) -> Windows:
     """Put windows of equal length together."""
@@ -70,53 +75,58 @@ def stack(priors: Sequence[Gaussian], windows: Sequence[Window]) -> Windows:
     )
 
 
-def draw(rngs: Sequence[np.random.Generator], steps: int, count: int) -> Draws:
+def draw(rngs: Sequence[np.random.Generator], draws: Draws) -> None:
     """Draw what one filter run takes, in the core's order; runs that share a generator share its numbers."""
-    own = list(dict.fromkeys(rngs))
-    draws = Draws(*(np.empty((len(own), *shape)) for shape in ((2, steps, count), (steps,), (count, 2))))
-    for run, rng in enumerate(own):
-        rng.standard_normal(out=draws.normal[run])
-        rng.random(out=draws.uniform[run])
-        rng.standard_normal(out=draws.start[run])
-    shares = [own.index(rng) for rng in rngs]
-    return draws if len(own) == len(rngs) else Draws(*(column[shares] for column in draws))
+    first: dict[np.random.Generator, int] = {}
+    for run, rng in enumerate(rngs):
+        drawn = first.setdefault(rng, run)
+        if drawn == run:
+            rng.standard_normal(out=draws.normal[run])
+            rng.random(out=draws.uniform[run])
+            rng.standard_normal(out=draws.start[run])
+        else:
+            for numbers in draws:
+                numbers[run] = numbers[drawn]
 
 
-def particle_filter(
-    motion: Motion, windows: Windows, mu: Array, draws: Draws
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Bootstrap filter: positions, speeds and log weights (K + 1, R, N), log likelihoods and smallest ESS (R,)."""
-    steps, runs, _ = windows.dt_s.shape
-    count = draws.start.shape[1]
-    position, speed, log_weights = np.empty((3, steps + 1, runs, count))
-    spread_s, spread_v = (np.sqrt(np.asarray(variance)) for variance in motion.noise(windows.dt_s))
-    first = windows.mean[:, None, :] + draws.start @ windows.root.transpose(0, 2, 1)
-    position[0], speed[0], log_weights[0] = first[..., 0], first[..., 1], 0.0
-    ess, log_likelihood = np.full(runs, float(count)), np.zeros(runs)
-    smallest_ess = ess
-    measured_speed = np.isfinite(windows.speed_variance)
+def particle_filter(motion: Motion, windows: Windows, mu: Array, draws: Draws, particles: Array) -> tuple[Array, Array]:
+    """Bootstrap filter: log likelihoods and smallest ESS (R,).
+
+    Positions, speeds and log weights are written to `particles`, (3, K + 1, R, N).
+    """
+    _begin(motion, windows, draws, particles)
+    position, speed, log_weights = particles
+    steps, (runs, count) = len(windows.dt_s), position.shape[1:]
+    precision, measured_speed = -0.5 / windows.variance_m2, np.isfinite(windows.speed_variance)
+    top, relative = np.zeros((runs, 1)), np.ones((runs, count))
+    ess, log_likelihood = np.full((steps + 1, runs), float(count)), np.zeros(runs)
     for k in range(steps):
         s, v, log_w = position[k], speed[k], log_weights[k]
-        poor = np.flatnonzero(ess < count / 2)
+        poor = np.flatnonzero(ess[k] < count / 2)
         if poor.size:
-            weights, log_mean = normalised(log_w[poor])
+            weights, log_mean = _normalised(top[poor], relative[poor])
             log_likelihood[poor] += log_mean
-            parents = _parents(weights, draws.uniform[poor, k])
+            parents = poor[:, None], _parents(weights, draws.uniform[poor, k])
             s, v, log_w = s.copy(), v.copy(), log_w.copy()
-            s[poor], v[poor] = (np.take_along_axis(x[poor], parents, axis=1) for x in (s, v))
-            log_w[poor] = 0.0
+            s[poor], v[poor], log_w[poor] = s[parents], v[parents], 0.0
         s, v = motion.advance(s, v, windows.dt_s[k], windows.brake[k], mu)
-        s += spread_s[k] * draws.normal[:, 0, k]
-        v += spread_v[k] * draws.normal[:, 1, k]
-        log_w = log_w + (-0.5 / windows.variance_m2[k]) * (windows.position_m[k] - s) ** 2
+        s, v = np.add(position[k + 1], s, out=position[k + 1]), np.add(speed[k + 1], v, out=speed[k + 1])
+        log_w = np.add(log_w, precision[k] * (windows.position_m[k] - s) ** 2, out=log_weights[k + 1])
         if measured_speed[k].any():
             log_w -= (0.5 / windows.speed_variance[k]) * (windows.speed_mps[k] - v) ** 2
-        relative = np.exp(log_w - log_w.max(axis=1, keepdims=True))
-        ess = np.einsum("rn->r", relative) ** 2 / np.einsum("rn,rn->r", relative, relative)
-        smallest_ess = np.minimum(smallest_ess, ess)
-        position[k + 1], speed[k + 1], log_weights[k + 1] = s, v, log_w
-    log_likelihood += normalised(log_weights[-1])[1] + windows.log_constant
-    return position, speed, log_weights, log_likelihood, smallest_ess
+        top = log_w.max(axis=1, keepdims=True)
+        relative = np.exp(log_w - top)
+        ess[k + 1] = np.einsum("rn->r", relative) ** 2 / np.einsum("rn,rn->r", relative, relative)
+    log_likelihood += _normalised(top, relative)[1] + windows.log_constant
+    return log_likelihood, ess.min(axis=0)
+
+
+def _begin(motion: Motion, windows: Windows, draws: Draws, particles: Array) -> None:
+    """Write the first positions, speeds and log weights, and of the later ones the noise alone."""
+    first = windows.mean[:, None, :] + draws.start @ windows.root.transpose(0, 2, 1)
+    particles[0, 0], particles[1, 0], particles[2, 0] = first[..., 0], first[..., 1], 0.0
+    for index, variance in enumerate(motion.noise(windows.dt_s)):
+        np.multiply(np.sqrt(variance), draws.normal[:, index].transpose(1, 0, 2), out=particles[index, 1:])
 
 
 def _parents(weights: Array, offsets: Array) -> Indices:
@@ -131,6 +141,10 @@ def _parents(weights: Array, offsets: Array) -> Indices:
 def normalised(log_weights: Array) -> tuple[Array, Array]:
     """Normalised weights and the logarithms of the mean weights."""
     top = log_weights.max(axis=1, keepdims=True)
-    weights = np.exp(log_weights - top)
-    total = weights.sum(axis=1, keepdims=True)
-    return weights / total, (top + np.log(total / weights.shape[1]))[:, 0]
+    return _normalised(top, np.exp(log_weights - top))
+
+
+def _normalised(top: Array, relative: Array) -> tuple[Array, Array]:
+    """The same of weights exp(top) * relative."""
+    total = relative.sum(axis=1, keepdims=True)
+    return relative / total, (top + np.log(total / relative.shape[1]))[:, 0]
