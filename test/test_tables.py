@@ -115,11 +115,20 @@ def test_a_chunk_comes_back_from_the_cache_whole(tmp_path: Path) -> None:
     assert (stored.chunk, stored.seconds) == (QUICK, fresh.seconds)
 
 
+def test_other_seeds_of_the_estimator_see_the_same_runs() -> None:
+    found, other = _quick()["rows"], QUICK._replace(seed_shift=7).compute()["rows"]
+    assert np.array_equal(found["true_mu"], other["true_mu"])
+    assert np.array_equal(found["t_ns"], other["t_ns"])
+    assert not np.array_equal(found["mu"], other["mu"])
+    filtered = QUICK._replace(method="ekf_tuned")  # draws nothing
+    assert filtered.compute()["rows"].tobytes() == filtered._replace(seed_shift=7).compute()["rows"].tobytes()
+
+
 def test_a_chunk_of_other_settings_has_another_file() -> None:
     finer = replace(QUICK.config, particles=6)
     changed = (QUICK._replace(config=finer), QUICK._replace(seeds=2), QUICK._replace(sigma_m=0.1))
-    others = (QUICK._replace(method="ekf_tuned"), QUICK._replace(scenario="tunnel_entry"))
-    assert len({file_name(chunk) for chunk in (QUICK, *changed, *others)}) == 6
+    others = (QUICK._replace(method="ekf_tuned"), QUICK._replace(scenario="tunnel_entry"), QUICK._replace(seed_shift=1))
+    assert len({file_name(chunk) for chunk in (QUICK, *changed, *others)}) == 7
 
 
 def test_numbers_do_not_depend_on_the_workers_or_the_chunks(tmp_path: Path) -> None:

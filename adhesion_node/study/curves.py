@@ -56,9 +56,11 @@ def _draw(cells: Sequence[Cell], quantity: Quantity, path: Path, title: str) -> 
 
 
 def _draw_cell(axis: Any, cell: Cell, quantity: Quantity) -> None:
-    """The first run from every start, and the band that holds 90 % of the runs."""
+    """The first run from every start, the band that holds 90 % of the runs, and where the brake begins to limit."""
     axis.fill_between(*_band(cell, quantity), color="0.88", label="5-95 % of all runs")
     first = cell.runs[0][0]
+    brake_limits = first["speed_mps"][first["limited"]].min() / KMH
+    axis.axvline(brake_limits, color="0.6", lw=1.0, label="below this speed the brake limits")
     if quantity.name == "estimate":
         axis.plot(first["speed_mps"] / KMH, first["true_mu"], color="0.0", lw=3, alpha=0.35, label="true")
     for start, runs, (color, dashes) in zip(STARTS, cell.runs, STYLES, strict=True):

@@ -29,6 +29,8 @@ class Chunk(NamedTuple):
     seeds: int
     config: Config = Config()
     """The estimator's, `start_mu` left open."""
+    seed_shift: int = 0
+    """Added to a run's seed it gives that of its estimator."""
 
     @property
     def name(self) -> str:
@@ -50,7 +52,7 @@ class Chunk(NamedTuple):
         """Simulate and estimate every run; the rows of all runs stand in one array, run i before `ends[i]`."""
         started = time.perf_counter()
         lanes = [
-            Lane(seed, start, simulated)
+            Lane(seed + self.seed_shift, start, simulated)
             for seed in range(self.first_seed, self.first_seed + self.seeds)
             for simulated in (simulate(self.scenario, seed, self.sigma_m),)
             for start in STARTS
