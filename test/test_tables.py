@@ -165,6 +165,7 @@ def test_json_of_the_tables(study: tuple[list[dict[str, Any]], Path]) -> None:
         assert 0.0 < row["mean_relative_error_percent"] < 60.0
         assert row["runs"] == 1
         assert row["sigma_m"] == 0.5
+    assert len({row["digest"] for row in table}) == 2 * len(METHODS)
     by_method = {row["method"]: row for row in table if row["start_mu"] == START_OF_MEAN}
     tuned, naive = (by_method[name]["mean_relative_error_percent"] for name in ("ekf_tuned", "ekf_naive"))
     assert tuned < 4.0

@@ -10,6 +10,7 @@ process, `ms_per_window` that of a window among the others of its batch. `bound_
 from __future__ import annotations
 
 import argparse
+import hashlib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -41,6 +42,11 @@ class Cell(NamedTuple):
     seconds: float
     window_ms: NDArray[np.float64]
 
+    @property
+    def digest(self) -> str:
+        """SHA-256 over every estimate, the same wherever the runs were computed."""
+        return hashlib.sha256(b"".join(rows.tobytes() for of_start in self.runs for rows in of_start)).hexdigest()
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study tables`."""
@@ -70,6 +76,7 @@ def rows(cell: Cell) -> Iterator[dict[str, Any]]:
     of_starts: list[tuple[float | str, list[list[NDArray[np.void]]]]] = [
         (start, [runs]) for start, runs in zip(STARTS, cell.runs, strict=True)
     ]
+    digest = cell.digest
     for start, runs in [*of_starts, (START_OF_MEAN, cell.runs)]:
         paper_abs, paper_relative = TABLES[cell.scenario][start].of(cell.method)
         yield {
@@ -84,6 +91,7 @@ def rows(cell: Cell) -> Iterator[dict[str, Any]]:
             "seconds": cell.seconds,
             "ms_per_window_p50": float(np.percentile(cell.window_ms, 50)),
             "ms_per_window_p99": float(np.percentile(cell.window_ms, 99)),
+            "digest": digest,
         }
 
 
@@ -103,7 +111,7 @@ def run(options: argparse.Namespace) -> int:
         from .curves import draw_all
 
         draw_all(found, options.figures)
-    report(options.json, table, "\n".join([*_table_lines(table), "", *_speed_lines(found)]))
+    report(options.json, table, "\n".join([*_table_lines(table), "", *_speed_lines(found), "", *_digest_lines(found)]))
     return DONE
 
 
@@ -132,3 +140,9 @@ def _speed_lines(found: Sequence[Cell]) -> Iterator[str]:
             f"{top}: {curve.relative_error_percent[classes == top].mean():.1f}" for top in np.unique(classes)[::-1]
         )
         yield f"{cell.scenario:>13} {cell.method:>12}  below km/h  {'  '.join(means)}"
+
+
+def _digest_lines(found: Sequence[Cell]) -> Iterator[str]:
+    yield "digest of every estimate, all starts"
+    for cell in found:
+        yield f"{cell.scenario:>13} {cell.method:>12}  {cell.digest}"
