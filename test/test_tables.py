@@ -107,6 +107,12 @@ def test_chunks_cover_every_run_once() -> None:
     assert seeds == list(range(1000, 1095))
 
 
+def test_the_tables_stand_at_the_papers_settings() -> None:
+    config = chunks("tunnel_entry", "particle_em", 0.5, 1)[0].config
+    assert (config.method, config.window, config.step) == ("particle_em", 50, 10)
+    assert (config.particles, config.iterations, config.position_noise_m) == (20, 50, 0.02)
+
+
 def test_a_chunk_comes_back_from_the_cache_whole(tmp_path: Path) -> None:
     save(QUICK, _quick(), tmp_path)
     stored, fresh = (result_of(QUICK, found) for found in (load(QUICK, tmp_path), _quick()))

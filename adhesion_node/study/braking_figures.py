@@ -11,7 +11,7 @@ from ..core import braking
 from ..core.adhesion import DRY, WET
 from ..core.train import CRH3, KMH, Array
 from .drawing import STYLES, picture
-from .published import BRAKINGS
+from .published import BRAKING_CASES
 
 
 class Scene(NamedTuple):
@@ -74,7 +74,7 @@ def _draw_forces(scene: Scene, folder: Path) -> None:
 
 def _draw_brakings(scene: Scene, along: str, unit: str, number: int, folder: Path) -> None:
     """Speed over distance or time for each adhesion; a cross where the paper's braking ended."""
-    cases = [case for case in BRAKINGS if case[:2] == (scene.from_kmh, scene.to_kmh)]
+    cases = [case for case in BRAKING_CASES if case[:2] == (scene.from_kmh, scene.to_kmh)]
     quantity = f"{along}_{unit}"
     with picture(*_named(scene, number, along, folder)) as axis:
         for (color, dashes), case in zip(STYLES, cases, strict=False):

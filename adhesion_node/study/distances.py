@@ -12,14 +12,14 @@ from ..core import braking
 from ..core.train import CRH3, KMH
 from . import identified
 from .montecarlo import chunks, results
-from .published import BRAKINGS, SAVINGS, Saving
+from .published import BRAKING_CASES, SAVINGS, Saving
 from .running import Running, add_running_options, running
 
 
 def rows() -> list[dict[str, Any]]:
     """Our distances and times beside the published ones, a row per braking."""
     table = []
-    for case in BRAKINGS:
+    for case in BRAKING_CASES:
         ours = braking.curve(CRH3, case.from_kmh * KMH, case.mu, case.to_kmh * KMH)
         distance, time = float(ours.distance_m[-1]), float(ours.time_s[-1])
         table.append(

@@ -19,6 +19,9 @@ from .runs import Simulated, rows_of
 STARTS = (0.0, 0.03, 0.05, 0.09, 0.12)
 """Adhesion from which the paper's runs start."""
 
+PAPER = Config(method="particle_em", window=50, step=10, particles=20, iterations=50)
+"""The paper's settings at the nominal noise, those of every method in the tables; `start_mu` is left to the lanes."""
+
 
 class Lane(NamedTuple):
     """One run from one start."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..core import Config
-from .methods import METHODS, STARTS, Lane
+from .methods import METHODS, PAPER, STARTS, Lane
 from .running import Running, run_all
 from .runs import FIRST_SEED, simulate
 from .tasks import Arrays
@@ -27,8 +27,7 @@ class Chunk(NamedTuple):
     sigma_m: float
     first_seed: int
     seeds: int
-    config: Config = Config()
-    """The estimator's, `start_mu` left open."""
+    config: Config = PAPER
     seed_shift: int = 0
     """Added to a run's seed it gives that of its estimator."""
 

@@ -62,7 +62,7 @@ class Braking(NamedTuple):
 BEST, WORST = 0.1542, 0.0726
 """Adhesion of a wet rail at 0 and at 300 km/h: the constants between which the paper compares."""
 
-BRAKINGS = (
+BRAKING_CASES = (
     Braking(300, 100, "0.1542", BEST, 3060.7, 56.1),
     Braking(300, 100, "0.0726", WORST, 3946.7, 71.7),
     Braking(300, 100, "wet law", WET, 3481.1, 62.8),

@@ -15,10 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ..cli import DONE, report
-from ..core import Config
 from ..core.ekf import TUNED, Tuning
 from .accuracy import errors
-from .methods import STARTS, Lane, ekf
+from .methods import PAPER, STARTS, Lane, ekf
 from .published import TABLES
 from .running import add_running_options, run_all, running
 from .runs import simulate
@@ -56,7 +55,7 @@ class Trial(NamedTuple):
 
     def compute(self) -> Arrays:
         """Mean relative error, %."""
-        found = errors(ekf(self.tuning)(Config(), _lanes(self.runs)).rows)
+        found = errors(ekf(self.tuning)(PAPER, _lanes(self.runs)).rows)
         return {"percent": np.array(np.mean(found.relative_percent))}
 
 
