@@ -66,7 +66,7 @@ def test_while_it_is_stuck_mu_is_withheld_and_the_curve_falls_back_to_the_low_la
         assert prediction.safe is not None
         assert estimate.mu_lower == pytest.approx(float(SNOW(np.array(seen.speed_mps))))
         assert prediction.safe.speed_mps[0] >= true.speed_mps
-        assert estimate.position_m >= true.position_m
+        assert estimate.position_m >= true.position_m - 3.0 * estimate.position_std_m
     stamps = [p.estimate.t_ns for p in predictions]
     assert stamps == sorted(set(stamps))
     assert pipeline.dropped["STUCK"] > 80

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import Config
+from ..core import Config, finish, init, step
 from ..core.ekf import NAIVE, TUNED, EkfConfig, Tuning, ekf_init, ekf_step
 from .lockstep import Run, drive
 from .runs import Simulated, rows_of
@@ -41,6 +41,23 @@ class Outcome(NamedTuple):
 
 
 Method = Callable[[Config, Sequence[Lane]], Outcome]
+
+
+def rail_condition(config: Config, lanes: Sequence[Lane]) -> Outcome:
+    """The default method, run by run."""
+    started, window_ms = time.perf_counter(), []
+    rows = []
+    for lane in lanes:
+        begun = time.perf_counter()
+        own = replace(config, method="rail_condition", start_mu=lane.start_mu)
+        state, estimates = init(own, lane.seed), []
+        for measurement in lane.simulated.measurements:
+            state, estimate = step(own, state, measurement)
+            estimates += [] if estimate is None else [estimate]
+        estimates += finish(own, state)[1]
+        rows.append(rows_of(own, lane.simulated.truth, estimates))
+        window_ms.append(1e3 * (time.perf_counter() - begun) / max(len(rows[-1]), 1))
+    return Outcome(rows, time.perf_counter() - started, window_ms)
 
 
 def particle_em(config: Config, lanes: Sequence[Lane]) -> Outcome:
@@ -76,6 +93,6 @@ def ekf(tuning: Tuning) -> Method:
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(
-    {"particle_em": particle_em, "ekf_tuned": ekf(TUNED), "ekf_naive": ekf(NAIVE)}
+    {"rail_condition": rail_condition, "particle_em": particle_em, "ekf_tuned": ekf(TUNED), "ekf_naive": ekf(NAIVE)}
 )
 """By the name that stands in tables and JSON."""

@@ -19,7 +19,7 @@ class Printed(NamedTuple):
 
     def of(self, method: str) -> tuple[float, float]:
         """Absolute and relative error to hold a method of ours against."""
-        return self[:2] if method == "particle_em" else self[2:]
+        return self[2:] if method.startswith("ekf") else self[:2]
 
 
 START_OF_MEAN = "mean"

@@ -3,8 +3,9 @@
 Paper's settings (M = 20, 50 iterations, S = 50, L = 10) at the nominal noise; run r has seed 1000 + r. The error is
 the mean of abs(mu - true mu) over all estimates while adhesion limits, after the first 30 km/h. `converged_kmh` is
 the speed at which the error, averaged over the runs, first falls below 5 %; `coverage95` the share of estimates within
-1.96 of their own standard deviations. `seconds` is the computing time of the scenario's runs from all starts in one
-process, `ms_per_window` that of a window among the others of its batch. `bound_ratio` is null: there is no bound yet.
+1.96 of their own standard deviations; `bound_ratio` the mean relative error over that of an estimator at the bound of
+`study bound`. The estimators know the track. `seconds` is the computing time of the scenario's runs from all starts
+in one process, `ms_per_window` that of a window among the others of its batch.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..cli import DONE, report
 from .accuracy import figures, over_speed
+from .bound import Case, nominal
 from .methods import METHODS, STARTS
 from .montecarlo import Chunk, Result, chunks, results
 from .published import START_OF_MEAN, TABLES
@@ -73,19 +75,21 @@ def cells(wanted: Sequence[Chunk], where: Running) -> list[Cell]:
 
 def rows(cell: Cell) -> Iterator[dict[str, Any]]:
     """A row per start, and the mean over the starts."""
+    least = nominal(Case(cell.scenario, cell.sigma_m)).mean_error_percent
     of_starts: list[tuple[float | str, list[list[NDArray[np.void]]]]] = [
         (start, [runs]) for start, runs in zip(STARTS, cell.runs, strict=True)
     ]
     digest = cell.digest
     for start, runs in [*of_starts, (START_OF_MEAN, cell.runs)]:
         paper_abs, paper_relative = TABLES[cell.scenario][start].of(cell.method)
+        found = figures(runs)
         yield {
             "scenario": cell.scenario,
             "method": cell.method,
             "sigma_m": cell.sigma_m,
             "start_mu": start,
-            **figures(runs),
-            "bound_ratio": None,
+            **found,
+            "bound_ratio": found["mean_relative_error_percent"] / least,
             "paper_mean_abs_error": paper_abs,
             "paper_mean_relative_error_percent": paper_relative,
             "seconds": cell.seconds,
@@ -119,7 +123,7 @@ def _table_lines(table: Sequence[dict[str, Any]]) -> Iterator[str]:
     yield "mean relative error of mu, %, beside the paper's (its EKF beside ours); spread over the runs"
     yield (
         f"{'scenario':>13} {'method':>12} {'start':>6} {'ours':>6} {'paper':>6} {'std':>5} {'5 %':>6} {'95 %':>6}"
-        f" {'abs':>7} {'converged':>9} {'cover':>6} {'bound':>6}"
+        f" {'abs':>7} {'converged':>9} {'cover':>6} {'bound':>6} {'ratio':>6}"
     )
     for row in table:
         reached = "-" if row["converged_kmh"] is None else f"{row['converged_kmh']:.0f} km/h"
@@ -128,6 +132,7 @@ def _table_lines(table: Sequence[dict[str, Any]]) -> Iterator[str]:
             f" {row['paper_mean_relative_error_percent']:6.2f} {row['std_relative_error_percent']:5.2f}"
             f" {row['p5_relative_error_percent']:6.2f} {row['p95_relative_error_percent']:6.2f}"
             f" {row['mean_abs_error']:7.4f} {reached:>9} {row['coverage95']:6.3f} {row['lower_bound_holds']:6.3f}"
+            f" {row['bound_ratio']:6.2f}"
         )
 
 
