@@ -8,6 +8,7 @@ from .adhesion import SpeedLaw
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import Hypothesis
+from .noise import Noise
 from .outcome import Regime
 from .rail import Rail
 from .train import Array
@@ -21,6 +22,8 @@ class BrakingWindow(NamedTuple):
     samples: tuple[Sample, ...]
     hypotheses: tuple[Hypothesis, ...] = ()
     """Joint laws with the rail condition at the first sample; empty until such a window is evaluated."""
+    noise: Noise = Noise()
+    """Identified so far."""
     trajectory: Array | None = None
     """Smoothed positions and speeds of its first samples, from the last evaluation; where the next one begins."""
 

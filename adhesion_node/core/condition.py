@@ -19,6 +19,7 @@ from .changes import change
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
+from .noise import Noise, learn_noise
 from .outcome import Regime
 from .rail import Rail, learn_bound
 from .smoother import Search, Smoothed, posterior, smooth
@@ -62,18 +63,20 @@ def evaluate_condition(
     """
     if not window.hypotheses:
         window = _opened(config, with_rail(window.prior, before), window)
-    arrays = window_of(window.samples)
+    arrays = _scaled_noise(window_of(window.samples), window.noise)
     found = list[Found]()
     for hypothesis in window.hypotheses:
         near = found[0].smoothed.trajectory if found else window.trajectory
-        found.append(_find(config, arrays, hypothesis, (start, lowest), near))
+        model = Model(config.motion, hypothesis.law, config.tail_dof)
+        problem = Problem(model, arrays, hypothesis.belief)
+        found.append(_find(config, problem, hypothesis, (start, lowest), near))
     leading = max(found, key=lambda each: each.now.log_weight)
     changed = _changed(config, leading)
     if changed is None:
         following = _following(config, window, found)
         law, now = _state(leading.now.belief), tuple(each.now for each in found)
     else:
-        following = _opened(config, changed, BrakingWindow(window.prior, window.samples[-1:]))
+        following = _opened(config, changed, BrakingWindow(window.prior, window.samples[-1:], noise=window.noise))
         law, now = following.prior, following.hypotheses
     regime, rail = _judge(config, now, before, _limit(config, window, leading))
     return Verdict(
@@ -101,10 +104,9 @@ def _state(belief: Belief) -> Gaussian:
 
 
 def _find(
-    config: Config, arrays: Window, before: Hypothesis, search: tuple[float | None, float], near: Array | None
+    config: Config, problem: Problem, before: Hypothesis, search: tuple[float | None, float], near: Array | None
 ) -> Found:
     start, lowest = search
-    problem = Problem(Model(config.motion, before.law, config.tail_dof), arrays, before.belief)
     _, speed, kappa = before.belief.mean
     scale = float(before.law(speed))
     smoothed = smooth(
@@ -177,7 +179,7 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
     spent, trajectory = window.spent(config), found[0].smoothed.trajectory
     if not spent:
         return window._replace(trajectory=trajectory)
-    gone = window_of(window.samples[: spent + 1])
+    gone = _scaled_noise(window_of(window.samples[: spent + 1]), window.noise)
     drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
     passed = []
     for each in found:
@@ -190,4 +192,11 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
         for hypothesis, probability in zip(passed, probabilities(passed), strict=True)
         if probability >= NEGLIGIBLE
     )
-    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, trajectory[spent:])
+    noise = (
+        learn_noise(window.noise, found[0].problem, found[0].smoothed, spent) if config.identify_noise else window.noise
+    )
+    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, noise, trajectory[spent:])
+
+
+def _scaled_noise(window: Window, noise: Noise) -> Window:
+    return replace(window, variance_m2=window.variance_m2 * noise.factor)

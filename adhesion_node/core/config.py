@@ -39,6 +39,9 @@ class Config:
         3.0, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
     )
     tail_dof: float = setting(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
+    identify_noise: bool = setting(
+        False, "Identify the variance of the positions by the same EM, from the given one on"
+    )
     window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
     step: int = setting(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
     particles: int = setting(20, "Particles, M, of particle_em", low=2, high=100_000)

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 
 from ..cli import help_texts, json_option, run_tool
-from . import bound, creep, distances, intervention, sensitivity, tables, tune_ekf
+from . import bound, creep, distances, intervention, robust, sensitivity, tables, tune_ekf
 
 PURPOSE = "Reproduces the figures of the papers, and shows what follows from them."
 
@@ -18,6 +18,7 @@ STUDIES = {
         "--runs 200 --figures figures",
     ),
     "sensitivity": (sensitivity, "the same against position noise, window, step and particles", "--runs 10"),
+    "robust": (robust, "the default method where rail, sensors or train are not what it believes", "--runs 40"),
     "bound": (bound, "the posterior Cramér-Rao bound of mu over a braking", "--json -"),
     "intervention": (
         intervention,
