@@ -16,7 +16,7 @@ from .core.creep_align import CreepAligner, Paired, Sample
 from .core.creep_config import CreepConfig, CreepOutcome
 from .core.creep_curve import creep, used_adhesion
 from .core.setting import check_settings, check_value, setting, settings_of
-from .settings import FRAME_ID, check_names
+from .settings import FRAME_ID, SENSOR_TIMEOUT, check_names
 from .topics import SPEED, TRACTION_FORCE, WHEEL_SPEED
 
 UNPAIRED, SLOW, AXLES, UNEQUAL = "UNPAIRED", "SLOW", "AXLES", "UNEQUAL"
@@ -52,7 +52,7 @@ class Vehicle:
         return (((1.0 + mean_creep) * self.speed_std_mps) ** 2 + wheels) / speed_mps**2
 
 
-SETTINGS = (FRAME_ID, *settings_of(Vehicle), *settings_of(CreepConfig))
+SETTINGS = (FRAME_ID, SENSOR_TIMEOUT, *settings_of(Vehicle), *settings_of(CreepConfig))
 """All settings of the creep estimator."""
 
 READERS: Mapping[str, Callable[[Any, str], Sample]] = MappingProxyType(
@@ -72,6 +72,8 @@ class CreepSetup(NamedTuple):
     vehicle: Vehicle
     frame: str
     """The frame_id that sensor messages must have."""
+    sensor_timeout_s: float
+    """Silence of the wheel speeds after which /diagnostics says STALE; no result depends on it."""
 
 
 def setup_of(values: Mapping[str, Any]) -> CreepSetup:
@@ -80,9 +82,11 @@ def setup_of(values: Mapping[str, Any]) -> CreepSetup:
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
     check_names(values, SETTINGS)
-    frame = values.get(FRAME_ID.name, FRAME_ID.default)
-    check_value(FRAME_ID.name, frame, str, FRAME_ID._asdict())
-    return CreepSetup(_build(CreepConfig, values), _build(Vehicle, values), frame)
+    of_the_node = (FRAME_ID, SENSOR_TIMEOUT)
+    given = [values.get(own.name, own.default) for own in of_the_node]
+    for own, value in zip(of_the_node, given, strict=True):
+        check_value(own.name, value, type(own.default), own._asdict())
+    return CreepSetup(_build(CreepConfig, values), _build(Vehicle, values), *given)
 
 
 def _build(kind: type[Any], values: Mapping[str, Any]) -> Any:

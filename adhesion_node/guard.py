@@ -65,6 +65,7 @@ class Guard:
         before = self._held.before if self._held else None
         if before is None:
             return None
+        unseen_s = (t_ns - before.t_ns) / NS
         low = float(config.low_law(np.asarray(before.speed_mps)))
         unseen = before._replace(
             t_ns=t_ns,
@@ -72,7 +73,9 @@ class Guard:
             mu_std=config.unknown_std,
             mu_lower=low,
             regime=Regime.COASTING,
-            position_m=before.position_m + before.speed_mps * (t_ns - before.t_ns) / NS,
+            position_m=before.position_m + before.speed_mps * unseen_s,
+            position_std_m=before.position_std_m + STRONGEST_MPS2 * unseen_s**2 / 2,
+            speed_std_mps=before.speed_std_mps + STRONGEST_MPS2 * unseen_s,
             window=0,
             iterations=0,
         )

@@ -26,7 +26,11 @@ SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, ())
 
 FRAME_ID = Setting("frame", FRAME, "frame_id that sensor messages must have", "", 0.0, 0.0, ())
 
-SETTINGS = (SEED, FRAME_ID, *settings_of(Config), *settings_of(Train, "train."), TRACK)
+SENSOR_TIMEOUT = Setting(
+    "sensor_timeout_s", 0.5, "Silence of the sensor after which /diagnostics says STALE", "s", 0.05, 3600.0, ()
+)
+
+SETTINGS = (SEED, FRAME_ID, SENSOR_TIMEOUT, *settings_of(Config), *settings_of(Train, "train."), TRACK)
 """All settings of the estimator."""
 
 
@@ -37,6 +41,8 @@ class Setup(NamedTuple):
     seed: int
     frame: str
     """The frame_id that sensor messages must have."""
+    sensor_timeout_s: float
+    """Silence of the position after which /diagnostics says STALE; no result depends on it."""
 
 
 def check_names(values: Mapping[str, Any], settings: Sequence[Setting]) -> None:
@@ -53,7 +59,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
     check_names(values, SETTINGS)
-    for setting in (SEED, FRAME_ID, TRACK):
+    for setting in (SEED, FRAME_ID, SENSOR_TIMEOUT, TRACK):
         check_value(setting.name, values.get(setting.name, setting.default), type(setting.default), setting._asdict())
     train = Train(**{name.removeprefix("train."): value for name, value in values.items() if name.startswith("train.")})
     own = {item.name for item in fields(Config) if item.metadata}
@@ -62,7 +68,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
         track=parse_track(values.get(TRACK.name, ""), train.length_m),
         **{name: value for name, value in values.items() if name in own},
     )
-    return Setup(config, values.get(SEED.name, SEED.default), values.get(FRAME_ID.name, FRAME_ID.default))
+    return Setup(config, *(values.get(setting.name, setting.default) for setting in (SEED, FRAME_ID, SENSOR_TIMEOUT)))
 
 
 def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:

@@ -19,7 +19,7 @@ import pytest
 from conftest import ROOT
 
 OWN = ("adhesion_node", "sim_node")
-ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|interfaces)")
+ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|srvs|interfaces)")
 OPTIONAL = {"distributed": "cluster"}
 """Imported only where it is asked for: extra by module."""
 

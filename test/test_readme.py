@@ -54,7 +54,7 @@ def test_the_readme_names_the_quality_of_service(topic: topics.Topic) -> None:
     (row,) = (
         line for line in section.splitlines() if line.startswith("| ") and f"`{topic.name}`" in line.split("|")[1]
     )
-    assert row.split(" | ")[2] == ("latched" if estimator.OUTPUTS[topic] is qos.LATCHED else "result")
+    assert row.split(" | ")[2] == ("latched" if estimator.OUTPUTS[topic] is qos.EXPIRING else "result")
 
 
 @pytest.mark.parametrize("row", distances.rows(), ids=lambda row: f"{row['from_kmh']}-{row['case']}")

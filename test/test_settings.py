@@ -40,10 +40,8 @@ def another(setting: Setting) -> Any:
 
 def in_use(setup: Setup, name: str) -> Any:
     """Return what a set-up makes of a setting."""
-    if name == "seed":
-        return setup.seed
-    if name == "frame":
-        return setup.frame
+    if name in ("seed", "frame", "sensor_timeout_s"):
+        return getattr(setup, name)
     group, _, field = name.rpartition(".")
     return getattr(setup.config.train if group else setup.config, field)
 
@@ -78,7 +76,7 @@ def test_there_is_no_ros_parameter_besides() -> None:
 
 def test_nothing_named_is_the_nominal_set_up() -> None:
     setup = setup_of({})
-    assert setup == Setup(Config(), 1, "track")
+    assert setup == Setup(Config(), 1, "track", 0.5)
     assert setup.config.train == CRH3
     assert setup_of({setting.name: setting.default for setting in SETTINGS}) == setup
 
@@ -195,9 +193,9 @@ def test_a_text_becomes_the_settings_type(text: str, expected: tuple[str, Any]) 
         ("window=", "setting window = '': give a value of type int"),
         ("start_mu=0,12", "setting start_mu = '0,12': give a value of type float"),
         ("speed_while_braking=1", "setting speed_while_braking = '1': give a value of type bool"),
-        ("windw=40", "setting 'windw=40': write NAME=VALUE with one of seed, frame, method"),
-        ("window", "setting 'window': write NAME=VALUE with one of seed, frame, method"),
-        ("", "setting '': write NAME=VALUE with one of seed, frame, method"),
+        ("windw=40", "setting 'windw=40': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+        ("window", "setting 'window': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+        ("", "setting '': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
     ],
 )
 def test_a_text_that_does_not_fit_is_refused_by_name(text: str, message: str) -> None:

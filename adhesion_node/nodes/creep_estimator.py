@@ -11,22 +11,22 @@ Nothing is published on creep/* while the data cannot tell the peak; /diagnostic
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.node import Node
 
 from adhesion_node import reading, topics
 from adhesion_node.core.creep import CreepEstimate
 from adhesion_node.core.creep_config import CreepOutcome
+from adhesion_node.core.supervision import Severity
 from adhesion_node.creep_pipeline import READERS, SETTINGS, CreepPipeline, setup_of
+from adhesion_node.topics import Topic
 
 from . import convert, qos, runtime
+from .diagnostics import Finding, next_stamp, status_message
+from .intake import Intake
 from .params import declare, spec_of
-
-REPORT_EVERY = 10
-"""The first refused message of its kind and then every tenth reach the operator."""
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
 
@@ -35,6 +35,9 @@ INPUTS = (topics.SPEED, topics.TRACTION_FORCE, topics.WHEEL_SPEED)
 EXAMPLES = ("creep_estimator", "creep_estimator --ros-args -p axles:=4 -p wheel_radius_m:=0.46")
 
 OUTPUTS = (*topics.CREEP_RESULTS, topics.DIAGNOSTICS)
+
+NAME = "creep_estimator/peak"
+"""In /diagnostics."""
 
 
 class CreepEstimator(Node):
@@ -46,15 +49,17 @@ class CreepEstimator(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("creep_estimator", automatically_declare_parameters_from_overrides=True, **kwargs)
         setup = setup_of(declare(self, PARAMETERS))
-        self._frame = setup.frame
         self._pipeline = CreepPipeline(setup.config, setup.vehicle)
-        self._newest_ns = 0
-        self.heard: Counter[topics.Topic] = Counter()
-        self.published: Counter[topics.Topic] = Counter()
-        self._outputs = {topic: qos.advertise(self, topic, qos.RESULT) for topic in OUTPUTS}
-        for topic in INPUTS:
-            qos.subscribe(self, topic, self._receiver(topic), qos.SENSOR_SUBSCRIPTION)
-        self.get_logger().info(f"ready: waiting for {self.resolve_topic_name(topics.WHEEL_SPEED.name)}")
+        self._reported_ns = 0
+        self.published: Counter[Topic] = Counter()
+        readers = {topic: READERS[topic.name] for topic in INPUTS}
+        self._intake = Intake(self, self, readers, setup.frame, setup.sensor_timeout_s)
+        self._outputs = {topic: qos.advertise(self, topic, qos.RESULT, tell=self._intake.tell) for topic in OUTPUTS}
+
+    @property
+    def heard(self) -> Counter[Topic]:
+        """Messages received by topic."""
+        return self._intake.heard
 
     @property
     def latest(self) -> CreepEstimate | None:
@@ -73,49 +78,41 @@ class CreepEstimator(Node):
             f"{self._pipeline.accepted} samples, dropped {self._pipeline.dropped or 'none'}, digest {self.digest}"
         )
 
-    def _receiver(self, topic: topics.Topic) -> Callable[[Any], None]:
-        def receive(message: Any) -> None:
-            self.heard[topic] += 1
-            try:
-                sample = READERS[topic.name](message, self._frame)
-            except reading.Rejected as refusal:
-                self._refuse(topic, refusal)
-            else:
-                self._newest_ns = max(self._newest_ns, sample.t_ns)
-                self._publish(self._pipeline.push(sample))
+    def take(self, topic: Topic, sample: Any) -> None:
+        """Use a sample and publish what it completes."""
+        del topic
+        self._publish(self._pipeline.push(sample))
 
-        return receive
-
-    def _refuse(self, topic: topics.Topic, refusal: reading.Rejected) -> None:
+    def refuse(self, topic: Topic, refusal: reading.Rejected) -> None:
+        """Count a refused message."""
+        del topic
         self._pipeline.refuse(refusal.reason)
-        count = self._pipeline.dropped_early[refusal.reason]
-        if count % REPORT_EVERY == 1:
-            self.get_logger().warning(f"{topic.name}: {refusal} ({count} so far)")
-            self._send(topics.DIAGNOSTICS, diagnostics_message(self._newest_ns, self._pipeline, str(refusal)))
+
+    def report(self) -> None:
+        """Publish the state of affairs in /diagnostics."""
+        self._report(self._intake.now_ns)
+
+    def _report(self, t_ns: int) -> None:
+        self._reported_ns = next_stamp(t_ns, self._reported_ns)
+        found = [*self._intake.findings(), _finding(self._pipeline.last)]
+        self._send(topics.DIAGNOSTICS, status_message(self._reported_ns, NAME, found, _values(self._pipeline)))
 
     def _publish(self, estimates: list[CreepEstimate]) -> None:
         for estimate in estimates:
             if estimate.known:
                 self._send(topics.CREEP_MU_MAX, convert.mu_message(estimate.mu_max))
                 self._send(topics.CREEP_LAMBDA_M, convert.mu_message(estimate.lambda_m))
-            self._send(topics.DIAGNOSTICS, diagnostics_message(estimate.t_ns, self._pipeline))
+            self._report(estimate.t_ns)
 
-    def _send(self, topic: topics.Topic, message: Any) -> None:
+    def _send(self, topic: Topic, message: Any) -> None:
         self._outputs[topic].publish(message)
         self.published[topic] += 1
 
 
-def diagnostics_message(t_ns: int, pipeline: CreepPipeline, refusal: str = "") -> DiagnosticArray:
-    """Build the status at `t_ns`; `refusal` says why a message has just been refused."""
-    last = pipeline.last
-    level, message = DiagnosticStatus.OK, "no estimate yet"
-    if refusal:
-        level, message = DiagnosticStatus.WARN, f"message refused: {refusal}"
-    elif last is not None:
-        level, message = (DiagnosticStatus.OK if last.known else DiagnosticStatus.WARN), last.status.value
-    values = [KeyValue(key=key, value=value) for key, value in _values(pipeline).items()]
-    status = DiagnosticStatus(level=level, name="creep_estimator/peak", message=message, values=values)
-    return DiagnosticArray(header=convert.header(t_ns), status=[status])
+def _finding(last: CreepEstimate | None) -> Finding:
+    if last is None:
+        return Finding(Severity.OK, "no estimate yet")
+    return Finding(Severity.OK if last.known else Severity.WARN, last.status.value)
 
 
 def _values(pipeline: CreepPipeline) -> dict[str, str]:

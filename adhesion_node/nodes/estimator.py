@@ -3,27 +3,32 @@
 ::
 
     position, brake_pressure, speed, wheel_speed  ->  adhesion/*, /diagnostics
+    ~/reset, ~/set_enabled                            services
 
-Every message goes through `Pipeline`, as in an offline replay; stamps drive the work, no timer does.
+Every message goes through `Pipeline`, as in an offline replay; stamps drive the work. The one timer watches for
+silence and speaks in /diagnostics alone.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
 
 from adhesion_node import reading, topics
 from adhesion_node.core import Config, Estimate
-from adhesion_node.core.align import Sample
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.pipeline import Pipeline
 from adhesion_node.settings import SETTINGS, setup_of
+from adhesion_node.topics import Topic
 
 from . import convert, qos, runtime
-from .diagnostics import diagnostics_message
+from .diagnostics import next_stamp, status_message
+from .health import findings, values
+from .intake import Intake
 from .params import declare, spec_of
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
@@ -34,21 +39,26 @@ EXAMPLES = (
     "estimator --ros-args --params-file my_train.yaml -r __ns:=/train1",
 )
 
+READERS = {
+    topics.BRAKE_PRESSURE: reading.brake_pressure,
+    topics.SPEED: reading.speed,
+    topics.WHEEL_SPEED: reading.wheel_speed,
+    topics.POSITION: reading.position,
+}
 
 OUTPUTS = {
     topics.MU: qos.RESULT,
     topics.MU_LOWER: qos.RESULT,
     topics.DECELERATION: qos.RESULT,
     topics.STATE: qos.RESULT,
-    topics.BRAKING_CURVE: qos.LATCHED,
-    topics.BRAKING_CURVE_NOMINAL: qos.LATCHED,
+    topics.BRAKING_CURVE: qos.EXPIRING,
+    topics.BRAKING_CURVE_NOMINAL: qos.EXPIRING,
     topics.DIAGNOSTICS: qos.RESULT,
 }
 """What the node publishes, in the order of publishing."""
 
-
-SAID_EVERY = 10
-"""Of the messages refused for one reason, the first and then every tenth is said."""
+NAME = "estimator/adhesion"
+"""In /diagnostics."""
 
 
 class Estimator(Node):
@@ -60,20 +70,20 @@ class Estimator(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("estimator", automatically_declare_parameters_from_overrides=True, **kwargs)
         setup = setup_of(declare(self, PARAMETERS))
-        self._frame = setup.frame
         self._pipeline = Pipeline(setup.config, setup.seed)
-        self._newest_ns = 0
-        self.heard: Counter[topics.Topic] = Counter()
-        self.published: Counter[topics.Topic] = Counter()
-        self._outputs = {topic: qos.advertise(self, topic, profile) for topic, profile in OUTPUTS.items()}
-        for topic, read in (
-            (topics.BRAKE_PRESSURE, reading.brake_pressure),
-            (topics.SPEED, reading.speed),
-            (topics.WHEEL_SPEED, reading.wheel_speed),
-            (topics.POSITION, reading.position),
-        ):
-            qos.subscribe(self, topic, self._receiver(topic, read), qos.SENSOR_SUBSCRIPTION)
-        self.get_logger().info(f"ready: waiting for {self.resolve_topic_name(topics.POSITION.name)}")
+        self._reported_ns = 0
+        self.published: Counter[Topic] = Counter()
+        self._intake = Intake(self, self, READERS, setup.frame, setup.sensor_timeout_s)
+        self._outputs = {
+            topic: qos.advertise(self, topic, profile, tell=self._intake.tell) for topic, profile in OUTPUTS.items()
+        }
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(SetBool, "~/set_enabled", self._on_set_enabled)
+
+    @property
+    def heard(self) -> Counter[Topic]:
+        """Messages received by topic."""
+        return self._intake.heard
 
     @property
     def config(self) -> Config:
@@ -98,47 +108,68 @@ class Estimator(Node):
             f"dropped {self._pipeline.dropped or 'none'}, digest {self.digest}"
         )
 
-    def _receiver(self, topic: topics.Topic, read: Callable[[Any, str], Sample]) -> Callable[[Any], None]:
-        def receive(message: Any) -> None:
-            self.heard[topic] += 1
-            try:
-                sample = read(message, self._frame)
-            except reading.Rejected as refusal:
-                self._refuse(topic, refusal)
-            else:
-                self._newest_ns = max(self._newest_ns, sample.t_ns)
-                self._publish(self._pipeline.push(sample))
+    def take(self, topic: Topic, sample: Any) -> None:
+        """Use a sample and publish what it completes."""
+        predictions = self._pipeline.push(sample)
+        if self._pipeline.refusal is not None:
+            self._intake.note(topic, self._pipeline.refusal)
+        self._publish(predictions)
 
-        return receive
-
-    def _refuse(self, topic: topics.Topic, refusal: reading.Rejected) -> None:
-        """Count a refused message; the first of its kind and then some reach the operator."""
+    def refuse(self, topic: Topic, refusal: reading.Rejected) -> None:
+        """Count a refused message."""
         self._pipeline.refuse(topic.name, refusal.reason)
-        count = self._pipeline.refused[refusal.reason]
-        if count % SAID_EVERY == 1:
-            self.get_logger().warning(f"{topic.name}: {refusal} ({count} so far)")
-            self._send(topics.DIAGNOSTICS, diagnostics_message(self._newest_ns, self._pipeline, str(refusal)))
+
+    def report(self) -> None:
+        """Publish the state of affairs in /diagnostics."""
+        self._report(self._intake.now_ns)
+
+    def _report(self, t_ns: int) -> None:
+        self._reported_ns = next_stamp(t_ns, self._reported_ns)
+        found = [*self._intake.findings(), *findings(self._pipeline)]
+        self._send(topics.DIAGNOSTICS, status_message(self._reported_ns, NAME, found, values(self._pipeline)))
+
+    def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._publish(self._pipeline.reset())
+        response.success, response.message = True, "started anew"
+        self.get_logger().info(f"~/reset: {response.message}")
+        self.report()
+        return response
+
+    def _on_set_enabled(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if self._intake.enabled and not request.data:
+            self._publish(self._pipeline.reset())
+        self._intake.enabled = request.data
+        response.success, response.message = True, "enabled" if request.data else "disabled: nothing is identified"
+        self.get_logger().info(f"~/set_enabled: {response.message}")
+        self.report()
+        return response
 
     def _publish(self, predictions: list[Prediction]) -> None:
         for prediction in predictions:
-            estimate = prediction.estimate
-            t_ns, place = estimate.t_ns, estimate.position_m
-            self._send(topics.MU, convert.mu_message(estimate.mu))
-            self._send(topics.MU_LOWER, convert.mu_message(estimate.mu_lower))
-            self._send(topics.DECELERATION, convert.deceleration_message(t_ns, estimate.mu, estimate.mu_std))
-            variances = estimate.position_std_m**2, estimate.speed_std_mps**2
-            self._send(topics.STATE, convert.state_message(t_ns, place, variances[0], estimate.speed_mps, variances[1]))
-            for topic, curve in (
-                (topics.BRAKING_CURVE, prediction.safe),
-                (topics.BRAKING_CURVE_NOMINAL, prediction.nominal),
-            ):
-                if curve is not None:
-                    self._send(topic, convert.curve_message(t_ns, curve, place))
-            self._send(topics.DIAGNOSTICS, diagnostics_message(t_ns, self._pipeline))
+            for topic, message in messages_of(prediction):
+                self._send(topic, message)
+            self._report(prediction.estimate.t_ns)
 
-    def _send(self, topic: topics.Topic, message: Any) -> None:
+    def _send(self, topic: Topic, message: Any) -> None:
         self._outputs[topic].publish(message)
         self.published[topic] += 1
+
+
+def messages_of(prediction: Prediction) -> list[tuple[Topic, Any]]:
+    """Return what is published of a prediction, in order; of a withheld mu nothing is."""
+    estimate = prediction.estimate
+    t_ns, place = estimate.t_ns, estimate.position_m
+    found: list[tuple[Topic, Any]] = []
+    if not prediction.withheld:
+        found += [
+            (topics.MU, convert.mu_message(estimate.mu)),
+            (topics.MU_LOWER, convert.mu_message(estimate.mu_lower)),
+            (topics.DECELERATION, convert.deceleration_message(t_ns, estimate.mu, estimate.mu_std)),
+        ]
+    variances = estimate.position_std_m**2, estimate.speed_std_mps**2
+    found.append((topics.STATE, convert.state_message(t_ns, place, variances[0], estimate.speed_mps, variances[1])))
+    curves = (topics.BRAKING_CURVE, prediction.safe), (topics.BRAKING_CURVE_NOMINAL, prediction.nominal)
+    return found + [(topic, convert.curve_message(t_ns, curve, place)) for topic, curve in curves if curve is not None]
 
 
 def main(args: Sequence[str] | None = None) -> int:

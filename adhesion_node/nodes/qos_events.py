@@ -1,0 +1,67 @@
+"""What DDS notices of the other side, in words: qualities that do not fit, missed deadlines, publishers that die."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
+from rclpy.qos import qos_policy_name_from_kind
+
+Tell = Callable[[str], None]
+
+_MODEST = {"reliability": "best_effort", "durability": "volatile"}
+"""What every publisher offers."""
+
+
+def of_subscription(topic: str, tell: Tell) -> SubscriptionEventCallbacks:
+    """Return the callbacks of a subscription to `topic` (its resolved name); each tells one line."""
+
+    def incompatible(event: Any) -> None:
+        policy = _policy(event)
+        modest = _MODEST.get(policy)
+        remedy = f": start this node with -p qos_overrides.{topic}.subscription.{policy}:={modest}" if modest else ""
+        tell(f"{topic}: a publisher offers less {policy} than is asked for, so nothing of it arrives{remedy}")
+
+    def liveliness(event: Any) -> None:
+        if event.alive_count_change < 0:
+            tell(f"{topic}: a publisher shows no life, {event.alive_count} left")
+
+    def matched(event: Any) -> None:
+        if event.current_count_change < 0:
+            tell(f"{topic}: a publisher has gone, {event.current_count} left")
+
+    return SubscriptionEventCallbacks(
+        deadline=_counted(tell, f"{topic}: deadline missed"),
+        incompatible_qos=incompatible,
+        liveliness=liveliness,
+        message_lost=_counted(tell, f"{topic}: messages lost on the way"),
+        matched=matched,
+    )
+
+
+def of_publisher(topic: str, tell: Tell) -> PublisherEventCallbacks:
+    """Return the callbacks of a publisher of `topic` (its resolved name); each tells one line."""
+
+    def incompatible(event: Any) -> None:
+        tell(f"{topic}: a subscriber asks for more {_policy(event)} than is offered and receives nothing")
+
+    return PublisherEventCallbacks(
+        deadline=_counted(tell, f"{topic}: own deadline missed"),
+        incompatible_qos=incompatible,
+        liveliness=_counted(tell, f"{topic}: own liveliness lost"),
+    )
+
+
+def _counted(tell: Tell, text: str) -> Callable[[Any], None]:
+    """Tell the first, second, fourth, eighth ... of events that come again and again."""
+
+    def told(event: Any) -> None:
+        if event.total_count & (event.total_count - 1) == 0 or event.total_count_change > 1:
+            tell(f"{text}, {event.total_count} so far")
+
+    return told
+
+
+def _policy(event: Any) -> str:
+    return str(qos_policy_name_from_kind(event.last_policy_kind)).lower()
