@@ -9,11 +9,8 @@ NAME = "adhesion_node"
 HERE = Path(__file__).parent
 MANIFEST = ElementTree.parse(HERE / "package.xml")
 
-NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay")
-PROGRAMS = {
-    "simulator": "sim_node.node",
-    "slip_simulator": "sim_node.slip_node",
-    **{node: f"adhesion_node.nodes.{node}" for node in NODES},
+NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "simulator", "slip_simulator")
+TOOLS = {
     "import_csv": "adhesion_node.import_csv",
     "recover": "adhesion_node.recover",
     "demo": "adhesion_node.demo",
@@ -84,5 +81,10 @@ setup(
         # colcon drives `setup.py develop`, which setuptools 80 removed.
         "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
     },
-    entry_points={"console_scripts": [f"{name} = {module}:main" for name, module in PROGRAMS.items()]},
+    entry_points={
+        "console_scripts": [
+            *(f"{node} = adhesion_node.main:{node}" for node in NODES),
+            *(f"{name} = {module}:main" for name, module in TOOLS.items()),
+        ]
+    },
 )

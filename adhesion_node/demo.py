@@ -27,13 +27,13 @@ from .core.train import KMH
 from .line import Pace, executor_of_line, play
 from .line_live import LivePage
 from .live.address import address_options
-from .nodes.runtime import stop_on_signals
 from .pipeline import Pipeline
 from .report.picture import draw
 from .report.run import read_run
 from .report.series import read_status
 from .report.table import table
 from .score import Truth
+from .signals import stop_on_signals
 from .topics import ATP_STATUS
 
 EXAMPLES = (

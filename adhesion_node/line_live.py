@@ -8,7 +8,7 @@ from collections.abc import Callable
 from rclpy.executors import SingleThreadedExecutor
 
 from .live.node import Live
-from .nodes.runtime import StopRequest
+from .signals import StopRequest
 
 SAMPLE_S = 0.1
 """Time between two samples of the simulator."""

@@ -22,8 +22,9 @@ def test_help_says_the_purpose_and_gives_examples(
     program: str, args: tuple[str, ...], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(sys, "argv", [f"/usr/bin/{program}", *args, "--help"])
+    module, function = console_scripts()[program]
     with pytest.raises(SystemExit) as ended:
-        importlib.import_module(console_scripts()[program]).main()
+        getattr(importlib.import_module(module), function)()
     shown, errors = capsys.readouterr()
     assert (ended.value.code, errors) == (0, "")
     called = " ".join((program, *args))
@@ -44,7 +45,8 @@ def complete(program: str, line: str, folder: Path) -> set[str]:
         "COMP_LINE": line,
         "COMP_POINT": str(len(line)),
     }
-    code = f"from {console_scripts()[program]} import main; main()"
+    module, function = console_scripts()[program]
+    code = f"from {module} import {function}; {function}()"
     subprocess.run([sys.executable, "-c", code], env={**os.environ, **asked}, check=True, timeout=60.0)
     return {word.strip() for word in (folder / "answer").read_text().splitlines()}
 

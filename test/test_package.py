@@ -7,6 +7,7 @@ import importlib
 import inspect
 import re
 import runpy
+import subprocess
 import sys
 from functools import cache
 from pathlib import Path
@@ -49,12 +50,12 @@ def setup_arguments() -> dict[str, Any]:
     return handed
 
 
-def console_scripts() -> dict[str, str]:
-    """Return the modules of the console scripts by name; each entry must read `name = module:main`."""
+def console_scripts() -> dict[str, tuple[str, str]]:
+    """Return module and function of the console scripts by name."""
     entries = [
-        re.fullmatch(r"(\w+) = ([\w.]+):main", entry) for entry in setup_arguments()["entry_points"]["console_scripts"]
+        re.fullmatch(r"(\w+) = ([\w.]+):(\w+)", entry) for entry in setup_arguments()["entry_points"]["console_scripts"]
     ]
-    return {entry[1]: entry[2] for entry in entries if entry}
+    return {entry[1]: (entry[2], entry[3]) for entry in entries if entry}
 
 
 @cache
@@ -110,8 +111,15 @@ def test_every_source_folder_is_a_package() -> None:
 
 @pytest.mark.parametrize("name", sorted(console_scripts()))
 def test_a_console_script_has_its_main(name: str) -> None:
-    main = importlib.import_module(console_scripts()[name]).main
-    assert inspect.signature(main).parameters["args"].default is None
+    module, function = console_scripts()[name]
+    parameters = inspect.signature(getattr(importlib.import_module(module), function)).parameters.values()
+    assert all(parameter.default is None for parameter in parameters)
+
+
+def test_a_node_imports_nothing_heavy_before_it_minds_signals() -> None:
+    code = "import sys, adhesion_node.main; print({name.partition('.')[0] for name in sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert not {name for name in ("numpy", "scipy", "rclpy", "matplotlib") if f"'{name}'" in loaded}
 
 
 def test_the_executables_of_the_design_are_there() -> None:

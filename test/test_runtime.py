@@ -12,11 +12,13 @@ from typing import IO
 import pytest
 from conftest import SpinUntil
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from adhesion_node.nodes import runtime
+from adhesion_node.signals import stop_on_signals
 
 PROGRAM = """
 import os, sys
@@ -41,6 +43,8 @@ class Probe(Node):
         self.values = declare(self, SPECS)
         self.words = self.create_publisher(Float64, "last_word", 100)
         self.create_timer(0.001, self.tick)
+        self.heard = []
+        self.create_subscription(Float64, "first_word", lambda message: self.heard.append(message.data), 1000)
         self.task = os.environ.get("TASK", "")
 
     def tick(self):
@@ -51,11 +55,16 @@ class Probe(Node):
             raise OSError(28, "No space left on device")
         if self.task == "finish":
             self.finished = True
+        if self.task == "stumble":  # the messages of the test queue up behind this
+            say("stumbling")
+            sys.stdin.readline()
+            self.task = ""
         if self.task == "call":
             self.words.publish(Float64(data=-1.0))
 
     def close(self):
         say("closing")
+        say(f"heard {len(self.heard)}")
         for number in range(50):
             self.words.publish(Float64(data=float(number)))
 
@@ -128,6 +137,26 @@ def test_a_signal_ends_an_idle_node_and_closes_it(start: Start) -> None:
     program.send_signal(signal.SIGTERM)
     wait_for(program, "closing")
     program.send_signal(signal.SIGTERM)
+    assert end(program) == (0, [])
+
+
+def test_what_is_queued_at_the_signal_is_still_taken(
+    start: Start, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    speaker = Node("speaker", context=context)
+    executor.add_node(speaker)
+    words = speaker.create_publisher(Float64, "first_word", 1000)
+    program = start(TASK="stumble")
+    wait_for(program, "stumbling")
+    spin_until(executor, words.get_subscription_count, timeout_s=30.0)
+    for number in range(200):
+        words.publish(Float64(data=float(number)))
+    assert words.wait_for_all_acked(Duration(seconds=10.0))  # they are in the program's queue
+    program.send_signal(signal.SIGTERM)
+    assert program.stdin is not None
+    program.stdin.write("go on\n")
+    program.stdin.flush()
+    wait_for(program, "heard 200")
     assert end(program) == (0, [])
 
 
@@ -206,7 +235,7 @@ def test_own_and_ros_arguments_are_told_apart() -> None:
 
 def test_without_a_signal_the_earlier_handlers_return() -> None:
     before = signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)
-    with runtime.stop_on_signals() as stop:
+    with stop_on_signals() as stop:
         assert signal.getsignal(signal.SIGINT) is not before[0]
     assert (signal.getsignal(signal.SIGINT), signal.getsignal(signal.SIGTERM)) == before
     assert not stop.requested

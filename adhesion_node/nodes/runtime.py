@@ -9,21 +9,20 @@ from __future__ import annotations
 import argparse
 import inspect
 import os
-import signal
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Callable, Sequence
 
 import argcomplete
 import rclpy
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException, ParameterException
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from rclpy.node import Node
 from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import ok, try_shutdown
+
+from adhesion_node.signals import StopRequest, stop_on_signals
 
 from ..cli import help_texts
 from .params import Spec
@@ -34,45 +33,14 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 POLL_S = 0.1
 """Longest time until a signal is seen: no signal interrupts rclpy's wait."""
 
+DRAIN_S, QUIET_S = 1.0, 0.05
+"""After a signal what is queued is still taken: for so long at most, or until nothing has come for so long."""
+
 GOODBYE_S = 0.5
 """Longest wait at the end for reliable subscribers to have the last messages."""
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM)
-
 _BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidationException)
 """What a node's start raises for bad input; the RuntimeErrors are those of rcl."""
-
-
-class StopRequest:
-    """Whether SIGINT or SIGTERM has come. Later signals change nothing."""
-
-    __slots__ = ("requested",)
-
-    def __init__(self) -> None:
-        self.requested = False
-
-
-@contextmanager
-def stop_on_signals() -> Iterator[StopRequest]:
-    """Turn SIGINT and SIGTERM into a request to stop; call it in the main thread.
-
-    After a signal both stay ignored for good: the program is on its way out, and a second signal must not cut
-    its exit short. Without one the earlier handlers return.
-    """
-    stop = StopRequest()
-
-    def note(_signal: int, _frame: FrameType | None) -> None:
-        stop.requested = True
-
-    earlier = {number: signal.signal(number, note) for number in _SIGNALS}
-    try:
-        yield stop
-    finally:
-        # Blocked meanwhile: a signal between two of these lines would be reported as lost in a race.
-        signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
-        for number, handler in earlier.items():
-            signal.signal(number, signal.SIG_IGN if stop.requested else handler)
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
 
 
 def run(
@@ -87,8 +55,8 @@ def run(
     is refused, a forgotten --ros-args for one. --help shows the first paragraph of the docstring of `make_node`,
     `parameters` and `examples`; both end the program, as argparse does. A ValueError, OSError or rclpy error at
     start is one line on stderr and code 2; an OSError later, a full disk for one, is one line and code 1. The node
-    ends on SIGINT or SIGTERM or when it sets its attribute `finished`; then its method `close`, if it has one, may
-    publish a last time.
+    ends on SIGINT or SIGTERM or when it sets its attribute `finished`; it still takes what has come, and its method
+    `close`, if it has one, may publish a last time.
     """
     with stop_on_signals() as stop:
         own, ros = split_ros_arguments(sys.argv[1:] if args is None else args)
@@ -135,6 +103,8 @@ def _parser(
 
 
 def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopRequest) -> int:
+    if stop.requested:
+        return DONE
     try:
         rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
@@ -156,6 +126,7 @@ def _spin(executor: SingleThreadedExecutor, node: Node, stop: StopRequest) -> No
     try:
         while not stop.requested and not getattr(node, "finished", False):
             executor.spin_once(timeout_sec=POLL_S)
+        _drain(executor, node)
     except ExternalShutdownException:  # the node itself shut rclpy down
         return
     finally:
@@ -164,6 +135,22 @@ def _spin(executor: SingleThreadedExecutor, node: Node, stop: StopRequest) -> No
             close()
         if ok():
             _say_goodbye(node)
+
+
+def _drain(executor: SingleThreadedExecutor, node: Node) -> None:
+    """Take the messages that are queued; the timers, which would go on for ever, are over."""
+    for timer in node.timers:
+        timer.cancel()
+    now = time.monotonic()
+    end, quiet = now + DRAIN_S, now + QUIET_S
+    while (now := time.monotonic()) < min(end, quiet):
+        try:
+            work, *_ = executor.wait_for_ready_callbacks(timeout_sec=min(end, quiet) - now)
+        except TimeoutException:
+            return
+        work()
+        work.result()  # raises what the callback raised
+        quiet = time.monotonic() + QUIET_S
 
 
 def _say_goodbye(node: Node) -> None:

@@ -1,0 +1,51 @@
+"""SIGINT and SIGTERM as a request to stop. Standard library alone, so that it is there before anything heavy is."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+
+
+class StopRequest:
+    """Whether SIGINT or SIGTERM has come. Later signals change nothing."""
+
+    __slots__ = ("requested",)
+
+    def __init__(self) -> None:
+        self.requested = False
+
+
+_watching: list[StopRequest] = []
+"""The request that the handlers in force note in."""
+
+
+@contextmanager
+def stop_on_signals() -> Iterator[StopRequest]:
+    """Turn SIGINT and SIGTERM into a request to stop; call it in the main thread. Inside another one it is that one's.
+
+    After a signal both stay ignored for good: the program is on its way out, and a second signal must not cut
+    its exit short. Without one the earlier handlers return.
+    """
+    if _watching:
+        yield _watching[0]
+        return
+    stop = StopRequest()
+
+    def note(_signal: int, _frame: FrameType | None) -> None:
+        stop.requested = True
+
+    _watching.append(stop)
+    earlier = {number: signal.signal(number, note) for number in _SIGNALS}
+    try:
+        yield stop
+    finally:
+        _watching.clear()
+        # Blocked meanwhile: a signal between two of these lines would be reported as lost in a race.
+        signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        for number, handler in earlier.items():
+            signal.signal(number, signal.SIG_IGN if stop.requested else handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
