@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
+from faulty import READERS, S
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -20,8 +21,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
 from test_estimator_node import FAST, Line
 
-from adhesion_node import reading, topics
-from adhesion_node.core.align import Sample
+from adhesion_node import topics
 from adhesion_node.nodes import qos
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.pipeline import Pipeline
@@ -32,15 +32,8 @@ from sim_node.scenario import find
 from sim_node.sensor_messages import SensorMessage, Tick
 from sim_node.sensors import SensorSettings
 
-S = 10**9
 SENSORS = SensorSettings(speed_std_mps=0.3)
 MakeLine = Callable[..., Line]
-
-READERS: dict[topics.Topic, Callable[[Any], Sample]] = {
-    topics.POSITION: reading.position,
-    topics.BRAKE_PRESSURE: reading.brake_pressure,
-    topics.SPEED: reading.speed,
-}
 
 
 @pytest.fixture

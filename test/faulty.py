@@ -1,0 +1,70 @@
+"""Simulated runs with a fault through the pipeline, to be held beside the same run without it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from adhesion_node import reading, topics
+from adhesion_node.core import Config, Estimate
+from adhesion_node.core.align import Sample
+from adhesion_node.core.prediction import Prediction
+from adhesion_node.core.train import Array
+from adhesion_node.pipeline import Pipeline
+from sim_node.faults import Plan, faulty_run, period_of
+from sim_node.messages import message_of
+from sim_node.plant import Truth
+from sim_node.scenario import find
+from sim_node.sensors import SensorSettings
+
+S = 10**9
+SETTINGS = SensorSettings()
+READERS: dict[topics.Topic, Callable[[Any], Sample]] = {
+    topics.POSITION: reading.position,
+    topics.BRAKE_PRESSURE: reading.brake_pressure,
+    topics.SPEED: reading.speed,
+}
+
+
+class Outcome(NamedTuple):
+    """A run's estimates, the truth by stamp, and the pipeline at its end."""
+
+    predictions: list[Prediction]
+    truth: dict[int, Truth]
+    pipeline: Pipeline
+
+    def braking(self) -> list[Estimate]:
+        """Estimates of settled, adhesion-limited braking."""
+        first = max(truth.speed_mps for truth in self.truth.values())
+        settled = [p.estimate for p in self.predictions if first - self.truth[p.estimate.t_ns].speed_mps > 30 / 3.6]
+        return [e for e in settled if self.truth[e.t_ns].regime == "ADHESION_LIMITED"]
+
+    def errors(self) -> Array:
+        """Errors of mu while it can be seen."""
+        return np.array([e.mu - self.truth[e.t_ns].mu for e in self.braking()])
+
+    def by_second(self) -> dict[int, Estimate]:
+        """The last estimate of every second."""
+        return {p.estimate.t_ns // S: p.estimate for p in self.predictions}
+
+
+@cache
+def outcome(fault: str, seed: int = 1, start_s: float = 30.0, duration_s: float = 0.0, share: float = 0.0) -> Outcome:
+    plan = Plan(fault, start_s, duration_s, share)
+    pipeline, predictions, truths = Pipeline(Config(), 1), list[Prediction](), {}
+    for truth, sent in faulty_run(plan, find("tunnel_entry"), period_of(plan, 0.1), seed, SETTINGS):
+        truths[truth.t_ns] = truth
+        for message in sent:
+            predictions += pipeline.push(READERS[message.topic](message_of(message)))
+    return Outcome(predictions + pipeline.finish(), truths, pipeline)
+
+
+def assert_sound(run: Outcome) -> None:
+    """Every number is finite and the stamps strictly increase."""
+    assert all(later.estimate.t_ns > earlier.estimate.t_ns for earlier, later in pairwise(run.predictions))
+    assert all(math.isfinite(value) for p in run.predictions for value in p.estimate if isinstance(value, float))

@@ -1,0 +1,61 @@
+"""What the faults of the sensors cost: each faulty run beside the same run without the fault."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from faulty import S, assert_sound, outcome
+
+from adhesion_node.core import Config
+
+
+@pytest.mark.parametrize("duration_s", [1.0, 5.0, 30.0])
+def test_a_dropout_costs_certainty_and_is_made_up_within_a_window(duration_s: float) -> None:
+    gap, whole = outcome("dropout", start_s=35.0, duration_s=duration_s), outcome("none").by_second()
+    after = [p.estimate for p in gap.predictions if p.estimate.t_ns > (35.0 + duration_s) * S]
+    first = after[0]
+    if duration_s > Config().max_gap_s:  # a shorter one is bridged: the window only spans more time
+        assert first.mu_std > whole[first.t_ns // S].mu_std
+        assert first.position_std_m > whole[first.t_ns // S].position_std_m
+    made_up = [e for e in after if e.t_ns > (35.0 + duration_s + 6.0) * S]
+    assert made_up
+    for e in made_up:
+        b = whole[e.t_ns // S]
+        assert abs(e.mu - b.mu) < 3.0 * max(e.mu_std, b.mu_std)
+    assert_sound(gap)
+
+
+def test_30_percent_of_loss_stays_within_3_sigma() -> None:
+    lossy, whole = outcome("loss"), outcome("none").by_second()
+    for e in lossy.braking():
+        b = whole[e.t_ns // S]
+        assert abs(e.mu - b.mu) < 3.0 * max(e.mu_std, b.mu_std)
+    assert_sound(lossy)
+
+
+def test_outliers_cost_at_most_half_as_much_again_and_are_flagged() -> None:
+    run = outcome("outliers")
+    assert np.abs(run.errors()).mean() <= 1.5 * np.abs(outcome("none").errors()).mean()
+    assert run.pipeline.dropped["OUTLIER"] >= 20
+    assert_sound(run)
+
+
+def test_heavy_tails_cost_at_most_half_as_much_again() -> None:
+    run = outcome("heavy_tails")
+    assert np.abs(run.errors()).mean() <= 1.5 * np.abs(outcome("none").errors()).mean()
+    assert_sound(run)
+
+
+def test_at_changing_rates_the_90_percent_interval_covers() -> None:
+    scores = []
+    for seed in (1, 2):
+        run = outcome("irregular", seed)
+        scores += [error / e.mu_std for error, e in zip(run.errors(), run.braking(), strict=True)]
+        assert_sound(run)
+    assert 0.85 <= np.mean(np.abs(scores) < 1.645) <= 0.95
+
+
+@pytest.mark.parametrize(("fault", "shift"), [("grade", -0.005), ("mass", 0.0)])
+def test_an_unknown_grade_or_mass_shifts_mu_by_what_it_must(fault: str, shift: float) -> None:
+    """Downhill 5 permille takes 0.005 off; the mass cancels for as long as the rail limits."""
+    assert outcome(fault).errors().mean() - outcome("none").errors().mean() == pytest.approx(shift, abs=0.001)
