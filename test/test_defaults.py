@@ -157,3 +157,12 @@ def test_help_lists_every_parameter_with_its_default() -> None:
     ).stdout
     for name, value in sections()["estimator"].items():
         assert f"  {name} (default {value}): " in shown
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_parameter_has_a_description_and_every_number_a_range(name: str) -> None:
+    for spec in NODES[name][1]:
+        assert spec.description, spec.name
+        if isinstance(spec.default, (int, float)) and not isinstance(spec.default, bool):
+            assert spec.minimum is not None, spec.name
+            assert spec.maximum is not None, spec.name

@@ -123,7 +123,8 @@ def test_nothing_changes_while_running(make: Make, changes: dict[str, Any]) -> N
     result = node.set_parameters_atomically(parameters)
     assert not result.successful
     (name, value), *_ = [change for change in changes.items() if change[0] != "use_sim_time"]
-    assert result.reason == f"{name} = {value}: fixed at start; restart the node to change it"
+    (spec,) = [spec for spec in SPECS if spec.name == name]
+    assert result.reason == (f"{name} = {value}: fixed at start; restart the node to change it, with {spec.allowed()}")
     assert {spec.name: node.get_parameter(spec.name).value for spec in SPECS} == DEFAULTS
     assert node.get_parameter("use_sim_time").value is False
 

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import IO
 
 import pytest
@@ -18,6 +19,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 
 from adhesion_node.nodes import runtime
+from adhesion_node.nodes.params_file import sections_of, unheeded
 from adhesion_node.signals import stop_on_signals
 
 PROGRAM = """
@@ -205,6 +207,28 @@ def test_bad_ros_arguments_are_one_line_and_code_2(start: Start, args: tuple[str
     assert code == runtime.BAD_INPUT
     (complaint,) = [line for line in errors if not line.startswith("[ERROR]")]  # rcl logs some of them itself
     assert message in complaint
+
+
+@pytest.mark.parametrize(
+    ("section", "told"), [("prob", True), ("probe", False), ("/**", False), ("/other/probe", True)]
+)
+def test_a_parameter_file_for_another_node_is_told(start: Start, tmp_path: Path, section: str, told: bool) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"{section}:\n  ros__parameters:\n    gain: 0.25\n")
+    program = start("--ros-args", "--params-file", str(file), TASK="finish")
+    _, errors = program.communicate(timeout=30.0)
+    assert program.returncode == 0
+    assert (f"has sections for {section.strip('/')}, none for /probe: name one 'probe' or '/**'" in errors) == told
+    assert ("gain = 0.25" in errors) != told
+
+
+def test_nested_namespaces_are_sections_too(tmp_path: Path) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text("train1:\n  probe: {ros__parameters: {gain: 1.0}}\n  other: {ros__parameters: {}}\n")
+    assert sections_of(str(file)) == ["train1/probe", "train1/other"]
+    assert unheeded(["--params-file", str(file)], "/train1/probe") == []
+    (warning,) = unheeded(["-p", "a:=1", "--params-file", str(file)], "/train2/probe")
+    assert "has sections for train1/probe, train1/other, none for /train2/probe" in warning
 
 
 def test_arguments_without_ros_args_are_refused(start: Start) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -127,7 +127,8 @@ def declare(node: Node, specs: Sequence[Spec]) -> dict[str, Any]:
     for spec in specs:
         node.set_descriptor(spec.name, spec.descriptor())
     node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
-    node.add_on_set_parameters_callback(lambda changes: _refuse(changes, values))
+    allowed = {spec.name: spec.allowed() for spec in specs}
+    node.add_on_set_parameters_callback(lambda changes: _refuse(changes, allowed))
     for message in unknown(node, specs):
         node.get_logger().warning(message)
     node.get_logger().info("parameters: " + ", ".join(f"{name} = {value}" for name, value in values.items()))
@@ -153,10 +154,14 @@ def _given(node: Node, spec: Spec) -> object:
     return node.declare_parameter(spec.name, spec.default, ParameterDescriptor(dynamic_typing=True)).value
 
 
-def _refuse(changes: Sequence[Parameter], fixed: dict[str, Value]) -> SetParametersResult:
-    refused = [f"{change.name} = {change.value}" for change in changes if change.name in fixed]
-    reason = f"{', '.join(refused)}: fixed at start; restart the node to change it" if refused else ""
-    return SetParametersResult(successful=not refused, reason=reason)
+def _refuse(changes: Sequence[Parameter], allowed: Mapping[str, str]) -> SetParametersResult:
+    """Refuse all changes together when one of them is to what `allowed` says of every parameter fixed at start."""
+    refused = [
+        f"{change.name} = {change.value}: fixed at start; restart the node to change it, with {allowed[change.name]}"
+        for change in changes
+        if change.name in allowed
+    ]
+    return SetParametersResult(successful=not refused, reason="; ".join(refused))
 
 
 def _hint(name: str, names: Sequence[str]) -> str:

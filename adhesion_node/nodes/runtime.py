@@ -26,6 +26,7 @@ from adhesion_node.signals import StopRequest, stop_on_signals
 
 from ..cli import help_texts
 from .params import Spec
+from .params_file import unheeded
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 """Exit codes of every program."""
@@ -110,6 +111,8 @@ def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopReq
         node = make_node()
     except _BAD_START as error:
         return _complain(error, BAD_INPUT)
+    for warning in unheeded(ros, node.get_fully_qualified_name()):
+        node.get_logger().warning(warning)
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     try:
