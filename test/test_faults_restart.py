@@ -1,4 +1,4 @@
-"""An estimator that is killed and started again: it inherits nothing and works again within one window."""
+"""Processes that are killed: a sensor is missed, an estimator inherits nothing and works again within one window."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import partial
 
 import pytest
 from conftest import SpinUntil
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -17,6 +18,7 @@ from test_two_processes import PATIENCE_S, QUICK, Operator, Program
 
 from adhesion_node import topics
 from adhesion_node.nodes import qos
+from adhesion_node.nodes.estimator import Estimator
 from sim_node import messages
 from sim_node.sensor_messages import Tick
 
@@ -29,6 +31,21 @@ def started() -> Iterator[list[Program]]:
     for program in programs:
         program.kill()
         program.communicate()
+
+
+def test_a_sensor_whose_process_is_killed_is_stale(
+    started: list[Program], context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """A killed process says no goodbye: DDS itself would miss it after 20 s."""
+    operator, estimator = Operator(context), Estimator(context=context)
+    executor.add_node(operator)
+    executor.add_node(estimator)
+    simulator = start("simulator", "--ros-args", "-p", "rate_hz:=50", "-p", "scenario:=cruise", "-p", "wait_for:=1")
+    started.append(simulator)
+    spin_until(executor, lambda: estimator.heard[topics.POSITION] > 50, PATIENCE_S)
+    assert operator.levels[-1] != DiagnosticStatus.STALE
+    simulator.send_signal(signal.SIGKILL)
+    spin_until(executor, lambda: operator.levels[-1] == DiagnosticStatus.STALE)
 
 
 def measured(operator: Operator, count: int) -> bool:

@@ -70,10 +70,12 @@ class Operator(Node):
     def __init__(self, context: Context) -> None:
         super().__init__("operator", context=context)
         self.heard: list[dict[str, str]] = []
+        self.levels: list[bytes] = []
         qos.subscribe(self, DIAGNOSTICS, self._hear, qos.RESULT)
 
     def _hear(self, message: Any) -> None:
         (status,) = message.status
+        self.levels.append(status.level)
         self.heard.append({pair.key: pair.value for pair in status.values})
 
     def __repr__(self) -> str:

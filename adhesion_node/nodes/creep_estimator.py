@@ -36,9 +36,6 @@ EXAMPLES = ("creep_estimator", "creep_estimator --ros-args -p axles:=4 -p wheel_
 
 OUTPUTS = (*topics.CREEP_RESULTS, topics.DIAGNOSTICS)
 
-NAME = "creep_estimator/peak"
-"""In /diagnostics."""
-
 
 class CreepEstimator(Node):
     """Identifies the creep curve while the train pulls and publishes its peak as soon as the data tell it.
@@ -51,6 +48,7 @@ class CreepEstimator(Node):
         setup = setup_of(declare(self, PARAMETERS))
         self._pipeline = CreepPipeline(setup.config, setup.vehicle)
         self._reported_ns = 0
+        self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/peak"
         self.published: Counter[Topic] = Counter()
         readers = {topic: READERS[topic.name] for topic in INPUTS}
         self._intake = Intake(self, self, readers, setup.frame, setup.sensor_timeout_s)
@@ -95,7 +93,7 @@ class CreepEstimator(Node):
     def _report(self, t_ns: int) -> None:
         self._reported_ns = next_stamp(t_ns, self._reported_ns)
         found = [*self._intake.findings(), _finding(self._pipeline.last)]
-        self._send(topics.DIAGNOSTICS, status_message(self._reported_ns, NAME, found, _values(self._pipeline)))
+        self._send(topics.DIAGNOSTICS, status_message(self._reported_ns, self._entry, found, _values(self._pipeline)))
 
     def _publish(self, estimates: list[CreepEstimate]) -> None:
         for estimate in estimates:

@@ -57,9 +57,6 @@ OUTPUTS = {
 }
 """What the node publishes, in the order of publishing."""
 
-NAME = "estimator/adhesion"
-"""In /diagnostics."""
-
 
 class Estimator(Node):
     """Identifies the adhesion while the train brakes and publishes the braking curve that follows from it.
@@ -72,6 +69,7 @@ class Estimator(Node):
         setup = setup_of(declare(self, PARAMETERS))
         self._pipeline = Pipeline(setup.config, setup.seed)
         self._reported_ns = 0
+        self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/adhesion"
         self.published: Counter[Topic] = Counter()
         self._intake = Intake(self, self, READERS, setup.frame, setup.sensor_timeout_s)
         self._outputs = {
@@ -126,7 +124,7 @@ class Estimator(Node):
     def _report(self, t_ns: int) -> None:
         self._reported_ns = next_stamp(t_ns, self._reported_ns)
         found = [*self._intake.findings(), *findings(self._pipeline)]
-        self._send(topics.DIAGNOSTICS, status_message(self._reported_ns, NAME, found, values(self._pipeline)))
+        self._send(topics.DIAGNOSTICS, status_message(self._reported_ns, self._entry, found, values(self._pipeline)))
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._publish(self._pipeline.reset())
