@@ -117,7 +117,8 @@ class Pipeline:
     def _without_sight(self, t_ns: int) -> list[Prediction]:
         """As often as there are estimates, say what holds while the position sensor is stuck."""
         self._blind += 1
-        prediction = self._guard.blind(self.config, t_ns) if self._blind % self.config.step == 1 else None
+        due = (self._blind - 1) % self.config.step == 0
+        prediction = self._guard.blind(self.config, t_ns) if due else None
         return [] if prediction is None else self._digested([prediction])
 
     def _published(self, estimates: Iterable[Estimate]) -> list[Prediction]:

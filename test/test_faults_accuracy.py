@@ -33,26 +33,19 @@ def test_30_percent_of_loss_stays_within_3_sigma() -> None:
     assert_sound(lossy)
 
 
-def test_outliers_cost_at_most_half_as_much_again_and_are_flagged() -> None:
-    run = outcome("outliers")
-    assert np.abs(run.errors()).mean() <= 1.5 * np.abs(outcome("none").errors()).mean()
-    assert run.pipeline.dropped["OUTLIER"] >= 20
-    assert_sound(run)
+def mean_error(fault: str) -> float:
+    """Over four runs: one alone is too often lucky."""
+    return float(np.mean([np.abs(outcome(fault, seed).errors()).mean() for seed in (1, 2, 3, 4)]))
 
 
-def test_heavy_tails_cost_at_most_half_as_much_again() -> None:
-    run = outcome("heavy_tails")
-    assert np.abs(run.errors()).mean() <= 1.5 * np.abs(outcome("none").errors()).mean()
-    assert_sound(run)
+@pytest.mark.parametrize("fault", ["outliers", "heavy_tails"])
+def test_outliers_cost_at_most_half_as_much_again(fault: str) -> None:
+    assert mean_error(fault) <= 1.5 * mean_error("none")
+    assert_sound(outcome(fault))
 
 
-def test_at_changing_rates_the_90_percent_interval_covers() -> None:
-    scores = []
-    for seed in (1, 2):
-        run = outcome("irregular", seed)
-        scores += [error / e.mu_std for error, e in zip(run.errors(), run.braking(), strict=True)]
-        assert_sound(run)
-    assert 0.85 <= np.mean(np.abs(scores) < 1.645) <= 0.95
+def test_outliers_are_flagged() -> None:
+    assert outcome("outliers").pipeline.dropped["OUTLIER"] >= 20
 
 
 @pytest.mark.parametrize(("fault", "shift"), [("grade", -0.005), ("mass", 0.0)])

@@ -14,6 +14,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from start_stop import start
 from test_faults_estimator import flat, offline_digest, ticks
+from test_offline import FAST
 from test_two_processes import PATIENCE_S, QUICK, Operator, Program
 
 from adhesion_node import topics
@@ -85,4 +86,4 @@ def test_a_killed_estimator_is_replaced_by_one_that_inherits_nothing(
     second.send_signal(signal.SIGINT)
     spin_until(executor, lambda: second.poll() is not None, PATIENCE_S)
     assert second.returncode == 0
-    assert offline_digest(later) in (second.stderr.read() if second.stderr else "")
+    assert offline_digest(later, **FAST) in (second.stderr.read() if second.stderr else "")
