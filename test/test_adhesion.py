@@ -48,6 +48,12 @@ def test_laws_fall_with_speed_and_are_ordered() -> None:
     assert float(WET(np.array(-5.0))) == float(WET(np.array(0.0)))  # noise around standstill
 
 
+@pytest.mark.parametrize("law", [*LAWS.values(), SpeedLaw(0.04, 13.7, 120.0, 0.45), SpeedLaw(0.07)])
+def test_slope_by_finite_differences(law: SpeedLaw) -> None:
+    speeds, h = np.linspace(0.5, 100.0, 50), 1e-4
+    assert law.slope(speeds) == pytest.approx((law(speeds + h) - law(speeds - h)) / (2.0 * h), rel=1e-6, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("coefficients", "message"),
     [

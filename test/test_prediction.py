@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from adhesion_node.core import Config, Estimate, Regime
+from adhesion_node.core.adhesion import WET
 from adhesion_node.core.prediction import predict
 from adhesion_node.core.track import Grade, Track, Tunnel
 from adhesion_node.core.train import Train
@@ -99,3 +103,30 @@ def test_a_train_at_rest_has_curves_of_no_length() -> None:
     prediction = predict(config(), estimate(speed_mps=0.0))
     assert prediction.safe is not None
     assert prediction.safe.distance_m[-1] == prediction.safe.time_s[-1] == 0.0
+
+
+def test_an_uncertain_brake_lowers_the_safe_curve_alone() -> None:
+    certain, uncertain = (predict(replace(config(), brake_std=std), estimate(0.2, 0.15)) for std in (0.0, 0.05))
+    assert certain.safe is not None
+    assert uncertain.safe is not None
+    assert uncertain.nominal is not None
+    brake = 0.9332  # model.md: B/M, m/s^2
+    assert certain.safe.deceleration_mps2 == pytest.approx(brake, rel=1e-4)
+    assert uncertain.safe.deceleration_mps2 == pytest.approx(brake * (1.0 - 1.644854 * 0.05), rel=1e-4)
+    assert uncertain.nominal.deceleration_mps2 == pytest.approx(brake, rel=1e-4)
+    # an adhesion below even the weak brake is used in full
+    sliding = predict(replace(config(), brake_std=0.05), estimate(0.08, 0.05)).safe
+    assert sliding is not None
+    assert sliding.deceleration_mps2 == pytest.approx(0.05 * G)
+
+
+def test_the_nominal_curve_follows_the_identified_law() -> None:
+    """By quadrature of v dv/a on 0.8 times the wet law, the brake's limit included; the safe one stays at its bound."""
+    mu = 0.8 * (0.04 + 13.7 / (120.0 + 3.6 * 60.0))
+    prediction = predict(config(), estimate(mu, 0.05)._replace(shape=WET))
+    assert prediction.nominal is not None
+    assert prediction.safe is not None
+    distance, _ = quad(lambda v: v / (G * min(0.8 * (0.04 + 13.7 / (120.0 + 3.6 * v)), 0.9332 / G)), 0.0, 60.0)
+    assert prediction.nominal.distance_m[-1] == pytest.approx(distance, rel=1e-3)
+    assert prediction.nominal.distance_m[-1] < 60.0**2 / (2.0 * mu * G)
+    assert prediction.safe.distance_m[-1] == pytest.approx(60.0**2 / (2.0 * 0.05 * G))

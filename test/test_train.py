@@ -61,6 +61,12 @@ def test_cases_2_and_3_the_smaller_force_acts() -> None:
     assert CRH3.used_adhesion(np.array([0.05, 0.09, 0.2]), 0.09, r).tolist() == [0.05, 0.09, 0.09]
 
 
+def test_slope_of_the_resistance_by_finite_differences() -> None:
+    speeds, h = np.linspace(0.0, 100.0, 50), 1e-2
+    rise = (CRH3.specific_resistance(speeds + h) - CRH3.specific_resistance(speeds - h)) / (2.0 * h)
+    assert CRH3.resistance_slope(speeds) == pytest.approx(rise, rel=1e-9)
+
+
 def test_rotating_masses_slow_the_brake_limited_train_alone() -> None:
     train, b, r = replace(CRH3, rotating_mass_fraction=0.1), 0.0952, np.array(0.01306)
     # brake-limited: M (1 + rho) a = B + R: a = 9.8 x (0.0952 + 0.01306)/1.1 = 0.964498
