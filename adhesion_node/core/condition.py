@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from .braking_window import BrakingWindow, Verdict
-from .changes import change
+from .changes import change, position_step
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
@@ -32,6 +32,9 @@ UNDECIDED = 0.5
 
 EDGE = 5
 """Steps at either end of a window in which a change of the rail is not looked for."""
+
+STEP_STD_M = 3.0
+"""By how much a balise may correct the positions."""
 
 PLAUSIBLE = 0.005
 """Probability from which a hypothesis may lower the bound."""
@@ -76,7 +79,9 @@ def evaluate_condition(
         following = _following(config, window, found)
         law, now = _state(leading.now.belief), tuple(each.now for each in found)
     else:
-        following = _opened(config, changed, BrakingWindow(window.prior, window.samples[-1:], noise=window.noise))
+        following = _opened(
+            config, changed.belief, BrakingWindow(window.prior, window.samples[-1:], noise=window.noise)
+        )
         law, now = following.prior, following.hypotheses
     regime, rail = _judge(config, now, before, _limit(config, window, leading))
     return Verdict(
@@ -89,7 +94,7 @@ def evaluate_condition(
         iterations=leading.smoothed.iterations,
         converged=leading.smoothed.converged,
         log_likelihood=leading.now.log_weight,
-        changed=changed is not None,
+        changed=changed is not None and changed.of_rail,
     )
 
 
@@ -124,17 +129,28 @@ def _find(
     return Found(before, problem, smoothed, Hypothesis(before.law, now.belief, before.log_weight + now.log_evidence))
 
 
-def _changed(config: Config, leading: Found) -> Belief | None:
-    """Law of (s, v, mu) at the newest sample if the rail has changed within the window."""
-    candidates = np.arange(EDGE, leading.problem.window.steps - EDGE + 1, dtype=np.intp)
-    if candidates.size == 0:
+class Changed(NamedTuple):
+    """A change within the window."""
+
+    belief: Belief
+    """Law of (s, v, mu) at the newest sample."""
+    of_rail: bool
+    """Of the rail, or only of the positions' origin."""
+
+
+def _changed(config: Config, leading: Found) -> Changed | None:
+    """The change that the window has seen, of the rail or of the positions, whichever is the likelier."""
+    law, last = leading.before.law, leading.problem.window.steps - EDGE
+    if last < EDGE:
         return None
-    law = leading.before.law
     jump_std = config.unknown_std / float(law(leading.before.belief.mean[1]))
-    found = change(leading.problem, leading.smoothed, candidates, jump_std)
-    if found.log_odds < config.change_threshold:
+    rail = change(leading.problem, leading.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), jump_std)
+    place = position_step(leading.problem, leading.smoothed, np.arange(EDGE, last + 3, dtype=np.intp), STEP_STD_M)
+    likelier = max(rail, place, key=lambda found: found.log_odds)
+    if likelier.log_odds < config.change_threshold:
         return None
-    return scaled(found.belief, float(law(found.belief.mean[1])))
+    belief = scaled(likelier.belief, float(law(likelier.belief.mean[1])))
+    return Changed(belief, of_rail=likelier is rail)
 
 
 def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:

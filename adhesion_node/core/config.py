@@ -96,7 +96,7 @@ class Config:
         6.0, "Innovation in standard deviations from which a position is an outlier", low=3.0, high=1e6
     )
     max_outliers: int = setting(
-        10, "Outliers in a row after which the train is taken to be elsewhere", low=1, high=10_000
+        20, "Outliers in a row after which the train is taken to be elsewhere", low=1, high=10_000
     )
 
     def __post_init__(self) -> None:

@@ -99,9 +99,9 @@ class Problem:
         var_s, var_v = self.model.motion.noise(self.window.dt_s)
         return np.asarray(1.0 / var_s), np.asarray(1.0 / var_v)
 
-    def squared(self, trajectory: Array) -> Array:
-        """Squared deviations of the measured positions from the trajectory, in variances, shape (K,)."""
-        result: Array = (self.window.position_m - trajectory[1:, 0]) ** 2 / self.window.variance_m2
+    def squared(self, trajectory: Array, shift: float | Array = 0.0) -> Array:
+        """Squared deviations of the measured positions, less their shift, from the trajectory, in variances: (K,)."""
+        result: Array = (self.window.position_m - shift - trajectory[1:, 0]) ** 2 / self.window.variance_m2
         return result
 
     def linearise(self, trajectory: Array, kappa: float) -> Steps:
