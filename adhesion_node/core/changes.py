@@ -124,11 +124,14 @@ def _try(problem: Problem, smoothed: Smoothed, jumps: Callable[[Steps, Array], _
     per_jump = np.stack([-moved[-2], -moved[-1], -moved_kappa])
     per_jump[tried.adds_to] += 1.0
     base = np.array([*(trajectory[-1] + still[-2:]), kappa + still_kappa])
+    # a fall counts from what was used: the limit, where the brake limits
+    means = base[:, None] + per_jump * sizes
+    means[2] += np.minimum(steps.headroom[candidates], 0.0)
     best = int(np.argmax(log_odds))
     return _Tried(
         log_odds=log_odds,
         total=float(np.logaddexp.reduce(log_odds)),
-        means=base[:, None] + per_jump * sizes,
+        means=means,
         per_jump=per_jump,
         variances=1.0 / information,
         rest=normal.factor.law_at_end(),

@@ -70,10 +70,11 @@ def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoot
         limits = kappa + float(np.min(steps.headroom)), kappa + float(np.max(steps.headroom))
         if change > 0.0:
             low = max(low, kappa)
-        elif kappa > limits[0]:
+        elif kappa >= limits[0]:
             high = min(high, kappa)
         following = max(kappa + change, search.lowest)
-        if max(kappa, following) > limits[0] and not low <= following <= high:
+        crossing = max(kappa, following) >= limits[0] and abs(change) > search.tolerance
+        if crossing and not low < following < high:
             following = 0.5 * (max(low, min(limits[0], high)) + min(high, max(limits[1], low)))
         trajectory, change, kappa = trajectory + moved, following - kappa, following
         before, weights = weights, problem.model.weights(problem.squared(trajectory))
@@ -101,6 +102,7 @@ def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
         ps @ steps.position_error**2 + pv @ steps.speed_error**2 + deviation @ problem.precision @ deviation
     )
     misfit += problem.model.loss(problem.squared(trajectory))
+    misfit += 0.5 * float(np.sum((problem.window.speed_mps - trajectory[1:, 1]) ** 2 / problem.window.speed_variance))
     misfit -= 0.5 * (float(normal.states @ moved.ravel()) + normal.kappa * change)
     spread = normal.factor.log_determinant - float(np.linalg.slogdet(problem.precision)[1])
     return Posterior(Belief(mean, normal.factor.law_at_end()), -misfit - 0.5 * spread)
