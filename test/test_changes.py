@@ -100,7 +100,10 @@ def test_outliers_are_no_change() -> None:
 
 
 def test_while_the_brake_limits_only_a_fall_can_be_seen() -> None:
-    """0.0952/0.05 = 1.904 is the limit: a rail of 3 that rises or falls to 2 shows nothing."""
+    """0.0952/0.05 = 1.904 is the limit: a rail of 3 that rises or falls to 2 shows nothing, one that falls to 1 does.
+
+    More deceleration than the brake has, for whatever reason, is no rise.
+    """
     rail = Conditioned(NOMINAL, 0.05)
     beyond = Belief(np.array([100.0, 80.0, 3.0]), np.diag([0.04, 0.01, 0.04]))
     seen = []
@@ -109,3 +112,5 @@ def test_while_the_brake_limits_only_a_fall_can_be_seen() -> None:
         seen.append(_found(rail, draw(rail, used, np.random.default_rng(3)), beyond).log_odds)
     assert seen[0] == seen[1] < 1.0
     assert seen[2] > 10.0
+    stronger = draw(rail, np.where(np.arange(50) < 25, 1.904, 3.0), np.random.default_rng(3))
+    assert _found(rail, stronger, beyond).log_odds < 1.0
