@@ -82,10 +82,11 @@ def test_kappa_stays_above_the_lowest() -> None:
 # --- evidence and the law that a beginning leaves
 
 
+@pytest.mark.parametrize("speeds", [0, 4])
 @pytest.mark.parametrize("brake", [0.0952, TIMID], ids=["full", "building up"])
-def test_evidence_of_two_laws_differs_as_their_densities_do(brake: float | Array) -> None:
+def test_evidence_of_two_laws_differs_as_their_densities_do(brake: float | Array, speeds: int) -> None:
     for seed in range(3):
-        rail, window = _window(seed, brake)
+        rail, window = _window(seed, brake, speeds)
         ours, brute = [], []
         for floor, mean in ((0.05, 1.2), (0.06, 1.2), (0.05, 0.8)):
             other, prior = rail._replace(floor=floor), PRIOR._replace(mean=np.array([100.0, 80.0, mean]))
@@ -172,8 +173,10 @@ def _profile(prior: Belief, window: Window) -> tuple[float, list[float]]:
         (np.linspace(0.02, 0.0952, 30), 1.5),
         (np.linspace(0.0, 0.3, 30), 1.5),
         (np.where(np.arange(30) < 15, 0.05, 0.09), 1.4),
+        (np.where(np.arange(30) < 15, 0.05, 0.09), 2.4),
+        (np.full(30, 0.0952), 2.4),
     ],
-    ids=["building up", "far beyond", "two levels"],
+    ids=["building up", "far beyond", "two levels", "two levels, limited", "limited"],
 )
 def test_most_probable_kappa_around_the_brakes_limit(brake: Array, kappa: float, mean: float, std: float) -> None:
     covariance = np.zeros((3, 3))
