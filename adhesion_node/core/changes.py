@@ -70,6 +70,8 @@ class _Jumps(NamedTuple):
     """Which of (s, v, kappa) at the end it moves by itself."""
     shifts: Array
     """By how much it shifts each measured position, shape (K, C)."""
+    unused: Array
+    """Part of kappa from which it does not count, shape (C,)."""
 
 
 def change(problem: Problem, smoothed: Smoothed, candidates: Indices, jump_std: float) -> Change:
@@ -124,9 +126,8 @@ def _try(problem: Problem, smoothed: Smoothed, jumps: Callable[[Steps, Array], _
     per_jump = np.stack([-moved[-2], -moved[-1], -moved_kappa])
     per_jump[tried.adds_to] += 1.0
     base = np.array([*(trajectory[-1] + still[-2:]), kappa + still_kappa])
-    # a fall counts from what was used: the limit, where the brake limits
     means = base[:, None] + per_jump * sizes
-    means[2] += np.minimum(steps.headroom[candidates], 0.0)
+    means[2] -= tried.unused
     best = int(np.argmax(log_odds))
     return _Tried(
         log_odds=log_odds,
@@ -159,6 +160,7 @@ def _of_kappa(problem: Problem, steps: Steps, candidates: Indices, std: float) -
         std=std,
         adds_to=2,
         shifts=np.zeros((count, candidates.size)),
+        unused=np.maximum(-steps.headroom[candidates], 0.0),  # it counts from the brake's limit
     )
 
 
@@ -177,6 +179,7 @@ def _of_positions(problem: Problem, trajectory: Array, weights: Array, candidate
         std=std,
         adds_to=0,
         shifts=(np.arange(count)[:, None] >= candidates).astype(np.float64),
+        unused=np.zeros(candidates.size),
     )
 
 

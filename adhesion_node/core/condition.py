@@ -36,6 +36,9 @@ EDGE = 5
 STEP_STD_M = 3.0
 """By how much a balise may correct the positions."""
 
+RARER = 5.0
+"""Logarithm of how much rarer such a correction is than a change of the rail; heavy tails look like one."""
+
 PLAUSIBLE = 0.005
 """Probability from which a hypothesis may lower the bound."""
 
@@ -146,6 +149,7 @@ def _changed(config: Config, leading: Found) -> Changed | None:
     jump_std = config.unknown_std / float(law(leading.before.belief.mean[1]))
     rail = change(leading.problem, leading.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), jump_std)
     place = position_step(leading.problem, leading.smoothed, np.arange(EDGE, last + 3, dtype=np.intp), STEP_STD_M)
+    place = place._replace(log_odds=place.log_odds - RARER)
     likelier = max(rail, place, key=lambda found: found.log_odds)
     if likelier.log_odds < config.change_threshold:
         return None

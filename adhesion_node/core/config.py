@@ -36,7 +36,7 @@ class Config:
         0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0
     )
     change_threshold: float = setting(
-        3.0, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
+        3.5, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
     )
     tail_dof: float = setting(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
     identify_noise: bool = setting(
