@@ -12,14 +12,29 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from matplotlib.image import imread
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
+from test_convert import as_rosbags
 
 from adhesion_node.bag import BagReader, BagWriter, sensors
+from adhesion_node.bag.types import serialize
+from adhesion_node.core.braking import BrakingCurve
 from adhesion_node.core.train import Train
 from adhesion_node.nodes import convert
 from adhesion_node.report import picture
+from adhesion_node.report.findings import distances
 from adhesion_node.report.run import Run, distance_to_target, read_run
 from adhesion_node.report.table import ROWS, table
-from adhesion_node.topics import BRAKE_PRESSURE, DIAGNOSTICS, MU, MU_LOWER, STATE, TRUTH_MU, TRUTH_STATE, Topic
+from adhesion_node.topics import (
+    BRAKE_PRESSURE,
+    BRAKING_CURVE,
+    BRAKING_CURVE_NOMINAL,
+    DIAGNOSTICS,
+    MU,
+    MU_LOWER,
+    STATE,
+    TRUTH_MU,
+    TRUTH_STATE,
+    Topic,
+)
 
 S = 10**9
 START_NS = 1_700_000_000 * S
@@ -124,10 +139,38 @@ def test_without_estimates_it_says_what_to_do(left_out: tuple[Topic, ...], tmp_p
         read(path)
 
 
+def curve(second: int, length_m: float) -> bytes:
+    """Return a braking curve of that second, by hand: as it runs to 60, 40 and 0 m/s, it passes 50 at 2 lengths."""
+    speeds = np.array([80.0 - 2.0 * second, 60.0, 40.0, 0.0])
+    by_hand = BrakingCurve(length_m * np.array([0.0, 1.0, 3.0, 9.0]), speeds, np.ones(4), np.arange(4.0))
+    message = convert.curve_message(START_NS + second * S, by_hand, 70.0)
+    return serialize(as_rosbags(message, BRAKING_CURVE.type), BRAKING_CURVE.type)
+
+
+def test_distances_are_those_of_the_recorded_curves_and_of_the_present_mu_where_there_is_none(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            curves = [(BRAKING_CURVE_NOMINAL, curve(second, 100.0 + second)), (BRAKING_CURVE, curve(second, 200.0))]
+            for topic, cdr in [*rows(second), *(curves if second in (3, 4) else [])]:
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
+    run = read(tmp_path / "bag")
+    planned = distances(run, 50.0, FREE)
+    ways = np.maximum((80.0 - 2.0 * np.arange(20)) ** 2 - 50.0**2, 0.0) / (2 * 9.8)
+    identified, longest = ways / 0.09, ways / 0.08
+    identified[[3, 4]], longest[[3, 4]] = (206.0, 208.0), 400.0
+    assert planned.fixed == pytest.approx(ways / 0.0726)
+    assert planned.identified == pytest.approx(identified)
+    assert planned.longest == pytest.approx(longest)
+    faster = distances(run, 80.0, FREE)
+    assert not np.any([faster.identified, faster.longest]), "no way to a speed that the train is below"
+    shown = {line.split()[0]: line.split()[5:7] for line in table(run, 180.0, FREE).splitlines()[2:]}
+    assert shown["259"] == ["208", "400"]
+
+
 def test_distances_are_the_closed_form(recorded: Run) -> None:
-    distances = distance_to_target(recorded, 0.0726, 50.0, FREE)
+    lengths = distance_to_target(recorded, 0.0726, 50.0, FREE)
     speeds = 80.0 - 2.0 * np.arange(20)
-    assert distances == pytest.approx(np.maximum(speeds**2 - 50.0**2, 0.0) / (2 * 0.0726 * 9.8))
+    assert lengths == pytest.approx(np.maximum(speeds**2 - 50.0**2, 0.0) / (2 * 0.0726 * 9.8))
     growing = np.linspace(0.05, 0.09, 20)
     assert distance_to_target(recorded, growing, 0.0, FREE) == pytest.approx(speeds**2 / (2 * growing * 9.8))
 

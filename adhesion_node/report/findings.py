@@ -22,10 +22,11 @@ class Distances(NamedTuple):
     """Braking distances, m, at every estimate; arrays of the estimates' shape."""
 
     fixed: Array
-    """By the fixed worst case."""
+    """By the fixed worst case, on a level track."""
     identified: Array
+    """By the nominal curves."""
     longest: Array
-    """By the lower bound of mu: not exceeded, with the confidence of that bound."""
+    """By the safe curves: not exceeded, with the confidence of the bound."""
 
     @property
     def saved(self) -> Array:
@@ -44,12 +45,13 @@ class _Point(NamedTuple):
 
 
 def distances(run: Run, target_mps: float, train: Train) -> Distances:
-    """Braking distances from the speed at each estimate to the target speed, on a level track."""
-    fixed, identified, longest = (
-        distance_to_target(run, mu, target_mps, train)
-        for mu in (FIXED_MU, run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns))
+    """Braking distances from the speed at each estimate to the target speed."""
+    times = run.speed.t_ns
+    return Distances(
+        fixed=distance_to_target(run, FIXED_MU, target_mps, train),
+        identified=distance_to_target(run, run.mu.at(times), target_mps, train, run.nominal),
+        longest=distance_to_target(run, run.mu_lower.at(times), target_mps, train, run.safe),
     )
-    return Distances(fixed, identified, longest)
 
 
 def first_identified(run: Run) -> int | None:

@@ -51,7 +51,7 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
     }
     subtitle = (
         f"Wheel–rail adhesion and emergency braking to {target_kmh:g} km/h, beside the fixed worst case "
-        f"μ\u00a0=\u00a0{FIXED_MU}. Distances hold each μ at its present value. "
+        f"μ\u00a0=\u00a0{FIXED_MU}. Distances are those of the braking curves; without a curve μ keeps its value. "
         "Bands: nothing to learn (grey), the brake limits (blue), the adhesion limits (orange)."
     )
     details = [_section("Distances", subjects, lambda subject: _distances(subject, target_kmh))]
@@ -135,7 +135,7 @@ def _parameters(given: Mapping[str, Any]) -> str:
     )
     return (
         f"<h2>Parameters</h2><p>{changed or 'All at their defaults.'} A recording does not hold the parameters of the "
-        "estimator that ran beside it; what is drawn of its forces and distances takes the train from here.</p>"
+        "estimator that ran beside it; forces and the fixed worst case take the train from here.</p>"
         f"<details><summary>All parameters</summary>{_table(['name', 'value', 'unit', 'meaning'], body)}</details>"
     )
 

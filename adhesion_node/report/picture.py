@@ -81,8 +81,8 @@ def _draw_forces(axis: Any, run: Run, train: Train) -> None:
 def _draw_distance(axis: Any, run: Run, planned: Distances, target_kmh: float) -> None:
     seconds = run.seconds(run.speed.t_ns)
     axis.plot(seconds, planned.fixed, color=GREY, ls=":", label=f"fixed worst case {FIXED_MU}")
-    axis.plot(seconds, planned.longest, color=BLUE, ls="--", label="lower bound of mu (safe curve)")
-    axis.plot(seconds, planned.identified, color=ORANGE, label="identified mu")
+    axis.plot(seconds, planned.longest, color=BLUE, ls="--", label="safe curve, by the lower bound")
+    axis.plot(seconds, planned.identified, color=ORANGE, label="nominal curve, by the identified mu")
     axis.set_ylabel(f"braking distance to {target_kmh:.0f} km/h, m")
     # A bound near 0 needs any distance: beyond the worst case there is nothing to compare.
     axis.set_ylim(top=2.0 * max(float(planned.fixed.max()), 1.0))

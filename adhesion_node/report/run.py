@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from itertools import groupby, islice
+from collections.abc import Iterable, Mapping
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,16 +35,16 @@ RESULTS = (MU, MU_LOWER, STATE)
 """Without these a recording holds no results."""
 
 
-MOST_CURVES = 300
-"""Braking curves read of a recording, about."""
-
-
 class Curve(NamedTuple):
     """A predicted braking: at which places, m along the track, the train has which speeds, m/s; arrays of (n,)."""
 
     t_ns: int
     position_m: Array
     speed_mps: Array
+
+    def distance_to(self, target_mps: float) -> float:
+        """Distance, m, from the start of the curve to where the train has the target speed; 0 where it is slower."""
+        return float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0])
 
 
 class Band(NamedTuple):
@@ -69,9 +69,9 @@ class Run(NamedTuple):
     speed: Series
     regime: Series
     safe: tuple[Curve, ...]
-    """On mu_lower."""
+    """On mu_lower, a weaker brake and the least resistance of the track; at most one for each estimate."""
     nominal: tuple[Curve, ...]
-    """On mu."""
+    """On mu and the identified law over speed."""
     remarks: Series
     """What the estimator said while all was not well."""
     levels: Series
@@ -134,16 +134,20 @@ def bands(run: Run) -> list[Band]:
     return [Band(float(group[0][0]), float(group[-1][1]), str(group[0][2])) for group in grouped]
 
 
-def distance_to_target(run: Run, mu: Array | float, target_mps: float, train: Train) -> Array:
-    """Braking distance, m, from the speed at each estimate to the target speed with adhesion `mu`; 0 below it.
+def distance_to_target(
+    run: Run, mu: Array | float, target_mps: float, train: Train, curves: Iterable[Curve] = ()
+) -> Array:
+    """Braking distance, m, from the speed at each estimate to the target speed; 0 below it.
 
-    On a level track; a bound below 0 counts as no adhesion.
+    By the one of `curves` that has the estimate's stamp. Where there is none, adhesion stays at its present value `mu`
+    on a level track; a bound below 0 counts as no adhesion.
     """
-    speeds = run.speed.values
+    recorded = {curve.t_ns: curve.distance_to(target_mps) for curve in curves}
+    estimates = zip(*(a.tolist() for a in (run.speed.t_ns, *np.broadcast_arrays(run.speed.values, mu))), strict=True)
     return np.array(
         [
-            float(braking.curve(train, float(speed), max(value, 0.0), min(target_mps, float(speed))).distance_m[-1])
-            for speed, value in zip(speeds, np.broadcast_to(mu, speeds.shape).tolist(), strict=True)
+            recorded[t_ns] if t_ns in recorded else _held(train, speed, max(value, 0.0), target_mps)
+            for t_ns, speed, value in estimates
         ]
     )
 
@@ -158,17 +162,17 @@ def speed_of(message: Any) -> float:
     return float(message.twist.twist.linear.x)
 
 
+def _held(train: Train, speed_mps: float, mu: float, target_mps: float) -> float:
+    return float(braking.curve(train, speed_mps, mu, target_mps).distance_m[-1])
+
+
 def _stamped(series: Series, states: Series) -> Series:
     """An adhesion has no header but comes with a state: where none of either is lost, it takes the state's stamp."""
     return series._replace(t_ns=states.t_ns) if series.t_ns.size == states.t_ns.size else series
 
 
 def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
-    """Read about `MOST_CURVES` of the curves, evenly spread: decoding one takes as long as a hundred numbers."""
-    recorded = reader.resolve(topic.name)
-    stride = max(reader.counts[recorded] // MOST_CURVES, 1) if recorded else 1
-    chosen = (record.message for record in islice(reader.messages([topic.name]), None, None, stride))
-    return tuple(_curve(message) for message in chosen if message.points)
+    return tuple(_curve(record.message) for record in reader.messages([topic.name]) if record.message.points)
 
 
 def _curve(message: Any) -> Curve:

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.train import CRH3, KMH, Train
-from .run import FIXED_MU, Run, distance_to_target
+from .findings import distances
+from .run import FIXED_MU, Run
 
 ROWS = 6
 """Rows at most, evenly spread over the speeds of the braking."""
@@ -29,7 +30,7 @@ class Row(NamedTuple):
     true_m: float | None
     identified_m: float
     at_least_m: float
-    """By the lower bound of mu: the longest."""
+    """By the safe curve: the longest."""
     fixed_m: float
 
 
@@ -40,11 +41,11 @@ def rows(run: Run, target_kmh: float, train: Train = CRH3) -> Iterator[Row]:
     if shown.size > ROWS:
         shown = shown[np.linspace(0, shown.size - 1, ROWS).round().astype(int)]
     mu, lower = run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns)
-    distances = [distance_to_target(run, value, target_mps, train) for value in (mu, lower, FIXED_MU)]
+    planned = distances(run, target_mps, train)
     for i in shown:
         true_mu, true_m = _truth(run, int(run.speed.t_ns[i]), target_mps)
-        planned = (float(column[i]) for column in distances)
-        yield Row(float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *planned)
+        lengths = (float(column[i]) for column in (planned.identified, planned.longest, planned.fixed))
+        yield Row(float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *lengths)
 
 
 def table(run: Run, target_kmh: float, train: Train = CRH3) -> str:
