@@ -38,7 +38,7 @@ def mean_error(fault: str) -> float:
     return float(np.mean([np.abs(outcome(fault, seed).errors()).mean() for seed in (1, 2, 3, 4)]))
 
 
-@pytest.mark.parametrize("fault", ["outliers", "heavy_tails"])
+@pytest.mark.parametrize("fault", ["outliers", "burst", "heavy_tails"])
 def test_outliers_cost_at_most_half_as_much_again(fault: str) -> None:
     assert mean_error(fault) <= 1.5 * mean_error("none")
     assert_sound(outcome(fault))
@@ -52,3 +52,13 @@ def test_outliers_are_flagged() -> None:
 def test_an_unknown_grade_or_mass_shifts_mu_by_what_it_must(fault: str, shift: float) -> None:
     """Downhill 5 permille takes 0.005 off; the mass cancels for as long as the rail limits."""
     assert outcome(fault).errors().mean() - outcome("none").errors().mean() == pytest.approx(shift, abs=0.001)
+
+
+def test_a_balise_step_is_not_taken_for_low_adhesion() -> None:
+    step, whole = outcome("balise_step", start_s=45.0), outcome("none")
+    same_time = {p.estimate.t_ns: p.estimate for p in whole.predictions}
+    for p in step.predictions:
+        b = same_time.get(p.estimate.t_ns)
+        if p.estimate.t_ns > 45 * S and b is not None:
+            assert p.estimate.mu - b.mu > -3.0 * max(b.mu_std, p.estimate.mu_std)
+            assert p.estimate.mu_lower <= step.truth[p.estimate.t_ns].mu
