@@ -328,6 +328,7 @@ def test_rough_streams_give_finite_numbers_or_counted_drops(seed: int) -> None:
         QUICK,
         window=int(rng.integers(6, 25)),
         max_lag_s=float(rng.choice([0.0, 0.3])),
+        max_outliers=10,
         speed_while_braking=bool(rng.integers(2)),
     )
     state, estimates = drive(config, stream, seed)
