@@ -30,7 +30,7 @@ def parameter_row(setting: Setting) -> str:
     return f"| `{setting.name}` | {default} | {setting.unit} | {allowed} | {setting.description} |"
 
 
-TABLES = {"## Parameters of the estimator": SETTINGS, "### Parameters of the ATP monitor": atp_monitor.SETTINGS}
+TABLES = {"### Parameters of the estimator": SETTINGS, "### Parameters of the ATP monitor": atp_monitor.SETTINGS}
 
 
 @pytest.mark.parametrize("heading", TABLES)
