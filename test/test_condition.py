@@ -81,14 +81,30 @@ def test_a_steady_rail_has_no_changes() -> None:
 def test_a_limited_brake_claims_no_more_than_it_uses(pressure_pa: float) -> None:
     journey, limit = braking(lambda _, v: 0.14, 15.0, 2, pressure_pa=pressure_pa), LIMIT * pressure_pa / 410e3
     estimates = _estimates(Config(), journey)
+    known = float(SNOW(np.array(journey.speed_mps[-1])))
     assert estimates[-1].regime is Regime.BRAKE_LIMITED
     for estimate in estimates:
         if estimate.regime is not Regime.COASTING:
             assert estimate.regime is Regime.BRAKE_LIMITED
-            assert estimate.mu_lower <= limit + 1e-4
-    # a weak brake leaves what was known before, about 0.05 with a standard deviation of 0.04
+            assert estimate.mu_lower <= max(limit, known) + 1e-4
+    # a weak brake leaves what was known before: the low-adhesion law with a standard deviation of 0.04
     assert limit - 1e-4 < estimates[-1].mu < max(limit, 0.055) + 1e-4
     assert estimates[-1].mu_lower > 0.85 * limit
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_braking_begins_with_the_bound_that_was_known(seed: int) -> None:
+    """The low-adhesion law, which the first seconds neither confirm nor refute, until the rail has been seen."""
+
+    def bounds(rail: Rail) -> list[float]:
+        estimates = _estimates(Config(), braking(rail, 6.0, seed))
+        return [estimate.mu_lower / float(SNOW(np.array(estimate.speed_mps))) for estimate in estimates]
+
+    better, worse = bounds(wet()), bounds(wet(0.4))
+    assert 0.95 < better[0] < 1.05
+    assert min(better) > 0.3
+    assert better[-1] > 1.3
+    assert worse[-1] < 0.6
 
 
 def test_a_limited_brake_hands_on_no_knowledge_of_the_adhesion() -> None:
@@ -112,7 +128,7 @@ def test_where_the_search_starts_does_not_matter() -> None:
 
 
 def test_an_uncertain_grade_adds_in_quadrature() -> None:
-    journey = braking(wet(0.8), 10.0, 5)
+    journey = braking(wet(), 10.0, 5)
     sure, unsure = (_estimates(replace(LAW_KNOWN, grade_std=std), journey)[-1] for std in (0.0, 0.003))
     assert unsure.mu == sure.mu
     assert unsure.mu_std == pytest.approx(math.hypot(sure.mu_std, 0.003))

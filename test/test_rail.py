@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
-from adhesion_node.core.rail import Finding, Rail, age, ignorance, kept_of_start, learn, learn_bound
+from adhesion_node.core.rail import Finding, Rail, age, ignorance, kept_of_start, learn, learn_bound, lower_bound
 
 NOTHING = ignorance(0.05, 0.04)
 
@@ -81,3 +82,22 @@ def test_what_em_kept_of_its_start_is_replaced_by_what_was_known() -> None:
     assert learnt == pytest.approx((0.0775, 0.035, 0.049375))
     # hence the start does not matter: EM from 0.12 arrives 0.75 x 0.12 higher
     assert learn(NOTHING, Finding(0.13, 0.02, start=0.12, kept=0.75), 1.5) == pytest.approx(learnt)
+
+
+@pytest.mark.parametrize("known", [NOTHING, Rail(0.08, 0.03, 0.06)])
+@pytest.mark.parametrize(("mu", "std"), [(0.05, 0.039), (0.03, 0.02), (0.09, 0.01), (0.055, 0.002)])
+def test_a_known_bound_is_prior_knowledge(known: Rail, mu: float, std: float) -> None:
+    """By sums over a grid: the prior is scaled below the bound to 5 %, above it to 95 %."""
+    grid = np.linspace(-0.4, 0.6, 1_000_001)
+    gaussian, posterior = (np.exp(-0.5 * ((grid - m) / s) ** 2) for m, s in ((known.mu, known.std), (mu, std)))
+    below, likelihood = grid < known.lower, posterior / gaussian
+    prior = np.where(below, 0.05 * gaussian / gaussian[below].sum(), 0.95 * gaussian / gaussian[~below].sum())
+    share = np.cumsum(prior * likelihood) / np.sum(prior * likelihood)
+    expected = grid[np.searchsorted(share, 0.05)]
+    assert float(lower_bound(np.array(mu), np.array(std), known, 0.95)) == pytest.approx(expected, abs=2e-6)
+
+
+def test_a_bound_that_says_less_than_its_law_supports_nothing() -> None:
+    mu, std = np.array([0.05, 0.08]), np.array([0.02, 0.01])
+    assert lower_bound(mu, std, Rail(0.08, 0.01, 0.06), 0.95) == pytest.approx(lower_bound(mu, std, None, 0.95))
+    assert lower_bound(mu, std, None, 0.95) == pytest.approx(mu - 1.6448536269514722 * std)

@@ -26,6 +26,8 @@ class BrakingWindow(NamedTuple):
     """Identified so far."""
     trajectory: Array | None = None
     """Smoothed positions and speeds of its first samples, from the last evaluation; where the next one begins."""
+    known: Rail | None = None
+    """The rail as it was known when the braking began; None when it has changed since."""
 
     def extended(self, sample: Sample) -> BrakingWindow:
         """The window with one more sample."""

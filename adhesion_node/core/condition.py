@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
 
 from .braking_window import BrakingWindow, Verdict
 from .changes import change, position_step
@@ -21,7 +20,7 @@ from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
 from .noise import Noise, learn_noise
 from .outcome import Regime
-from .rail import Rail, learn_bound
+from .rail import Rail, learn_bound, lower_bound
 from .smoother import Search, Smoothed, posterior, smooth
 from .train import Array
 from .window import Window, window_of
@@ -68,7 +67,7 @@ def evaluate_condition(
     `before` is the rail as it was known, which a new braking begins with; `start` the adhesion to start from.
     """
     if not window.hypotheses:
-        window = _opened(config, with_rail(window.prior, before), window)
+        window = _opened(config, with_rail(window.prior, before), window._replace(known=before))
     arrays = _scaled_noise(window_of(window.samples), window.noise)
     found = list[Found]()
     for hypothesis in window.hypotheses:
@@ -86,7 +85,7 @@ def evaluate_condition(
             config, changed.belief, BrakingWindow(window.prior, window.samples[-1:], noise=window.noise)
         )
         law, now = following.prior, following.hypotheses
-    regime, rail = _judge(config, now, before, _limit(config, window, leading))
+    regime, rail = _judge(config, now, before, following.known, _limit(config, window, leading))
     return Verdict(
         regime=regime,
         rail=rail,
@@ -173,19 +172,21 @@ def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:
     return leading.now.mu if typical < 0.5 * config.sliding_creep else window.samples[-1].brake
 
 
-def _judge(config: Config, now: Sequence[Hypothesis], before: Rail, limit: float) -> tuple[Regime, Rail]:
+def _judge(
+    config: Config, now: Sequence[Hypothesis], before: Rail, known: Rail | None, limit: float
+) -> tuple[Regime, Rail]:
     """Regime and rail at the newest sample, over all hypotheses; `limit` is the most that the brake can use.
 
-    The bound holds under every hypothesis that is plausible.
+    The bound holds under every hypothesis that is plausible. It begins with that of `known`: a braking must not
+    withdraw it before it has seen anything.
     """
     weights, mus = probabilities(now), np.array([each.mu for each in now])
     variances = np.array([each.variance for each in now]) + config.grade_std**2
     mu = max(float(weights @ mus), 0.0)
     std = math.sqrt(float(weights @ (variances + (mus - mu) ** 2)))
     limit_std = config.brake_error * limit if math.isfinite(limit) else 0.0
-    bounds = np.minimum(mus, limit) - float(ndtri(config.confidence)) * np.sqrt(
-        variances + np.where(mus < limit, 0.0, limit_std**2)
-    )
+    spreads = np.sqrt(variances + np.where(mus < limit, 0.0, limit_std**2))
+    bounds = lower_bound(np.minimum(mus, limit), spreads, known, config.confidence)
     lower = min(max(float(np.min(bounds[weights >= PLAUSIBLE])), 0.0), mu)
     if std > UNDECIDED * config.unknown_std:
         return Regime.COASTING, Rail(mu, std, lower)
@@ -215,7 +216,7 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
     noise = (
         learn_noise(window.noise, found[0].problem, found[0].smoothed, spent) if config.identify_noise else window.noise
     )
-    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, noise, trajectory[spent:])
+    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, noise, trajectory[spent:], window.known)
 
 
 def _scaled_noise(window: Window, noise: Noise) -> Window:

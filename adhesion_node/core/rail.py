@@ -9,6 +9,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from .train import Array
+
 
 class Rail(NamedTuple):
     """Adhesion coefficient, its standard deviation and its one-sided lower bound."""
@@ -75,6 +80,31 @@ def learn(before: Rail, finding: Finding, quantile: float) -> Rail:
     mu = max(finding.mu + kept * (before.mu - finding.start), 0.0)
     lower = kept * before.lower + (1.0 - kept) * (mu - quantile * finding.std)
     return Rail(mu, (1.0 - kept) * finding.std + kept * before.std, min(max(lower, 0.0), mu))
+
+
+def lower_bound(mu: Array, std: Array, known: Rail | None, confidence: float) -> Array:
+    """Bound of adhesions with these Gaussian laws, element by element, which a bound known before may support.
+
+    `known` says that mu is above its bound at that confidence, which is more than its own Gaussian law says. So its
+    law is taken down below the bound until it says the same, and the posterior law with it.
+
+    >>> nothing = ignorance(0.05, 0.04)
+    >>> for mu, std in ((0.05, 0.04), (0.06, 0.02), (0.04, 0.02), (0.08, 0.002)):
+    ...     print(lower_bound(np.array(mu), np.array(std), None, 0.95).round(4),
+    ...           lower_bound(np.array(mu), np.array(std), nothing, 0.95).round(4))
+    -0.0158 0.05
+    0.0271 0.0511
+    0.0071 0.0311
+    0.0767 0.0767
+    """
+    missed = 1.0 - confidence
+    if known is None:
+        return np.asarray(mu + ndtri(missed) * std)
+    before, below = ndtr((known.lower - known.mu) / known.std), ndtr((known.lower - mu) / std)
+    weight = min(missed / confidence * (1.0 - before) / max(before, 1e-12), 1.0)
+    tail = missed * (weight * below + 1.0 - below)
+    tail = np.where(tail <= weight * below, tail / weight, tail + (1.0 - weight) * below)
+    return np.asarray(mu + ndtri(tail) * std)
 
 
 def learn_bound(before: Rail, bound: Rail) -> Rail:
