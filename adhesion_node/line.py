@@ -27,6 +27,9 @@ from .nodes.estimator import Estimator
 from .nodes.recorder import Recorder
 from .topics import POSITION
 
+TARGET_M, STOP_M = 8000.0, 9000.0
+"""The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
+
 PATIENCE_S = 10.0
 """Longest wait for a message between two nodes of the process."""
 
@@ -46,7 +49,10 @@ def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag
     simulated = [Parameter("use_sim_time", value=True)]
     recorder = Recorder(bag, parameter_overrides=simulated, **common)
     estimator = Estimator(parameter_overrides=[*simulated, Parameter("seed", value=seed)], **common)
-    target = [Parameter("target_position_m", value=6000.0), Parameter("target_speed_kmh", value=target_kmh)]
+    target = [
+        Parameter("target_position_m", value=TARGET_M if target_kmh else STOP_M),
+        Parameter("target_speed_kmh", value=target_kmh),
+    ]
     monitor = AtpMonitor(parameter_overrides=[*simulated, *target], **common)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)

@@ -177,7 +177,7 @@ def _judge(
 ) -> tuple[Regime, Rail]:
     """Regime and rail at the newest sample, over all hypotheses; `limit` is the most that the brake can use.
 
-    The bound holds under every hypothesis that is plausible. It begins with that of `known`: a braking must not
+    The bound holds under every hypothesis that is plausible. A braking begins with that of `known`, and must not
     withdraw it before it has seen anything.
     """
     weights, mus = probabilities(now), np.array([each.mu for each in now])
@@ -189,7 +189,7 @@ def _judge(
     bounds = lower_bound(np.minimum(mus, limit), spreads, known, config.confidence)
     lower = min(max(float(np.min(bounds[weights >= PLAUSIBLE])), 0.0), mu)
     if std > UNDECIDED * config.unknown_std:
-        return Regime.COASTING, Rail(mu, std, lower)
+        return Regime.COASTING, Rail(mu, std, lower) if known is None else before
     if mu + math.hypot(std, limit_std) < limit:
         return Regime.ADHESION_LIMITED, Rail(mu, std, lower)
     return Regime.BRAKE_LIMITED, learn_bound(before, Rail(min(mu, limit), std, min(lower, limit)))
