@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import importlib
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from conftest import ROOT
 from test_package import console_scripts
 
 from adhesion_node.study.__main__ import STUDIES
@@ -51,17 +53,36 @@ def complete(program: str, line: str, folder: Path) -> set[str]:
     return {word.strip() for word in (folder / "answer").read_text().splitlines()}
 
 
-@pytest.mark.parametrize(
-    ("line", "expected"),
-    [
-        ("study ", set(STUDIES)),
-        ("demo --scenario tunnel_e", {"tunnel_entry", "tunnel_exit"}),
-        ("replay my_run --off", {"--offline"}),
-        ("atp_monitor --ros-args -p target_", {"target_position_m:=", "target_speed_kmh:="}),
-        ("simulator --params", {"--params-file"}),
-    ],
-)
+COMPLETED = [
+    ("study ", set(STUDIES)),
+    ("demo --scenario tunnel_e", {"tunnel_entry", "tunnel_exit"}),
+    ("replay my_run --off", {"--offline"}),
+    ("recorder --out", {"--output"}),
+    ("recover my_run --out", {"--output"}),
+    ("import_csv log.csv --pressure-", {"--pressure-unit", "--pressure-kind"}),
+    ("report my_run --tar", {"--target"}),
+    ("live --po", {"--port"}),
+    ("bench --r", {"--rounds"}),
+    ("estimator --ros-args -p train.m", {"train.mass_kg:="}),
+    ("atp_monitor --ros-args -p target_", {"target_position_m:=", "target_speed_kmh:="}),
+    ("creep_estimator --ros-args -p axle", {"axles:=", "axle_load_kg:="}),
+    ("slip_simulator --ros-args -p scen", {"scenario:="}),
+    ("simulator --params", {"--params-file"}),
+]
+"""Command line up to the <TAB>, and what must be among the offers."""
+
+
+@pytest.mark.parametrize(("line", "expected"), COMPLETED)
 def test_a_shell_completes_what_a_program_takes(line: str, expected: set[str], tmp_path: Path) -> None:
     offered = complete(line.split(maxsplit=1)[0], line, tmp_path)
     assert offered >= expected
     assert all(word.startswith(line.rsplit(" ", 1)[1]) for word in offered)
+
+
+def test_the_readme_completes_every_program() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    command = re.search(r'^eval "\$\(register-python-argcomplete ([^)]*)\)"$', readme, re.MULTILINE)
+    assert command is not None
+    named = command[1].replace("\\\n", " ").split()
+    assert sorted(named) == sorted(console_scripts())
+    assert {line.partition(" ")[0] for line, _ in COMPLETED} == console_scripts().keys()
