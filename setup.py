@@ -54,13 +54,13 @@ setup(
     install_requires=[
         "numpy>=1.26,<3",
         "scipy>=1.11,<2",
-        "matplotlib>=3.8,<4",
+        "matplotlib>=3.6,<4",
         "argcomplete>=3,<4",
         "mcap>=1.5,<2",
         "lz4>=4.3,<5",
         "zstandard>=0.22,<1",
         "rosbags>=0.11.6,<0.12",
-        "ruamel.yaml>=0.18,<0.20",
+        "ruamel.yaml>=0.17.21,<0.20",
     ],
     extras_require={
         # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
@@ -68,8 +68,8 @@ setup(
         "live": ["aiohttp>=3.9,<4"],
         "cluster": CLUSTER,
         "test": [
-            "pytest>=8,<10",
-            "hypothesis>=6.100,<7",
+            "pytest>=7.4,<10",
+            "hypothesis>=6.98,<7",
             "mcap-ros2-support>=0.5.5,<1",
             "playwright>=1.48,<2",
             *CLUSTER,

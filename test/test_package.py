@@ -24,13 +24,20 @@ ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|srvs|interfaces)")
 OPTIONAL = {"distributed": "cluster"}
 """Imported only where it is asked for: extra by module."""
 
+BY_APT = {
+    *("python3-numpy", "python3-scipy", "python3-matplotlib", "python3-argcomplete", "python3-aiohttp"),
+    *("python3-ruamel.yaml", "python3-hypothesis", "python3-pytest"),
+}
+BY_PIP = {"python3-rosbags-pip", "mcap-ros2-support"}
+"""What the keys of rosdep/python.yaml install on Ubuntu 24.04; those by pip take a venv."""
+
 FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "numpy": ("numpy", "python3-numpy"),
     "scipy": ("scipy", "python3-scipy"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "argcomplete": ("argcomplete", "python3-argcomplete"),
     "rosbags": ("rosbags", "python3-rosbags-pip"),
-    "ruamel": ("ruamel.yaml", "python3-rosbags-pip"),
+    "ruamel": ("ruamel.yaml", "python3-ruamel.yaml"),
     "mcap": ("mcap", "mcap-ros2-support"),
     "lz4": ("lz4", "mcap-ros2-support"),
     "zstandard": ("zstandard", "mcap-ros2-support"),
@@ -141,6 +148,20 @@ def test_what_is_imported_is_declared() -> None:
         assert distribution in required
         assert rosdep_key in depends
     assert not any(ROS.fullmatch(name) for name in required), "ROS is no PyPI requirement; it stands in the extra `ros`"
+
+
+def test_rosdep_knows_every_key_and_the_readme_those_by_pip() -> None:
+    keys = {depend.text for kind in ("exec_depend", "test_depend") for depend in manifest().findall(kind)}
+    assert {key for key in keys if not ROS.fullmatch(str(key))} == BY_APT | BY_PIP
+    assert {key for _, key in FROM_PYPI.values()} <= BY_APT | BY_PIP
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    skipped = re.search(r'^rosdep install .* --skip-keys "(.*)"$', readme, re.MULTILINE)
+    installed = re.search(r"^venv/bin/pip install '(rosbags.*)' '(mcap-ros2-support.*)'$", readme, re.MULTILINE)
+    assert skipped is not None
+    assert installed is not None
+    assert set(skipped[1].split()) == BY_PIP
+    wanted = [*setup_arguments()["install_requires"], *setup_arguments()["extras_require"]["test"]]
+    assert set(installed.groups()) <= set(wanted)
 
 
 def test_only_bench_imports_its_peers() -> None:

@@ -14,12 +14,8 @@ from adhesion_node.live.view import View
 from adhesion_node.report.__main__ import main
 from adhesion_node.topics import POSITION
 
-browser = pytest.importorskip(
-    "browser", reason="playwright, of the extra `test`, is not installed", exc_type=ImportError
-)
-server = pytest.importorskip(
-    "adhesion_node.live.server", reason="the extra `live` is not installed", exc_type=ImportError
-)
+browser = pytest.importorskip("browser", reason="playwright, of the extra `test`, is not installed")
+server = pytest.importorskip("adhesion_node.live.server", reason="the extra `live` is not installed")
 
 
 @pytest.fixture

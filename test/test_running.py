@@ -9,11 +9,10 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import pytest
-from distributed import LocalCluster
 
 from adhesion_node.core import Config
 from adhesion_node.study import engines, running, tasks
@@ -23,6 +22,9 @@ from adhesion_node.study.creep_tasks import Experiment
 from adhesion_node.study.montecarlo import Chunk
 from adhesion_node.study.running import Running, run_all
 from adhesion_node.study.tasks import Arrays, Task, file_name, load, save
+
+if TYPE_CHECKING:
+    from distributed import LocalCluster
 
 TIMEOUT_S = 60.0
 
@@ -68,7 +70,8 @@ class Killed(NamedTuple):
 @pytest.fixture(scope="module")
 def dask() -> Iterator[LocalCluster]:
     """A cluster of two workers, which hear of the tasks through TCP."""
-    with LocalCluster(
+    distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    with distributed.LocalCluster(
         n_workers=2, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=None
     ) as local:
         yield local
@@ -140,6 +143,7 @@ def test_a_worker_with_other_code_is_refused(tmp_path: Path, dask: LocalCluster)
 def test_a_scheduler_that_does_not_answer_is_one_line_and_code_1(
     study: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
     monkeypatch.setattr(engines, "CONNECT_S", 0.2)
     with socket.socket() as unused:  # bound but not listening: nobody answers
         unused.bind(("127.0.0.1", 0))

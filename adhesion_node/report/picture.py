@@ -27,7 +27,9 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
     figure = Figure(figsize=(11, 12), layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title)
-    axes = figure.subplots(3, 2)
+    parts: Any = figure.subfigures(2, 1, height_ratios=(20.0, 1.0))
+    charts, foot = parts
+    axes = charts.subplots(3, 2)
     planned = distances(run, target_kmh * KMH, train)
     _draw_adhesion(axes[0, 0], run)
     _draw_speed(axes[0, 1], run)
@@ -46,7 +48,7 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
         axis.set_ylim(bottom=0.0)
     names = [regime.replace("_", "-").lower() for regime in SHADES]
     shades = [Patch(color=color) for color in SHADES.values()]
-    figure.legend(shades, names, loc="outside lower center", ncols=len(names), title="what limits the motion")
+    foot.legend(shades, names, loc="center", ncols=len(names), title="what limits the motion")
     figure.savefig(path, dpi=110)
 
 
