@@ -173,6 +173,24 @@ def test_only_bench_imports_its_peers() -> None:
     assert {path.parent.name for path in importing} == {"bench"}
 
 
+REP_2004 = (
+    *("1.i", "1.ii", "1.iii", "1.iv", "1.v", "1.vi", "2.i", "2.ii", "2.iii", "2.iv", "2.v"),
+    *("3.i", "3.ii", "3.iii", "3.iv", "3.v", "3.v.a", "3.v.b", "3.v.c"),
+    *("4.i", "4.ii", "4.iii.a", "4.iii.b", "4.iv.a", "4.iv.b", "4.v.a", "4.v.b", "5.i", "5.ii", "5.iii", "6.i", "7.i"),
+)
+"""Its points; the chart makes 3.iii and 3.iv a condition of Level 4."""
+
+
+def test_the_quality_declaration_answers_every_point_of_rep_2004() -> None:
+    declaration = (ROOT / "resource" / "QUALITY_DECLARATION.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| [*]{0,2}(\d\.[iva-c.]+) [^|]*\| ([^|]+) \|", declaration, re.MULTILINE)
+    assert [point for point, _ in rows] == list(REP_2004)
+    held = dict(rows)
+    assert set(held.values()) <= {"yes", "in part", "no", "–"}
+    assert "**Quality Level 4**" in declaration
+    assert held["3.iii"] == held["3.iv"] == "yes"
+
+
 def test_the_quick_start_is_two_commands() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     sections = re.findall(r"^## Quick start\n(.*?)(?=^## |\Z)", readme, re.MULTILINE | re.DOTALL)
