@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -41,7 +41,10 @@ Pace = Callable[[int, Estimate | None], bool]
 
 
 def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag: Path, seed: int, pace: Pace) -> str:
-    """Run the nodes until the scenario or `pace` ends; the digest of what the estimator published."""
+    """Run the nodes until the scenario or `pace` ends; the digest of what the estimator published.
+
+    However it ends, by a full disk (OSError) or Ctrl-C too, the recording is complete up to there.
+    """
     common: dict[str, Any] = {"context": executor.context}
     settings = [Parameter("scenario", value=scenario), Parameter("seed", value=seed)]
     # First: a bad seed ends here, before anything is written.
@@ -56,13 +59,13 @@ def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag
     monitor = AtpMonitor(parameter_overrides=[*simulated, *target], **common)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)
-    for ticks in count():
-        if not pace(ticks, estimator.latest) or not simulator.tick():
-            break
-        spin_until(executor, partial(_have_heard, ticks + 1, estimator, recorder))
-    estimator.close()
-    spin_until(executor, lambda: all(recorder.heard[topic] == sent for topic, sent in estimator.published.items()))
-    recorder.close()
+    with closing(recorder):
+        for ticks in count():
+            if not pace(ticks, estimator.latest) or not simulator.tick():
+                break
+            spin_until(executor, partial(_have_heard, ticks + 1, estimator, recorder))
+        estimator.close()
+        spin_until(executor, lambda: all(recorder.heard[topic] == sent for topic, sent in estimator.published.items()))
     return estimator.digest
 
 

@@ -10,9 +10,11 @@ from typing import Any
 
 import pytest
 from matplotlib.image import imread
+from test_recording_survives import assert_complete, file_size_limit
 
 from adhesion_node import demo
-from adhesion_node.bag import BagReader
+from adhesion_node.bag import BagReader, part
+from adhesion_node.bag.writer import file_name
 from adhesion_node.core.adhesion import DRY, WET
 from adhesion_node.core.track import LEVEL
 from adhesion_node.nodes import replay
@@ -114,6 +116,21 @@ def test_a_bad_seed_is_one_line_and_code_2_and_leaves_nothing(
     assert out == ""
     assert line.startswith("demo: seed = -1: give ")
     assert not (tmp_path / "demo").exists()
+
+
+def test_a_full_disk_is_one_line_and_code_1_and_the_recording_complete_up_to_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(part, "STEP_BYTES", 4096)  # more would hold all of this short run
+    with file_size_limit(150_000):
+        assert demo.main(["--output", str(tmp_path / "demo")]) == 1
+    last = capfd.readouterr().err.splitlines()[-1]
+    bag = tmp_path / "demo" / "bag"
+    assert last == f"demo: {bag / file_name(0)}: File too large: the recording ends here, make room for another"
+    with BagReader(bag) as reader:
+        messages = sum(reader.counts.values())
+        assert 30 < reader.counts["/position"] < SAMPLES
+    assert_complete(bag, messages)
 
 
 def test_an_output_that_cannot_be_is_one_line_and_code_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -28,6 +28,7 @@ from adhesion_node import recover
 from adhesion_node.bag import BagReader, BagWriter, Limits, sensors
 from adhesion_node.bag.part import MARGIN_BYTES, STEP_BYTES
 from adhesion_node.bag.writer import file_name
+from adhesion_node.nodes import recorder
 from adhesion_node.nodes.qos import SENSOR_PUBLISHER, advertise
 from adhesion_node.topics import CLOCK, POSITION
 
@@ -213,3 +214,26 @@ def test_the_recorder_stops_before_its_disk_is_full(
     assert full.value.filename == str(tmp_path / "bag")
     recording.close()
     assert_complete(tmp_path / "bag", 1)
+
+
+def test_a_disk_that_is_full_at_the_end_still_leaves_a_complete_recording(
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The messages that wait for their log time do not fit any more."""
+    monkeypatch.setattr(recorder, "ROUNDS", 10_000)  # however long it takes, they wait
+    recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], sim=True)
+    texts = incompressible(np.random.default_rng(1))
+    for number in range(40):
+        message = stamped(POSITION, number)
+        message.header.frame_id = next(texts)
+        ends[POSITION].publish(message)
+    spin_until(executor, lambda: recording.heard[POSITION] == 40)
+    with file_size_limit(400_000), pytest.raises(OSError, match="File too large: the recording ends here"):
+        recording.close()
+    messages = recording.counts["/train1/position"]
+    assert 0 < messages < 40
+    assert_complete(tmp_path / "bag", messages)

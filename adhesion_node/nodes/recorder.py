@@ -73,8 +73,8 @@ class Recorder(Node):
     message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder does
     not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks. Before the
     first /clock, the header's stamp takes its place. `heard` counts the messages received by topic. Call `close` at
-    the end. Raises ValueError when `output` exists. A callback raises OSError when the disk is full; `close` then
-    still makes the recording complete up to there.
+    the end. Raises ValueError when `output` exists. A callback or `close` raises OSError when the disk is full; `close`
+    makes the recording complete up to there all the same.
     """
 
     def __init__(self, output: Path, limits: Limits = LIMITS, **kwargs: Any) -> None:
@@ -112,8 +112,10 @@ class Recorder(Node):
 
     def close(self) -> None:
         """Write the rest, the index and the metadata."""
-        self._release(lambda _: True)
-        self._writer.close()
+        try:
+            self._release(lambda _: True)
+        finally:  # the disk may be full by now
+            self._writer.close()
         self.get_logger().info(f"recorded {sum(self.counts.values())} messages to {self._writer.path}")
 
     def _receiver(self, topic: topics.Topic) -> Callable[..., None]:
