@@ -1,15 +1,17 @@
 """The whole line in one process: simulator, estimator, ATP monitor and recorder, with a simulated clock.
 
-The clock waits for the estimator, so a run does not depend on the machine's speed.
+The clock waits until all nodes have taken what they were sent, and no node watches the machine's own clock. So a run
+depends neither on the machine's speed nor on the order in which the executor turns to the nodes: equal runs leave equal
+recordings.
 """
 
 from __future__ import annotations
 
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, contextmanager
 from functools import partial
-from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +27,16 @@ from .core import Estimate
 from .nodes.atp_monitor import AtpMonitor
 from .nodes.estimator import Estimator
 from .nodes.recorder import Recorder
-from .topics import POSITION
+from .topics import CLOCK, POSITION, STATE
 
 TARGET_M, STOP_M = 8000.0, 9000.0
 """The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
 
 PATIENCE_S = 10.0
 """Longest wait for a message between two nodes of the process."""
+
+NEVER_S = 3600.0
+"""By the machine's own clock: longer than a tick can take."""
 
 NODES = ("recorder", "estimator", "atp_monitor", "simulator", "live")
 """Their errors are shown, the rest of their log is not: who runs the line says himself how far it is."""
@@ -46,26 +51,23 @@ def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag
     However it ends, by a full disk (OSError) or Ctrl-C too, the recording is complete up to there.
     """
     common: dict[str, Any] = {"context": executor.context}
-    settings = [Parameter("scenario", value=scenario), Parameter("seed", value=seed)]
     # First: a bad seed ends here, before anything is written.
-    simulator = Simulator(paced=False, parameter_overrides=settings, **common)
-    simulated = [Parameter("use_sim_time", value=True)]
-    recorder = Recorder(bag, parameter_overrides=simulated, **common)
-    estimator = Estimator(parameter_overrides=[*simulated, Parameter("seed", value=seed)], **common)
-    target = [
-        Parameter("target_position_m", value=TARGET_M if target_kmh else STOP_M),
-        Parameter("target_speed_kmh", value=target_kmh),
-    ]
-    monitor = AtpMonitor(parameter_overrides=[*simulated, *target], **common)
+    simulator = Simulator(paced=False, parameter_overrides=_parameters(scenario=scenario, seed=seed), **common)
+    simulated = {"use_sim_time": True}
+    recorder = Recorder(bag, by_log_time=True, parameter_overrides=_parameters(**simulated), **common)
+    identifying = _parameters(**simulated, seed=seed, sensor_timeout_s=NEVER_S)
+    estimator = Estimator(parameter_overrides=identifying, **common)
+    target = {"target_position_m": TARGET_M if target_kmh else STOP_M, "target_speed_kmh": target_kmh}
+    supervising = _parameters(**simulated, **target, clock_timeout_s=NEVER_S)
+    monitor = AtpMonitor(parameter_overrides=supervising, **common)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)
+    at_rest = partial(_at_rest, simulator, estimator, monitor, recorder)
     with closing(recorder):
-        for ticks in count():
-            if not pace(ticks, estimator.latest) or not simulator.tick():
-                break
-            spin_until(executor, partial(_have_heard, ticks + 1, estimator, recorder))
+        while pace(simulator.samples, estimator.latest) and simulator.tick():
+            spin_until(executor, at_rest)
         estimator.close()
-        spin_until(executor, lambda: all(recorder.heard[topic] == sent for topic, sent in estimator.published.items()))
+        spin_until(executor, at_rest)
     return estimator.digest
 
 
@@ -98,5 +100,19 @@ def spin_until(executor: SingleThreadedExecutor, done: Callable[[], bool]) -> No
         executor.spin_once(timeout_sec=0.1)
 
 
-def _have_heard(positions: int, *nodes: Estimator | Recorder) -> bool:
-    return all(node.heard[POSITION] == positions for node in nodes)
+def _at_rest(simulator: Simulator, estimator: Estimator, monitor: AtpMonitor, recorder: Recorder) -> bool:
+    """Whether every node has taken what the others sent, and its time is that of the newest sample."""
+    sensed = Counter({POSITION: simulator.samples, CLOCK: simulator.samples})
+    return (
+        estimator.heard[POSITION] == simulator.samples
+        and monitor.heard[STATE] == estimator.published[STATE]
+        and all(
+            recorder.heard[topic] == sent for topic, sent in (sensed + estimator.published + monitor.published).items()
+        )
+        and all(node.get_clock().now().nanoseconds == simulator.now_ns for node in (estimator, monitor, recorder))
+        and not any(timer.is_ready() for timer in monitor.timers)
+    )
+
+
+def _parameters(**values: Any) -> list[Parameter]:
+    return [Parameter(name, value=value) for name, value in values.items()]

@@ -81,7 +81,10 @@ class Simulator(Node):
         self._start_ns = round(values["start_time_s"] * 1e9)
         period_s = period_of(plan, 1.0 / values["rate_hz"])
         self._ticks = faulty_run(plan, self._scenario, period_s, values["seed"], settings)
-        self._published = 0
+        self.samples = 0
+        """Number of samples published."""
+        self.now_ns = 0
+        """Time of the newest one, as on /clock."""
         self._regime = ""
         self._ended = False
         optional = ((topics.SPEED, settings.speed_std_mps), (topics.WHEEL_SPEED, settings.wheel_speed_std_radps))
@@ -100,7 +103,7 @@ class Simulator(Node):
             return False
         self._report(sample[0])
         self._publish(*sample)
-        self._published += 1
+        self.samples += 1
         return True
 
     def _wait_for(self, subscribers: int, period_s: float, factor: float) -> None:
@@ -110,7 +113,7 @@ class Simulator(Node):
         Pace(self, period_s, factor, lambda: awaited.get_subscription_count() >= subscribers, self.tick)
 
     def _publish(self, truth: Truth, sent: Sequence[SensorMessage]) -> None:
-        t_ns = self._start_ns + truth.t_ns
+        t_ns = self.now_ns = self._start_ns + truth.t_ns
         self._outputs[topics.CLOCK].publish(messages.clock(t_ns))
         self._outputs[topics.TRUTH_STATE].publish(messages.truth_state(t_ns, truth))
         self._outputs[topics.TRUTH_MU].publish(messages.truth_mu(truth))
@@ -119,7 +122,7 @@ class Simulator(Node):
             self._outputs[one.topic].publish(messages.message_of(stamped))
 
     def _report(self, truth: Truth) -> None:
-        if not self._published:
+        if not self.samples:
             _log(self, f"scenario {self._scenario.name}: started at {self._start_ns / 1e9:.1f} s")
         if truth.regime != self._regime:
             self._regime = truth.regime
@@ -132,7 +135,7 @@ class Simulator(Node):
             return
         self._ended = True
         self.finished = self._exit_at_end
-        _log(self, f"scenario {self._scenario.name}: ended after {self._published} samples")
+        _log(self, f"scenario {self._scenario.name}: ended after {self.samples} samples")
 
 
 def _log(node: Node, text: str) -> None:

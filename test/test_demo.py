@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 from matplotlib.image import imread
+from rclpy.executors import SingleThreadedExecutor
 from test_recording_survives import assert_complete, file_size_limit
 
-from adhesion_node import demo
+from adhesion_node import demo, line
 from adhesion_node.bag import BagReader, part
 from adhesion_node.bag.writer import file_name
+from adhesion_node.core import Estimate
 from adhesion_node.core.adhesion import DRY, WET
 from adhesion_node.core.track import LEVEL
+from adhesion_node.line import executor_of_line
 from adhesion_node.nodes import replay
 from adhesion_node.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH
 from sim_node import scenario
@@ -86,6 +91,33 @@ def _check_bag(path: Path) -> None:
         **{topic.name: SAMPLES for topic in (POSITION, BRAKE_PRESSURE, *TRUTH)},
         **{topic.name.lstrip("/"): estimates for topic in (*RESULTS, DIAGNOSTICS)},
     }
+
+
+def test_equal_runs_leave_equal_bytes_however_busy_the_machine_is(tmp_path: Path) -> None:
+    """The second run is held up for longer than any watchdog waits: 2 s."""
+    bags = [tmp_path / "one", tmp_path / "two"]
+    for bag, busy_s in zip(bags, (0.0, 2.5), strict=True):
+        with executor_of_line() as executor:
+            line.play(executor, "tunnel_entry", 100.0, bag, 1, partial(_hold_up, executor, busy_s))
+    first, second = [{file.name: file.read_bytes() for file in bag.iterdir()} for bag in bags]
+    assert _statuses(bags[0]) == _statuses(bags[1])
+    assert first == second
+
+
+def _hold_up(executor: SingleThreadedExecutor, busy_s: float, samples: int, _: Estimate | None) -> bool:
+    """At one sample let everything but the simulator go on for so long."""
+    until = time.monotonic() + busy_s
+    while samples == 61 and time.monotonic() < until:
+        executor.spin_once(timeout_sec=0.1)
+    return True
+
+
+def _statuses(bag: Path) -> list[tuple[int, str, str]]:
+    with BagReader(bag) as reader:
+        return [
+            (record.log_ns, record.topic, str(record.message))
+            for record in reader.messages(["/atp/status", "/diagnostics"])
+        ]
 
 
 def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable[..., dict[str, Any]]) -> None:

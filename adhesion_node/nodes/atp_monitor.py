@@ -10,6 +10,7 @@ and one on the machine's own for the case that the ROS clock stands still.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
@@ -32,6 +33,7 @@ from adhesion_node.core.supervision import (
     decide,
     unsafe,
 )
+from adhesion_node.topics import Topic
 
 from . import convert, qos, runtime
 from .params import declare, spec_of
@@ -61,7 +63,8 @@ _SILENCE = "none received yet; is the estimator running, are topic names and QoS
 class AtpMonitor(Node):
     """Supervises a target by the braking curve in the manner of ETCS, from NORMAL to EMERGENCY_BRAKE.
 
-    Whatever is missing, old or not understood is an EMERGENCY_BRAKE.
+    Whatever is missing, old or not understood is an EMERGENCY_BRAKE. `heard` counts the messages received by topic,
+    refused ones included; `published` those sent.
     """
 
     def __init__(self, **kwargs: Any) -> None:
@@ -73,6 +76,8 @@ class AtpMonitor(Node):
         self._state: TrainState | Unavailable = Unavailable(_SILENCE)
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
         self._judged = False
+        self.heard: Counter[Topic] = Counter()
+        self.published: Counter[Topic] = Counter()
         self._now_ns = self._stamp_ns = self._seen_ns = 0
         self._level: Level | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -85,12 +90,14 @@ class AtpMonitor(Node):
         self.create_timer(period_s, self._on_steady_watchdog, clock=self._steady)
 
     def _on_curve(self, message: Any) -> None:
+        self.heard[topics.BRAKING_CURVE] += 1
         try:
             self._curve = StampedCurve(*convert.curve(message))
         except reading.Rejected as refusal:
             self._curve = Unavailable(f"refused: {refusal}")
 
     def _on_state(self, message: Any) -> None:
+        self.heard[topics.STATE] += 1
         try:
             self._state = convert.state(message)
         except reading.Rejected as refusal:
@@ -124,6 +131,7 @@ class AtpMonitor(Node):
         else:
             decision = decide(self._config, now_ns, self._state, self._curve, self._level or Level.NORMAL)
         self._status.publish(status_message(self._stamp_ns, self._config, decision))
+        self.published[topics.ATP_STATUS] += 1
         self._judged = True
         if decision.level is not self._level:
             self._level = decision.level

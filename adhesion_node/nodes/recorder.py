@@ -77,7 +77,11 @@ class Recorder(Node):
     makes the recording complete up to there all the same.
     """
 
-    def __init__(self, output: Path, limits: Limits = LIMITS, **kwargs: Any) -> None:
+    def __init__(self, output: Path, limits: Limits = LIMITS, *, by_log_time: bool = False, **kwargs: Any) -> None:
+        """Begin a recording; with `by_log_time` only log time brings messages to the disk.
+
+        That is for a /clock that does not stand still, and leaves equal bytes on the slowest machine too.
+        """
         super().__init__("recorder", **kwargs)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
         self._clocks: list[_Tick] = []
@@ -92,8 +96,9 @@ class Recorder(Node):
             subscribe(self, topics.CLOCK, self._on_clock, SENSOR_SUBSCRIPTION)
         for topic in topics.RECORDED:
             subscribe(self, topic, self._receiver(topic), _profile(topic), raw=True)
-        self.create_timer(ROUND_S, self.save, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
         self._writer = BagWriter(output, limits)
+        each_round = self._writer.check_disk if by_log_time else self.save
+        self.create_timer(ROUND_S, each_round, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
         self.get_logger().info(f"recording to {output}")
 
     @property
@@ -148,6 +153,7 @@ class Recorder(Node):
 
     def _on_clock(self, message: Clock, info: Mapping[str, int]) -> None:
         """Write what was published before the /clock before this one: what was published since may be on its way."""
+        self.heard[topics.CLOCK] += 1
         insort(self._clocks, _Tick(info["source_timestamp"], message.clock.sec * 10**9 + message.clock.nanosec))
         del self._clocks[:-CLOCKS]
         if len(self._clocks) > 1:
