@@ -290,7 +290,7 @@ def test_heavy_tails_are_smoothed_to_within_a_fraction_of_the_standard_deviation
 @pytest.mark.parametrize("brake", [0.0952, 0.03])
 @pytest.mark.parametrize(("rho", "grade"), [(0.0, 0.0), (0.1, 0.004)])
 def test_steps_by_finite_differences(rho: float, grade: float, brake: float) -> None:
-    """Of the model written out; beyond the limit kappa moves nothing, but `effect` tells what it would."""
+    """Of the model written out; beyond the limit kappa moves nothing, but the steps tell what it would."""
     wet, h, kappa = Wet(rho, grade, 0.0), 1e-3, 0.9
     window = wet.draw(0.8, np.full(12, brake), np.random.default_rng(0))
     rng = np.random.default_rng(1)
@@ -298,16 +298,12 @@ def test_steps_by_finite_differences(rho: float, grade: float, brake: float) -> 
     steps = wet.problem(window, WET_PRIOR).linearise(states, kappa)
     s, v = states[:-1].T
     up, down = (np.array(wet.step(s, v + d, kappa, window.dt_s, window.brake)) for d in (h, -h))
-    half, kept = (up - down) / (2.0 * h)
-    assert steps.half == pytest.approx(half, abs=1e-9)
-    assert steps.kept == pytest.approx(kept, abs=1e-9)
+    assert steps.moving[0] == pytest.approx((up - down) / (2.0 * h), abs=1e-9)
     open_brake = np.full(12, math.inf)
     more, less = (np.array(wet.step(s, v, kappa + d, window.dt_s, open_brake)) for d in (h, -h))
-    assert steps.effect == pytest.approx((more - less)[1] / (2.0 * h), abs=1e-9)
-    assert 0.5 * window.dt_s * steps.effect == pytest.approx((more - less)[0] / (2.0 * h), abs=1e-9)
+    assert steps.moving[1] == pytest.approx((more - less) / (2.0 * h), abs=1e-9)
     there = np.array(wet.step(s, v, kappa, window.dt_s, window.brake))
-    assert steps.position_error == pytest.approx(states[1:, 0] - there[0], abs=1e-9)
-    assert steps.speed_error == pytest.approx(states[1:, 1] - there[1], abs=1e-9)
+    assert steps.moving[2] == pytest.approx(states[1:].T - there, abs=1e-9)
     # at its headroom the motion just begins to depend on the brake alone
     for side, moves in ((-1e-4, True), (1e-4, False)):
         at = kappa + steps.headroom + side

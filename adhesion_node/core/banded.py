@@ -42,11 +42,11 @@ class Factor(NamedTuple):
 
     def law_at_end(self) -> Array:
         """Covariance of the last state and the parameter, shape (3, 3)."""
-        units = np.zeros((self.border.size, 2))
-        units[-2, 0] = units[-1, 1] = 1.0
+        first, below, second = self.cholesky[0, -2], self.cholesky[1, -2], self.cholesky[0, -1]
+        root = np.array([[1.0 / first, 0.0], [-below / (first * second), 1.0 / second]])
         along = np.array([-self.solved[-2], -self.solved[-1], 1.0])
         covariance = np.outer(along, along) / self.information
-        covariance[:2, :2] += self.apply(units)[-2:]
+        covariance[:2, :2] += root.T @ root  # the last states depend on none behind them
         return covariance
 
     @property

@@ -114,9 +114,8 @@ def _likeliest(
 
 def _try(problem: Problem, smoothed: Smoothed, jumps: Callable[[Steps, Array], _Jumps]) -> _Tried:
     trajectory, kappa = smoothed.trajectory, smoothed.kappa
-    steps = problem.linearise(trajectory, kappa)
-    normal = problem.normal(steps, trajectory, kappa, smoothed.weights)
-    tried = jumps(steps, smoothed.weights)
+    normal = problem.normal(smoothed.steps, trajectory, kappa, smoothed.weights)
+    tried = jumps(smoothed.steps, smoothed.weights)
     still, still_kappa = normal.factor.solve(normal.states, normal.kappa)
     moved, moved_kappa = normal.factor.solve(tried.border, tried.shared)
     information = tried.own + tried.std**-2 - np.sum(tried.border * moved, axis=0) - tried.shared * moved_kappa
@@ -143,12 +142,13 @@ def _try(problem: Problem, smoothed: Smoothed, jumps: Callable[[Steps, Array], _
 
 
 def _of_kappa(problem: Problem, steps: Steps, candidates: Indices, std: float) -> _Jumps:
-    before, after, own, pull = problem.effects(steps)
+    to_kappa, on_kappa = steps.weighted[1], steps.on_speed[1]
+    own, pull = np.sum(to_kappa * steps.moving[1:], axis=1)
     count = problem.window.steps
     single = np.zeros((count, count + 1, 2))
     diagonal = np.arange(count)
-    single[diagonal, diagonal] = before.T
-    single[diagonal, diagonal + 1] = after.T
+    single[diagonal, diagonal] = np.array([to_kappa[0], on_kappa]).T
+    single[diagonal, diagonal + 1] = -to_kappa.T
     free = steps.headroom > 0.0
     return _Jumps(
         border=_from_then_on(single)[candidates].reshape(candidates.size, -1).T,

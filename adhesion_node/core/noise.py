@@ -31,8 +31,7 @@ class Noise(NamedTuple):
 def learn_noise(noise: Noise, problem: Problem, smoothed: Smoothed, spent: int) -> Noise:
     """Take in the first `spent` steps of a smoothed window, whose variances already have the factor of `noise`."""
     trajectory = smoothed.trajectory
-    steps = problem.linearise(trajectory, smoothed.kappa)
-    factor = problem.normal(steps, trajectory, smoothed.kappa, smoothed.weights).factor
+    factor = problem.normal(smoothed.steps, trajectory, smoothed.kappa, smoothed.weights).factor
     positions = np.zeros((factor.border.size, spent))
     index = np.arange(spent)
     positions[2 * index + 2, index] = 1.0

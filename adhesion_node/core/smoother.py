@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .train import GRAVITY, Array
-from .window_model import Belief, Problem
+from .window_model import Belief, Problem, Steps
 
 SAME_WEIGHT = 1e-2
 """Change of a measurement's weight below which it counts as settled."""
@@ -42,6 +42,8 @@ class Smoothed(NamedTuple):
     kappa: float
     weights: Array
     """Of the K positions, shape (K,)."""
+    steps: Steps
+    """Linearised about the trajectory and kappa."""
     iterations: int
     converged: bool
 
@@ -63,9 +65,9 @@ def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoot
     """
     trajectory, kappa = _begin(problem, search.start, problem.prior.mean[None, :2] if near is None else near)
     weights = problem.model.weights(np.zeros(problem.window.steps) if near is None else problem.squared(trajectory))
+    steps = problem.linearise(trajectory, kappa)
     low, high = search.lowest, math.inf
     for iteration in range(1, search.iterations + 1):
-        steps = problem.linearise(trajectory, kappa)
         moved, change = problem.normal(steps, trajectory, kappa, weights).step()
         limits = kappa + float(np.min(steps.headroom)), kappa + float(np.max(steps.headroom))
         if change > 0.0:
@@ -77,11 +79,12 @@ def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoot
         if crossing and not low < following < high:
             following = 0.5 * (max(low, min(limits[0], high)) + min(high, max(limits[1], low)))
         trajectory, change, kappa = trajectory + moved, following - kappa, following
+        steps = problem.linearise(trajectory, kappa)
         before, weights = weights, problem.model.weights(problem.squared(trajectory))
         settled = abs(change) <= search.tolerance or high - low <= AT_LIMIT * kappa
         if settled and float(np.max(np.abs(weights - before))) <= SAME_WEIGHT:
-            return Smoothed(trajectory, kappa, weights, iteration, True)
-    return Smoothed(trajectory, kappa, weights, search.iterations, False)
+            return Smoothed(trajectory, kappa, weights, steps, iteration, True)
+    return Smoothed(trajectory, kappa, weights, steps, search.iterations, False)
 
 
 def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
@@ -90,19 +93,13 @@ def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
     `smoothed` may be of a longer window: then it is where the beginning is linearised and weighted, with hindsight,
     but the measurements behind the beginning do not enter the law. `margin` as in `Problem.normal`.
     """
-    count, kappa = problem.window.steps, smoothed.kappa
+    window, count, kappa = problem.window, problem.window.steps, smoothed.kappa
     trajectory, weights = smoothed.trajectory[: count + 1], smoothed.weights[:count]
-    steps = problem.linearise(trajectory, kappa)
-    normal = problem.normal(steps, trajectory, kappa, weights, margin)
+    normal = problem.normal(smoothed.steps.beginning(count), trajectory, kappa, weights, margin)
     moved, change = normal.step()
     mean = np.array([*(trajectory[-1] + moved[-1]), kappa + change])
-    deviation = np.array([*trajectory[0], kappa]) - problem.prior.mean
-    ps, pv = problem.certainty
-    misfit = 0.5 * float(
-        ps @ steps.position_error**2 + pv @ steps.speed_error**2 + deviation @ problem.precision @ deviation
-    )
-    misfit += problem.model.loss(problem.squared(trajectory))
-    misfit += 0.5 * float(np.sum((problem.window.speed_mps - trajectory[1:, 1]) ** 2 / problem.window.speed_variance))
+    misfit = normal.misfit + problem.model.loss(problem.squared(trajectory))
+    misfit += 0.5 * float(window.information[1] @ (window.speed_mps - trajectory[1:, 1]) ** 2)
     misfit -= 0.5 * (float(normal.states @ moved.ravel()) + normal.kappa * change)
     spread = normal.factor.log_determinant - float(np.linalg.slogdet(problem.precision)[1])
     return Posterior(Belief(mean, normal.factor.law_at_end()), -misfit - 0.5 * spread)

@@ -49,6 +49,16 @@ class Window:
         return int(self.dt_s.size)
 
     @cached_property
+    def measured(self) -> Array:
+        """Measured positions and speeds, shape (2, K)."""
+        return np.array((self.position_m, self.speed_mps))
+
+    @cached_property
+    def information(self) -> Array:
+        """Their inverse variances, shape (2, K); 0 where no speed was measured."""
+        return 1.0 / np.array((self.variance_m2, self.speed_variance))
+
+    @cached_property
     def observations(self) -> list[list[Observation]]:
         """What was measured at the end of each step: the position, and the speed where there is one."""
         observed = [

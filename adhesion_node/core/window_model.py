@@ -50,20 +50,23 @@ class Model:
 
 
 class Steps(NamedTuple):
-    """The steps of a window about a trajectory; every array has shape (K,).
+    """The steps of a window about a trajectory: x' = f + F dx + G dkappa.
 
-    x' = f + F dx + G dkappa with F = [[1, half], [0, kept]] and G = effect (dt/2, 1).
+    F = [[1, half], [0, kept]] and G = effect (dt/2, 1); everything has shape (..., K).
     """
 
-    half: Array
-    kept: Array
-    effect: Array
-    """-g T law(v): what kappa does to the speed, were it only for the adhesion."""
+    moving: Array
+    """What moves (s', v'), shape (3, 2, K): dv by (half, kept), dkappa by G, and the trajectory's own deviation."""
+    weighted: Array
+    """The same, by the certainty of s' and of v'."""
+    on_speed: Array
+    """What of it the speed before the step feels, (half, kept) . weighted, shape (3, K)."""
     headroom: Array
     """kappa at which the brake begins to limit, less the present kappa."""
-    position_error: Array
-    speed_error: Array
-    """The trajectory's deviations from its own steps."""
+
+    def beginning(self, count: int) -> Steps:
+        """The first `count` steps."""
+        return Steps(*(part[..., :count] for part in self))
 
 
 class Normal(NamedTuple):
@@ -73,6 +76,8 @@ class Normal(NamedTuple):
     states: Array
     """Shape (2K + 2,)."""
     kappa: float
+    misfit: float
+    """-ln p of the trajectory and kappa before the measurements, up to a constant."""
 
     def step(self) -> tuple[Array, float]:
         """Gauss-Newton step of the trajectory, shape (K + 1, 2), and of kappa."""
@@ -94,10 +99,9 @@ class Problem:
         return np.asarray(np.linalg.inv(self.prior.covariance), dtype=np.float64)
 
     @cached_property
-    def certainty(self) -> tuple[Array, Array]:
-        """Inverse variances of the process noise of position and speed, each of shape (K,)."""
-        var_s, var_v = self.model.motion.noise(self.window.dt_s)
-        return np.asarray(1.0 / var_s), np.asarray(1.0 / var_v)
+    def certainty(self) -> Array:
+        """Inverse variances of the process noise of position and speed, shape (2, K)."""
+        return 1.0 / np.array(self.model.motion.noise(self.window.dt_s))
 
     def squared(self, trajectory: Array, shift: float | Array = 0.0) -> Array:
         """Squared deviations of the measured positions, less their shift, from the trajectory, in variances: (K,)."""
@@ -107,76 +111,67 @@ class Problem:
     def linearise(self, trajectory: Array, kappa: float) -> Steps:
         """Linearise the steps about the trajectory, shape (K + 1, 2), at kappa."""
         motion, window, law = self.model.motion, self.window, self.model.law
-        position, speed = trajectory[:-1, 0], trajectory[:-1, 1]
-        dt, adhesion = window.dt_s, law(speed)
+        position, speed = trajectory[:-1].T
+        half_dt, adhesion = 0.5 * window.dt_s, law(speed)
         resistance = motion.resistance(position, speed)
+        resisting = motion.train.resistance_slope(speed)
         limit = motion.train.used_adhesion(np.inf, window.brake, resistance)
         used = np.minimum(kappa * adhesion, limit)
-        free = used < limit
         # while the brake limits, part of the resistance goes into the rotating masses
-        resisting = np.where(free, 1.0, 1.0 / (1.0 + motion.train.rotating_mass_fraction))
-        slope = np.where(free, kappa * law.slope(speed), 0.0) + resisting * motion.train.resistance_slope(speed)
-        kept = 1.0 - GRAVITY * dt * slope
-        next_speed = speed - GRAVITY * dt * (used + resistance)
-        return Steps(
-            half=0.5 * dt * (1.0 + kept),
-            kept=kept,
-            effect=-GRAVITY * dt * adhesion,
-            headroom=limit / adhesion - kappa,
-            position_error=trajectory[1:, 0] - position - 0.5 * dt * (speed + next_speed),
-            speed_error=trajectory[1:, 1] - next_speed,
-        )
+        limited_slope = resisting / (1.0 + motion.train.rotating_mass_fraction)
+        slope = np.where(used < limit, kappa * law.slope(speed) + resisting, limited_slope)
+        loss = GRAVITY * window.dt_s
+        next_speed = speed - loss * (used + resistance)
+
+        moving = np.empty((3, 2, window.steps))
+        (half, kept), (effect_s, effect), (error_s, error) = moving
+        kept[:] = 1.0 - loss * slope
+        half[:] = half_dt * (1.0 + kept)
+        effect[:] = -loss * adhesion
+        effect_s[:] = half_dt * effect
+        error[:] = trajectory[1:, 1] - next_speed
+        error_s[:] = trajectory[1:, 0] - position - half_dt * (speed + next_speed)
+        weighted = self.certainty * moving
+        felt = weighted * moving[0]
+        return Steps(moving, weighted, felt[:, 0] + felt[:, 1], limit / adhesion - kappa)
 
     def normal(self, steps: Steps, trajectory: Array, kappa: float, weights: Array, margin: float = 0.0) -> Normal:
         """Assemble and factorise the normal equations at the trajectory and kappa about which `steps` are.
 
         Steps with less headroom than `margin` do not depend on kappa: there the brake limits, or might.
         """
-        window, precision, (ps, pv) = self.window, self.precision, self.certainty
-        half, kept = steps.half, steps.kept
-        seen_s, seen_v = weights / window.variance_m2, 1.0 / window.speed_variance
-        before, after, own, pull = (part * (steps.headroom > margin) for part in self.effects(steps))
+        window, precision, certainty = self.window, self.precision, self.certainty
+        (to_speed, to_kappa, force), (speeds, on_kappa, on_force) = steps.weighted, steps.on_speed
+        free = steps.headroom > margin
+        to_kappa = to_kappa * free
+        seen = window.information * np.array((weights, np.ones_like(weights)))
 
-        band = np.zeros((3, trajectory.size), order="F")
-        border, states = np.zeros_like(trajectory), np.zeros_like(trajectory)
-        band[0, 2::2] = ps + seen_s
-        band[0, 3::2] = pv + seen_v
-        band[0, :-2:2] += ps
-        band[0, 1:-2:2] += ps * half**2 + pv * kept**2
-        band[1, :-2:2] = ps * half
-        band[1, 1:-2:2] = -ps * half
-        band[2, :-2:2] = -ps
-        band[2, 1:-2:2] = -pv * kept
-        band[0, 0] += precision[0, 0]
-        band[0, 1] += precision[1, 1]
-        band[1, 0] += precision[0, 1]
+        band = np.zeros((window.steps + 1, 2, 3))
+        band[1:, :, 0] = (certainty + seen).T
+        band[:-1, 0, 0] += certainty[0]
+        band[:-1, 1, 0] += speeds
+        band[:-1, 0, 1] = to_speed[0]
+        band[:-1, 1, 1] = -to_speed[0]
+        band[:-1, 0, 2] = -certainty[0]
+        band[:-1, 1, 2] = -to_speed[1]
+        band[0, 0, :2] += precision[0, :2]
+        band[0, 1, 0] += precision[1, 1]
 
-        border[:-1] = before.T
-        border[1:] += after.T
-        border[0] += precision[:2, 2]
-        corner = precision[2, 2] + float(np.sum(own))
+        border = np.zeros((window.steps + 1, 2))
+        border[:-1, 0] = to_kappa[0]
+        border[:-1, 1] = on_kappa * free
+        border[1:] -= to_kappa.T
+        border[0] += precision[2, :2]
+        corner = precision[2, 2] + np.vdot(to_kappa, steps.moving[1])
 
-        deviation = self.prior.mean - np.array([trajectory[0, 0], trajectory[0, 1], kappa])
-        force_s, force_v = ps * steps.position_error, pv * steps.speed_error
-        states[:-1, 0] = force_s
-        states[:-1, 1] = half * force_s + kept * force_v
-        states[1:, 0] += seen_s * (window.position_m - trajectory[1:, 0]) - force_s
-        states[1:, 1] += seen_v * (window.speed_mps - trajectory[1:, 1]) - force_v
-        states[0] += precision[:2] @ deviation
-        push = float(precision[2] @ deviation) + float(np.sum(pull))
-        return Normal(factorise(band, border.ravel(), corner), states.ravel(), push)
-
-    def effects(self, steps: Steps) -> tuple[Array, Array, Array, Array]:
-        """What every step adds to the normal equations if it depends on kappa.
-
-        To the border at the states before and after it, each of shape (2, K); to the corner and to the gradient,
-        each of shape (K,).
-        """
-        (ps, pv), effect, half_dt = self.certainty, steps.effect, 0.5 * self.window.dt_s
-        to_s, to_v = half_dt * effect * ps, effect * pv
-        return (
-            np.array([to_s, steps.half * to_s + steps.kept * to_v]),
-            np.array([-to_s, -to_v]),
-            effect * (half_dt * to_s + to_v),
-            to_s * steps.position_error + to_v * steps.speed_error,
-        )
+        deviation = self.prior.mean - np.array([*trajectory[0], kappa])
+        pulled = precision @ deviation
+        states = np.zeros((window.steps + 1, 2))
+        states[:-1, 0] = force[0]
+        states[:-1, 1] = on_force
+        states[1:] += (seen * (window.measured - trajectory[1:].T) - force).T
+        states[0] += pulled[:2]
+        push = pulled[2] + np.vdot(to_kappa, steps.moving[2])
+        misfit = 0.5 * float(np.vdot(force, steps.moving[2]) + deviation @ pulled)
+        factor = factorise(band.reshape(-1, 3).T, border.ravel(), float(corner))
+        return Normal(factor, states.ravel(), float(push), misfit)
