@@ -59,6 +59,15 @@ def test_the_block_of_the_states_alone(dense: Array) -> None:
     assert _factor(dense).apply(right) == pytest.approx(np.linalg.solve(dense[:-1, :-1], right), rel=1e-9, abs=1e-9)
 
 
+def test_half_way_are_the_quadratic_form_and_the_end(dense: Array) -> None:
+    rng, factor = np.random.default_rng(7), _factor(dense)
+    right, parameters = rng.standard_normal((len(dense) - 1, 4)), rng.standard_normal(4)
+    half = factor.forward(right)
+    assert half.T @ half == pytest.approx(right.T @ np.linalg.solve(dense[:-1, :-1], right), rel=1e-9, abs=1e-9)
+    moved, parameter = factor.solve(right, parameters)
+    assert factor.end(half, parameter) == pytest.approx(moved[-2:], rel=1e-9, abs=1e-9)
+
+
 def test_law_at_the_end_is_the_corner_of_the_inverse(dense: Array) -> None:
     factor, inverse = _factor(dense), np.linalg.inv(dense)
     assert factor.law_at_end() == pytest.approx(inverse[-3:, -3:], rel=1e-9, abs=1e-12)

@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg.lapack import dpbtrf, dpbtrs
+from scipy.linalg.lapack import dpbtrf, dpbtrs, dtbtrs
 
 from .train import Array
 
@@ -40,14 +40,27 @@ class Factor(NamedTuple):
         moved = (parameter - self.border @ free) / self.information
         return free - np.multiply.outer(self.solved, moved), moved
 
+    def forward(self, right: Array) -> Array:
+        """L^-1 `right` with A = L L^T, shape (2K + 2, C): half of `apply`."""
+        result: Array = dtbtrs(self.cholesky, right, uplo="L")[0]
+        return result
+
+    def end(self, half: Array, parameters: Array) -> Array:
+        """Last state of the solutions whose right-hand sides `forward` took half way, shape (2, C)."""
+        return self._root.T @ half[-2:] - np.outer(self.solved[-2:], parameters)
+
     def law_at_end(self) -> Array:
         """Covariance of the last state and the parameter, shape (3, 3)."""
-        first, below, second = self.cholesky[0, -2], self.cholesky[1, -2], self.cholesky[0, -1]
-        root = np.array([[1.0 / first, 0.0], [-below / (first * second), 1.0 / second]])
         along = np.array([-self.solved[-2], -self.solved[-1], 1.0])
         covariance = np.outer(along, along) / self.information
-        covariance[:2, :2] += root.T @ root  # the last states depend on none behind them
+        covariance[:2, :2] += self._root.T @ self._root
         return covariance
+
+    @property
+    def _root(self) -> Array:
+        """Inverse of the last block of L, shape (2, 2): no state behind it takes part."""
+        first, below, second = self.cholesky[0, -2], self.cholesky[1, -2], self.cholesky[0, -1]
+        return np.array([[1.0 / first, 0.0], [-below / (first * second), 1.0 / second]])
 
     @property
     def log_determinant(self) -> float:

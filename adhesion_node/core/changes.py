@@ -16,40 +16,13 @@ from numpy.typing import NDArray
 
 from .smoother import Smoothed
 from .train import Array
-from .window_model import Belief, Problem, Steps
+from .window import Window
+from .window_model import Belief, Normal, Problem, Steps
 
 Indices = NDArray[np.intp]
 
 FAR = 6.0
 """Deviation in standard deviations that no change explains."""
-
-
-class Change(NamedTuple):
-    """A window in which something has jumped."""
-
-    step: int
-    """Likeliest first step after it."""
-    log_odds: float
-    """Logarithm of the odds that the measurements give it against no change (Bayes factor)."""
-    belief: Belief
-    """Joint law of the last state and kappa as they are now, over all instants."""
-
-
-class _Tried(NamedTuple):
-    """All candidates: log odds and joint laws of the last state and the new kappa, and the likeliest trajectory."""
-
-    log_odds: Array
-    total: float
-    """Logarithm of the sum of the odds."""
-    means: Array
-    per_jump: Array
-    """How far a jump moves that law, shape (3, C)."""
-    variances: Array
-    """Of the jump, shape (C,)."""
-    rest: Array
-    """Covariance at a known jump, shape (3, 3)."""
-    squared: Array
-    """Squared deviations of the positions from the likeliest trajectory, in variances, shape (K,)."""
 
 
 class _Jumps(NamedTuple):
@@ -74,9 +47,70 @@ class _Jumps(NamedTuple):
     """Part of kappa from which it does not count, shape (C,)."""
 
 
+class Change(NamedTuple):
+    """Something may have jumped within a window, at one of the candidates."""
+
+    candidates: Indices
+    smoothed: Smoothed
+    """The window without a jump."""
+    normal: Normal
+    jumps: _Jumps
+    half: Array
+    """The jumps' border, solved half way, shape (2K + 2, C)."""
+    on_kappa: Array
+    """How far a jump moves kappa, with minus sign, shape (C,) as the following."""
+    information: Array
+    """On the jump."""
+    sizes: Array
+    """The most probable jumps."""
+    odds: Array
+    """Logarithms of the odds against no jump."""
+    total: float
+    """Logarithm of the sum of the odds."""
+
+    @property
+    def best(self) -> int:
+        """The likeliest candidate's number."""
+        return int(np.argmax(self.odds))
+
+    @property
+    def step(self) -> int:
+        """Likeliest first step after the change."""
+        return int(self.candidates[self.best])
+
+    @property
+    def log_odds(self) -> float:
+        """Logarithm of the odds that the measurements give a change against none (Bayes factor)."""
+        return self.total - math.log(self.candidates.size)
+
+    @property
+    def belief(self) -> Belief:
+        """Joint law of the last state and kappa as they are now, over all instants."""
+        factor, jumps = self.normal.factor, self.jumps
+        per_jump = -np.vstack((factor.end(self.half, self.on_kappa), self.on_kappa))
+        per_jump[jumps.adds_to] += 1.0
+        moved, change = self.normal.step()
+        base = np.array([*(self.smoothed.trajectory[-1] + moved[-1]), self.smoothed.kappa + change])
+        means = base[:, None] + per_jump * self.sizes
+        means[2] -= jumps.unused
+        likely = np.exp(self.odds - self.total)
+        mean = means @ likely
+        apart = means - mean[:, None]
+        spread = apart * likely @ apart.T + per_jump * (likely / self.information) @ per_jump.T
+        return Belief(mean, factor.law_at_end() + spread)
+
+    def squared(self, problem: Problem) -> Array:
+        """Squared deviations of the positions from the likeliest trajectory, in variances, shape (K,)."""
+        normal, jumps, best, size = self.normal, self.jumps, self.best, self.sizes[self.best]
+        states, kappa = normal.states - size * jumps.border[:, best], normal.kappa - size * jumps.shared[best]
+        moved = normal.factor.solve(states, kappa)[0].reshape(-1, 2)
+        return problem.squared(self.smoothed.trajectory + moved, size * jumps.shifts[:, best])
+
+
 def change(problem: Problem, smoothed: Smoothed, candidates: Indices, jump_std: float) -> Change:
     """A jump of kappa of standard deviation `jump_std` at one of the steps of `candidates`, all equally likely."""
-    return _likeliest(problem, smoothed, candidates, lambda steps, _: _of_kappa(problem, steps, candidates, jump_std))
+    jumps = _of_kappa(smoothed.steps, candidates, jump_std)
+    return _likeliest(problem, smoothed, candidates, lambda _: jumps)
 
 
 def position_step(problem: Problem, smoothed: Smoothed, candidates: Indices, step_std: float) -> Change:
@@ -85,105 +119,81 @@ def position_step(problem: Problem, smoothed: Smoothed, candidates: Indices, ste
         problem,
         smoothed,
         candidates,
-        lambda _, weights: _of_positions(problem, smoothed.trajectory, weights, candidates, step_std),
+        lambda weights: _of_positions(problem.window, smoothed.trajectory, weights, candidates, step_std),
     )
 
 
-def _likeliest(
-    problem: Problem, smoothed: Smoothed, candidates: Indices, jumps: Callable[[Steps, Array], _Jumps]
-) -> Change:
-    """Average over the candidates.
+def _likeliest(problem: Problem, smoothed: Smoothed, candidates: Indices, jumps: Callable[[Array], _Jumps]) -> Change:
+    """Try all candidates, with the jumps that the weights of the measurements make.
 
     Behind a change the measurements drift away together, so at first only what is far off counts as an outlier;
     if that makes a change likely, the measurements are weighted as the likeliest change has them.
     """
     good = problem.model.weights(np.zeros(problem.window.steps))
-    far = problem.squared(smoothed.trajectory) > FAR**2
-    tried = _try(problem, smoothed._replace(weights=np.where(far, smoothed.weights, good)), jumps)
-    if tried.total > 0.0:
-        tried = _try(problem, smoothed._replace(weights=problem.model.weights(tried.squared)), jumps)
-    if not math.isfinite(tried.total):
-        return Change(int(candidates[0]), tried.total, problem.prior)
-    likely = np.exp(tried.log_odds - tried.total)
-    mean = tried.means @ likely
-    apart = tried.means - mean[:, None]
-    covariance = tried.rest + apart * likely @ apart.T + tried.per_jump * (likely * tried.variances) @ tried.per_jump.T
-    step = int(candidates[np.argmax(likely)])
-    return Change(step, tried.total - math.log(candidates.size), Belief(mean, covariance))
+    weights = np.where(problem.squared(smoothed.trajectory) > FAR**2, smoothed.weights, good)
+    found = _try(problem, smoothed, candidates, weights, jumps(weights))
+    if found.total > 0.0:
+        weights = problem.model.weights(found.squared(problem))
+        found = _try(problem, smoothed, candidates, weights, jumps(weights))
+    return found
 
 
-def _try(problem: Problem, smoothed: Smoothed, jumps: Callable[[Steps, Array], _Jumps]) -> _Tried:
-    trajectory, kappa = smoothed.trajectory, smoothed.kappa
-    normal = problem.normal(smoothed.steps, trajectory, kappa, smoothed.weights)
-    tried = jumps(smoothed.steps, smoothed.weights)
-    still, still_kappa = normal.factor.solve(normal.states, normal.kappa)
-    moved, moved_kappa = normal.factor.solve(tried.border, tried.shared)
-    information = tried.own + tried.std**-2 - np.sum(tried.border * moved, axis=0) - tried.shared * moved_kappa
-    sizes = (tried.pull - tried.border.T @ still - tried.shared * still_kappa) / information
-    seen = np.where(sizes < 0.0, *tried.seen)
-    log_odds = np.where(seen, 0.5 * sizes**2 * information - 0.5 * np.log(information * tried.std**2), -np.inf)
-    per_jump = np.stack([-moved[-2], -moved[-1], -moved_kappa])
-    per_jump[tried.adds_to] += 1.0
-    base = np.array([*(trajectory[-1] + still[-2:]), kappa + still_kappa])
-    means = base[:, None] + per_jump * sizes
-    means[2] -= tried.unused
-    best = int(np.argmax(log_odds))
-    return _Tried(
-        log_odds=log_odds,
-        total=float(np.logaddexp.reduce(log_odds)),
-        means=means,
-        per_jump=per_jump,
-        variances=1.0 / information,
-        rest=normal.factor.law_at_end(),
-        squared=problem.squared(
-            trajectory + (still - moved[:, best] * sizes[best]).reshape(-1, 2), tried.shifts[:, best] * sizes[best]
-        ),
-    )
+def _try(problem: Problem, smoothed: Smoothed, candidates: Indices, weights: Array, jumps: _Jumps) -> Change:
+    normal = problem.normal(smoothed.steps, smoothed.trajectory, smoothed.kappa, weights)
+    factor = normal.factor
+    still, still_kappa = factor.solve(normal.states, normal.kappa)
+    half = factor.forward(jumps.border)
+    on_kappa = (jumps.shared - factor.solved @ jumps.border) / factor.information
+    explained = np.einsum("ij,ij->j", half, half) + factor.information * on_kappa**2
+    information = jumps.own + jumps.std**-2 - explained
+    sizes = (jumps.pull - still @ jumps.border - jumps.shared * still_kappa) / information
+    seen = np.where(sizes < 0.0, *jumps.seen)
+    odds = np.where(seen, 0.5 * sizes**2 * information - 0.5 * np.log(information * jumps.std**2), -np.inf)
+    total = float(np.logaddexp.reduce(odds))
+    return Change(candidates, smoothed, normal, jumps, half, on_kappa, information, sizes, odds, total)
 
 
-def _of_kappa(problem: Problem, steps: Steps, candidates: Indices, std: float) -> _Jumps:
-    to_kappa, on_kappa = steps.weighted[1], steps.on_speed[1]
-    own, pull = np.sum(to_kappa * steps.moving[1:], axis=1)
-    count = problem.window.steps
-    single = np.zeros((count, count + 1, 2))
-    diagonal = np.arange(count)
-    single[diagonal, diagonal] = np.array([to_kappa[0], on_kappa]).T
-    single[diagonal, diagonal + 1] = -to_kappa.T
+def _of_kappa(steps: Steps, candidates: Indices, std: float) -> _Jumps:
+    (to_s, to_v), on_speed = steps.weighted[1], steps.on_speed[1]
+    later = _later(to_s.size, candidates)
+    border = np.zeros((to_s.size + 1, 2, candidates.size))
+    border[:-1, 0] = to_s[:, None] * later
+    border[:-1, 1] = on_speed[:, None] * later
+    border[1:, 0] -= to_s[:, None] * later
+    border[1:, 1] -= to_v[:, None] * later
     free = steps.headroom > 0.0
+    own, pull = np.sum(steps.weighted[1] * steps.moving[1:], axis=1)
     return _Jumps(
-        border=_from_then_on(single)[candidates].reshape(candidates.size, -1).T,
-        shared=_from_then_on(own * free)[candidates],
-        own=_from_then_on(own)[candidates],
-        pull=_from_then_on(pull)[candidates],
+        border=border.reshape(-1, candidates.size),
+        shared=(own * free) @ later,
+        own=own @ later,
+        pull=pull @ later,
         # while the brake limits, only a fall of the adhesion could be seen
-        seen=np.stack([np.ones(candidates.size, dtype=np.bool_), free[candidates]]),
+        seen=np.array([np.ones(candidates.size, dtype=np.bool_), free[candidates]]),
         std=std,
         adds_to=2,
-        shifts=np.zeros((count, candidates.size)),
+        shifts=np.zeros_like(later),
         unused=np.maximum(-steps.headroom[candidates], 0.0),  # it counts from the brake's limit
     )
 
 
-def _of_positions(problem: Problem, trajectory: Array, weights: Array, candidates: Indices, std: float) -> _Jumps:
-    window, count = problem.window, problem.window.steps
-    seen = weights / window.variance_m2
-    single = np.zeros((count, count + 1, 2))
-    diagonal = np.arange(count)
-    single[diagonal, diagonal + 1, 0] = seen
+def _of_positions(window: Window, trajectory: Array, weights: Array, candidates: Indices, std: float) -> _Jumps:
+    seen, later = weights * window.information[0], _later(window.steps, candidates)
+    border = np.zeros((window.steps + 1, 2, candidates.size))
+    border[1:, 0] = seen[:, None] * later
     return _Jumps(
-        border=_from_then_on(single)[candidates].reshape(candidates.size, -1).T,
+        border=border.reshape(-1, candidates.size),
         shared=np.zeros(candidates.size),
-        own=_from_then_on(seen)[candidates],
-        pull=_from_then_on(seen * (window.position_m - trajectory[1:, 0]))[candidates],
+        own=seen @ later,
+        pull=seen * (window.position_m - trajectory[1:, 0]) @ later,
         seen=np.ones((2, candidates.size), dtype=np.bool_),
         std=std,
         adds_to=0,
-        shifts=(np.arange(count)[:, None] >= candidates).astype(np.float64),
+        shifts=later,
         unused=np.zeros(candidates.size),
     )
 
 
-def _from_then_on(steps: Array) -> Array:
-    """Sums over each step and all later ones."""
-    result: Array = np.cumsum(steps[::-1], axis=0)[::-1]
-    return result
+def _later(count: int, candidates: Indices) -> Array:
+    """1 for each of `count` steps from each candidate on, else 0: shape (K, C)."""
+    return (np.arange(count)[:, None] >= candidates).astype(np.float64)

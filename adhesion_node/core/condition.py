@@ -148,9 +148,8 @@ def _changed(config: Config, leading: Found) -> Changed | None:
     jump_std = config.unknown_std / float(law(leading.before.belief.mean[1]))
     rail = change(leading.problem, leading.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), jump_std)
     place = position_step(leading.problem, leading.smoothed, np.arange(EDGE, last + 3, dtype=np.intp), STEP_STD_M)
-    place = place._replace(log_odds=place.log_odds - RARER)
-    likelier = max(rail, place, key=lambda found: found.log_odds)
-    if likelier.log_odds < config.change_threshold:
+    log_odds, likelier = max((rail.log_odds, rail), (place.log_odds - RARER, place), key=lambda pair: pair[0])
+    if log_odds < config.change_threshold:
         return None
     belief = scaled(likelier.belief, float(law(likelier.belief.mean[1])))
     return Changed(belief, of_rail=likelier is rail)
