@@ -18,7 +18,11 @@ STUDIES = {
         "--runs 200 --figures figures",
     ),
     "sensitivity": (sensitivity, "the same against position noise, window, step and particles", "--runs 10"),
-    "robust": (robust, "the default method where rail, sensors or train are not what it believes", "--runs 40"),
+    "robust": (
+        robust,
+        "the default method where rail, sensors or train are not what it believes, and under faults",
+        "--runs 40",
+    ),
     "bound": (bound, "the posterior Cramér-Rao bound of mu over a braking", "--json -"),
     "intervention": (
         intervention,

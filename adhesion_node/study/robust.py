@@ -1,8 +1,11 @@
-"""`study robust`: the default method where the rail, the sensors or the train are not what it believes.
+"""`study robust`: the default method where rail, sensors or train are not what it believes, and under faults.
 
-Every figure stands beside that of tunnel_entry without a fault. *Bound kept*: estimates under the brake whose lower
-bound is not above the true adhesion; *claimed*: those that claim to observe the adhesion although the brake limits.
-The rail changes in low_adhesion_patch only: *found* after, and error again below 10 % after, the fall and the rise.
+Every figure of the first table stands beside that of tunnel_entry without a fault. *Bound*: estimates under the brake
+whose lower bound is not above the true adhesion; *claimed*: those that claim to observe the adhesion although the
+brake limits. The rail changes in low_adhesion_patch only: *found* after, and error again below 10 % after, the fall
+and the rise. The second table, from the beginning of each fault on: *B* is the same run without it; *cover*: of the
+90 % interval; *safe curve*: safe braking curves that are not shorter than the true distance to a standstill; *to B*:
+largest difference after a full window; *again*: longest time from the end of the fault to a full window.
 """
 
 from __future__ import annotations
@@ -18,9 +21,10 @@ from sim_node.sensors import SensorSettings
 
 from ..cli import DONE, report
 from ..core import Config
+from . import faults
 from .accuracy import TWO_SIDED_95
 from .robust_runs import Case, Runs
-from .running import add_running_options, run_all, running
+from .running import Running, add_running_options, run_all, running
 from .runs import FIRST_SEED
 
 CHUNK = 10
@@ -65,6 +69,7 @@ CASES = (
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study robust`."""
     parser.add_argument("--runs", type=int, default=40, help="runs of each case (default %(default)s)")
+    parser.add_argument("--only", choices=TABLES, help="one of the tables")
     add_running_options(parser)
 
 
@@ -72,14 +77,21 @@ def run(options: argparse.Namespace) -> int:
     """Run what is missing and print a line per case."""
     if options.runs < 1:
         raise ValueError(f"runs = {options.runs}: give at least 1")
-    wanted = [[Runs(case, FIRST_SEED + first, count) for first, count in _chunks(case, options.runs)] for case in CASES]
-    found = iter(run_all([task for tasks in wanted for task in tasks], running(options)))
+    wanted = {name: TABLES[name] for name in ([options.only] if options.only else TABLES)}
+    rows = {name: table(options.runs, running(options)) for name, (table, _) in wanted.items()}
+    texts = ["\n".join(lines(rows[name])) for name, (_, lines) in wanted.items()]
+    report(options.json, [entry for of_table in rows.values() for entry in of_table], "\n\n".join(texts))
+    return DONE
+
+
+def rails(runs: int, where: Running) -> list[dict[str, Any]]:
+    """Run what is missing; a row per rail, sensor or train."""
+    wanted = [[Runs(case, FIRST_SEED + first, count) for first, count in _chunks(case, runs)] for case in CASES]
+    found = iter(run_all([task for tasks in wanted for task in tasks], where))
     by_case = [np.concatenate([next(found)["rows"] for _ in tasks]) for tasks in wanted]
     table = [row(case, rows) for case, rows in zip(CASES, by_case, strict=True)]
     clean = table[0]["mean_relative_error_percent"]
-    table = [entry | {"ratio_to_clean": _ratio(entry["mean_relative_error_percent"], clean)} for entry in table]
-    report(options.json, table, "\n".join(_lines(table)))
-    return DONE
+    return [entry | {"ratio_to_clean": _ratio(entry["mean_relative_error_percent"], clean)} for entry in table]
 
 
 def _chunks(case: Case, runs: int) -> list[tuple[int, int]]:
@@ -98,6 +110,7 @@ def row(case: Case, rows: NDArray[np.void]) -> dict[str, Any]:
     found = [entry for own in runs for entry in after_changes(own)]
     inside = np.abs(scored["mu"] - scored["true_mu"]) <= TWO_SIDED_95 * scored["std"]
     return {
+        "table": "rails",
         "case": case.name,
         "scenario": case.scenario,
         "method": case.config.method,
@@ -169,3 +182,7 @@ def _lines(table: Sequence[dict[str, Any]]) -> Iterator[str]:
 
 def _text(value: float | None, form: str) -> str:
     return "-" if value is None else f"{value:{form}}"
+
+
+TABLES = {"rails": (rails, _lines), "faults": (faults.table, faults.lines)}
+"""By name: what computes the rows of a table, and what shows them."""
