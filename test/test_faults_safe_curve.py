@@ -38,15 +38,18 @@ def test_no_fault_is_left_out_by_its_name() -> None:
     assert len(KNOWN) == len(FAULTS)
 
 
-@pytest.mark.parametrize("scenario", ["tunnel_entry", "low_adhesion_patch", "grade_unknown", "overweight"])
+@pytest.mark.parametrize(
+    ("scenario", "within"),
+    [("tunnel_entry", 1e-5), ("grade_unknown", 1e-5), ("overweight", 1e-5), ("low_adhesion_patch", 2e-3)],
+)
 @pytest.mark.parametrize("speed_mps", [80.0, 40.0])
-def test_the_true_distance_is_that_of_the_simulated_train(scenario: str, speed_mps: float) -> None:
+def test_the_true_distance_is_that_of_the_simulated_train(scenario: str, within: float, speed_mps: float) -> None:
     run = SCENARIOS[scenario]
     place = run.brake.start_s * run.speed_mps + 200.0
     stop, speed = advance(run, run.brake.start_s, 600.0, place, speed_mps)
     assert speed == 0.0
     (found,) = stopping_distances(run, np.array([place]), np.array([speed_mps]))
-    assert found == pytest.approx(stop - place, rel=1e-3)
+    assert found == pytest.approx(stop - place, rel=within)
 
 
 def test_a_longer_way_is_told_from_a_shorter_one() -> None:
