@@ -311,6 +311,14 @@ def test_steps_by_finite_differences(rho: float, grade: float, brake: float) -> 
         assert np.all((limited[1] == free[1]) == moves)
 
 
+def test_refuses_a_prior_that_is_not_positive_definite() -> None:
+    rail, window = _window(0)
+    covariance = PRIOR.covariance.copy()
+    covariance[2, 2] = -0.09
+    with pytest.raises(np.linalg.LinAlgError, match=r"(?s)the prior's covariance .* is not positive definite"):
+        smooth(rail.problem(window, PRIOR._replace(covariance=covariance)), SEARCH)
+
+
 @pytest.mark.parametrize("dof", [1.0, 4.0, 30.0])
 def test_weights_of_the_tails(dof: float) -> None:
     """On average they are the Fisher information of the Student t, by integration; what is far weighs less."""

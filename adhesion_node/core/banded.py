@@ -52,7 +52,7 @@ class Factor(NamedTuple):
     def law_at_end(self) -> Array:
         """Covariance of the last state and the parameter, shape (3, 3)."""
         along = np.array([-self.solved[-2], -self.solved[-1], 1.0])
-        covariance = np.outer(along, along) / self.information
+        covariance: Array = along[:, None] * along / self.information
         covariance[:2, :2] += self._root.T @ self._root
         return covariance
 
@@ -65,7 +65,7 @@ class Factor(NamedTuple):
     @property
     def log_determinant(self) -> float:
         """ln det of the whole matrix."""
-        return float(2.0 * np.sum(np.log(self.cholesky[0])) + np.log(self.information))
+        return float(2.0 * np.log(self.cholesky[0]).sum() + np.log(self.information))
 
 
 def factorise(band: Array, border: Array, corner: float) -> Factor:

@@ -178,7 +178,7 @@ def _of_kappa(steps: Steps, candidates: Indices, std: float) -> _Jumps:
 
 
 def _of_positions(window: Window, trajectory: Array, weights: Array, candidates: Indices, std: float) -> _Jumps:
-    seen, later = weights * window.information[0], _later(window.steps, candidates)
+    seen, later = weights * window.information[:, 0], _later(window.steps, candidates)
     border = np.zeros((window.steps + 1, 2, candidates.size))
     border[1:, 0] = seen[:, None] * later
     return _Jumps(

@@ -18,12 +18,12 @@ from .changes import change, position_step
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
-from .noise import Noise, learn_noise
+from .noise import learn_noise
 from .outcome import Regime
 from .rail import Rail, learn_bound, lower_bound
 from .smoother import Search, Smoothed, posterior, smooth
 from .train import Array
-from .window import Window, window_of
+from .window import window_of
 from .window_model import Belief, Model, Problem
 
 UNDECIDED = 0.5
@@ -68,7 +68,7 @@ def evaluate_condition(
     """
     if not window.hypotheses:
         window = _opened(config, with_rail(window.prior, before), window._replace(known=before))
-    arrays = _scaled_noise(window_of(window.samples), window.noise)
+    arrays = window_of(window.samples, window.noise.factor)
     found = list[Found]()
     for hypothesis in window.hypotheses:
         near = found[0].smoothed.trajectory if found else window.trajectory
@@ -199,7 +199,7 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
     spent, trajectory = window.spent(config), found[0].smoothed.trajectory
     if not spent:
         return window._replace(trajectory=trajectory)
-    gone = _scaled_noise(window_of(window.samples[: spent + 1]), window.noise)
+    gone = found[0].problem.window.beginning(spent)
     drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
     passed = []
     for each in found:
@@ -216,7 +216,3 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
         learn_noise(window.noise, found[0].problem, found[0].smoothed, spent) if config.identify_noise else window.noise
     )
     return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, noise, trajectory[spent:], window.known)
-
-
-def _scaled_noise(window: Window, noise: Noise) -> Window:
-    return replace(window, variance_m2=window.variance_m2 * noise.factor)

@@ -69,7 +69,7 @@ def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoot
     low, high = search.lowest, math.inf
     for iteration in range(1, search.iterations + 1):
         moved, change = problem.normal(steps, trajectory, kappa, weights).step()
-        limits = kappa + float(np.min(steps.headroom)), kappa + float(np.max(steps.headroom))
+        limits = kappa + float(steps.headroom.min()), kappa + float(steps.headroom.max())
         if change > 0.0:
             low = max(low, kappa)
         elif kappa >= limits[0]:
@@ -82,7 +82,7 @@ def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoot
         steps = problem.linearise(trajectory, kappa)
         before, weights = weights, problem.model.weights(problem.squared(trajectory))
         settled = abs(change) <= search.tolerance or high - low <= AT_LIMIT * kappa
-        if settled and float(np.max(np.abs(weights - before))) <= SAME_WEIGHT:
+        if settled and float(np.abs(weights - before).max()) <= SAME_WEIGHT:
             return Smoothed(trajectory, kappa, weights, steps, iteration, True)
     return Smoothed(trajectory, kappa, weights, steps, search.iterations, False)
 
@@ -99,9 +99,9 @@ def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
     moved, change = normal.step()
     mean = np.array([*(trajectory[-1] + moved[-1]), kappa + change])
     misfit = normal.misfit + problem.model.loss(problem.squared(trajectory))
-    misfit += 0.5 * float(window.information[1] @ (window.speed_mps - trajectory[1:, 1]) ** 2)
+    misfit += 0.5 * float(window.information[:, 1] @ (window.speed_mps - trajectory[1:, 1]) ** 2)
     misfit -= 0.5 * (float(normal.states @ moved.ravel()) + normal.kappa * change)
-    spread = normal.factor.log_determinant - float(np.linalg.slogdet(problem.precision)[1])
+    spread = normal.factor.log_determinant - 2.0 * float(np.log(problem.whitening.diagonal()).sum())
     return Posterior(Belief(mean, normal.factor.law_at_end()), -misfit - 0.5 * spread)
 
 

@@ -101,7 +101,7 @@ class Track:
         """Sum of grade, curve and tunnel resistance R2/(M g), N/N, at each position (7)."""
         if not self.sections:
             return np.zeros_like(position_m)
-        return self._levels[np.searchsorted(self._breaks, position_m, side="right")]
+        return self._levels[self._breaks.searchsorted(position_m, side="right")]
 
     def least_resistance(self, from_m: float) -> float:
         """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""

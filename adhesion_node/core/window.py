@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import NamedTuple
 
@@ -48,15 +48,19 @@ class Window:
         """Number of steps K."""
         return int(self.dt_s.size)
 
+    def beginning(self, count: int) -> Window:
+        """The first `count` steps."""
+        return Window(*(getattr(self, each.name)[:count] for each in fields(self)))
+
     @cached_property
     def measured(self) -> Array:
-        """Measured positions and speeds, shape (2, K)."""
-        return np.array((self.position_m, self.speed_mps))
+        """Measured positions and speeds, shape (K, 2)."""
+        return np.stack((self.position_m, self.speed_mps), axis=1)
 
     @cached_property
     def information(self) -> Array:
-        """Their inverse variances, shape (2, K); 0 where no speed was measured."""
-        return 1.0 / np.array((self.variance_m2, self.speed_variance))
+        """Their inverse variances, shape (K, 2); 0 where no speed was measured."""
+        return 1.0 / np.stack((self.variance_m2, self.speed_variance), axis=1)
 
     @cached_property
     def observations(self) -> list[list[Observation]]:
@@ -80,13 +84,13 @@ class Window:
         return -0.5 * sum(math.log(2.0 * math.pi * variance) for variance in variances)
 
 
-def window_of(samples: Sequence[Sample]) -> Window:
+def window_of(samples: Sequence[Sample], noise: float = 1.0) -> Window:
     """Build the window that starts at the first sample: K + 1 samples make K steps.
 
     The first sample gives its time and its brake; its position belongs to the prior. The brake of a step is the
-    one measured at its start.
+    one measured at its start. `noise` is a factor on the variances of the positions.
     """
     t_ns = np.array([sample.t_ns for sample in samples], dtype=np.int64)
     columns = np.array([sample[1:6] for sample in samples], dtype=np.float64).T
     brake, position, variance, speed, speed_variance = columns
-    return Window(np.diff(t_ns) * 1e-9, brake[:-1], position[1:], variance[1:], speed[1:], speed_variance[1:])
+    return Window(np.diff(t_ns) * 1e-9, brake[:-1], position[1:], noise * variance[1:], speed[1:], speed_variance[1:])

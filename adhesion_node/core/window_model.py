@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from scipy.linalg.lapack import dpotrf, dtrtri
 
 from .adhesion import SpeedLaw
 from .banded import Factor, factorise
@@ -45,8 +46,8 @@ class Model:
     def loss(self, squared: Array) -> float:
         """-ln p of the measurements, up to a constant."""
         if self.tail_dof == 0.0:
-            return 0.5 * float(np.sum(squared))
-        return 0.5 * (self.tail_dof + 1.0) * float(np.sum(np.log1p(squared / self.tail_dof)))
+            return 0.5 * float(squared.sum())
+        return 0.5 * (self.tail_dof + 1.0) * float(np.log1p(squared / self.tail_dof).sum())
 
 
 class Steps(NamedTuple):
@@ -94,18 +95,41 @@ class Problem:
     prior: Belief
 
     @cached_property
+    def whitening(self) -> Array:
+        """Inverse of the Cholesky factor of the prior's covariance, shape (3, 3).
+
+        Raises numpy.linalg.LinAlgError when that is not positive definite.
+        """
+        cholesky, failed = dpotrf(self.prior.covariance, lower=1)
+        if failed:
+            raise np.linalg.LinAlgError(f"the prior's covariance {self.prior.covariance} is not positive definite")
+        result: Array = dtrtri(cholesky, lower=1)[0]
+        return result
+
+    @cached_property
     def precision(self) -> Array:
         """Inverse of the prior's covariance, shape (3, 3)."""
-        return np.asarray(np.linalg.inv(self.prior.covariance), dtype=np.float64)
+        result: Array = self.whitening.T @ self.whitening
+        return result
 
     @cached_property
     def certainty(self) -> Array:
         """Inverse variances of the process noise of position and speed, shape (2, K)."""
         return 1.0 / np.array(self.model.motion.noise(self.window.dt_s))
 
+    @cached_property
+    def constant(self) -> Array:
+        """What the prior and the process noise add to the band of any trajectory, shape (K + 1, 2, 3)."""
+        band = np.zeros((self.window.steps + 1, 2, 3))
+        band[1:, :, 0] = self.certainty.T
+        band[:-1, 0, 0] += self.certainty[0]
+        band[:-1, 0, 2] = -self.certainty[0]
+        band[0, :, 0] += np.diag(self.precision)[:2]
+        return band
+
     def squared(self, trajectory: Array, shift: float | Array = 0.0) -> Array:
         """Squared deviations of the measured positions, less their shift, from the trajectory, in variances: (K,)."""
-        result: Array = (self.window.position_m - shift - trajectory[1:, 0]) ** 2 / self.window.variance_m2
+        result: Array = (self.window.position_m - shift - trajectory[1:, 0]) ** 2 * self.window.information[:, 0]
         return result
 
     def linearise(self, trajectory: Array, kappa: float) -> Steps:
@@ -140,22 +164,20 @@ class Problem:
 
         Steps with less headroom than `margin` do not depend on kappa: there the brake limits, or might.
         """
-        window, precision, certainty = self.window, self.precision, self.certainty
+        window, precision = self.window, self.precision
         (to_speed, to_kappa, force), (speeds, on_kappa, on_force) = steps.weighted, steps.on_speed
-        free = steps.headroom > margin
+        free = (steps.headroom > margin).astype(np.float64)
         to_kappa = to_kappa * free
-        seen = window.information * np.array((weights, np.ones_like(weights)))
+        seen = window.information.copy()
+        seen[:, 0] *= weights
 
-        band = np.zeros((window.steps + 1, 2, 3))
-        band[1:, :, 0] = (certainty + seen).T
-        band[:-1, 0, 0] += certainty[0]
+        band = self.constant.copy()
+        band[1:, :, 0] += seen
         band[:-1, 1, 0] += speeds
         band[:-1, 0, 1] = to_speed[0]
         band[:-1, 1, 1] = -to_speed[0]
-        band[:-1, 0, 2] = -certainty[0]
         band[:-1, 1, 2] = -to_speed[1]
-        band[0, 0, :2] += precision[0, :2]
-        band[0, 1, 0] += precision[1, 1]
+        band[0, 0, 1] += precision[0, 1]
 
         border = np.zeros((window.steps + 1, 2))
         border[:-1, 0] = to_kappa[0]
@@ -169,7 +191,7 @@ class Problem:
         states = np.zeros((window.steps + 1, 2))
         states[:-1, 0] = force[0]
         states[:-1, 1] = on_force
-        states[1:] += (seen * (window.measured - trajectory[1:].T) - force).T
+        states[1:] += seen * (window.measured - trajectory[1:]) - force.T
         states[0] += pulled[:2]
         push = pulled[2] + np.vdot(to_kappa, steps.moving[2])
         misfit = 0.5 * float(np.vdot(force, steps.moving[2]) + deviation @ pulled)
