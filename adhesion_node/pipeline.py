@@ -6,7 +6,6 @@ import hashlib
 import struct
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import replace
 
 from .core import Config, Estimate, Measurement, Outcome, finish, init, step
 from .core.align import Aligner, PositionSample, Sample
@@ -63,7 +62,7 @@ class Pipeline:
         """End the data so far as `finish` does and start anew: only the counts and the digest go on."""
         predictions = self.finish()
         counts = {**self.state.counts, Outcome.RESET: self.state.counts[Outcome.RESET] + 1}
-        self.state = replace(init(self.config, self._seed), counts=counts)
+        self.state = init(self.config, self._seed)._replace(counts=counts)
         self._begin()
         return predictions
 

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from bisect import bisect_right, insort
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import NamedTuple
 
 from . import tracker
 from .braking_window import BrakingWindow
@@ -27,12 +27,11 @@ SLOWEST_MPS = 3.0
 """Speed below which the windows stop: a train about to stand still says nothing of the adhesion."""
 
 
-@dataclass(frozen=True, slots=True)
-class State:
+class State(NamedTuple):
     """Everything the estimator remembers. Immutable: `step` returns a new one."""
 
     seed: int
-    counts: Mapping[Outcome, int] = field(default_factory=lambda: MappingProxyType(dict.fromkeys(Outcome, 0)))
+    counts: Mapping[Outcome, int] = MappingProxyType(dict.fromkeys(Outcome, 0))
     outcome: Outcome = Outcome.ACCEPTED
     """What became of the measurement that came last."""
     pending: tuple[Measurement, ...] = ()
@@ -43,7 +42,7 @@ class State:
     """Law of (s, v) at the newest accepted measurement, from the tracker."""
     window: BrakingWindow | None = None
     """The present braking; None while coasting or while the speed is not known."""
-    knowledge: Knowledge = field(default_factory=Knowledge)
+    knowledge: Knowledge = Knowledge()
     outliers: int = 0
     """Outliers in a row."""
     since_estimate: int = 0
@@ -72,7 +71,7 @@ def step(
         return _counted(state, Outcome.INVALID), None
     estimates: list[Estimate] = []
     if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
-        state, estimates = _take_all(config, replace(state, pending=()), state.pending, evaluate)
+        state, estimates = _take_all(config, state._replace(pending=()), state.pending, evaluate)
         state = _reset(state)
     if any(waiting.t_ns == measurement.t_ns for waiting in state.pending):
         return _counted(state, Outcome.DUPLICATE), None
@@ -80,14 +79,14 @@ def step(
     insort(pending, measurement, key=lambda waiting: waiting.t_ns)
     due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)
     due = bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns)
-    state = replace(state, pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
+    state = state._replace(pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
     state, later = _take_all(config, state, pending[:due], evaluate)
     return state, next(reversed(estimates + later), None)
 
 
 def finish(config: Config, state: State, evaluate: Evaluate = evaluate) -> tuple[State, tuple[Estimate, ...]]:
     """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
-    state, estimates = _take_all(config, replace(state, pending=()), state.pending, evaluate)
+    state, estimates = _take_all(config, state._replace(pending=()), state.pending, evaluate)
     if state.newest is not None and state.since_estimate:
         state, last = _estimate(config, state, evaluate)
         estimates.append(last.estimate)
@@ -100,7 +99,7 @@ def _newest(state: State) -> Measurement | None:
 
 def _counted(state: State, outcome: Outcome) -> State:
     counts = MappingProxyType({**state.counts, outcome: state.counts[outcome] + 1})
-    return replace(state, counts=counts, outcome=outcome)
+    return state._replace(counts=counts, outcome=outcome)
 
 
 def _reset(state: State) -> State:
@@ -131,7 +130,7 @@ def _take(config: Config, state: State, measurement: Measurement, evaluate: Eval
     law = tracker.predict(state.law, dt_s, braked, config.coasting_noise_mps**2 / 0.1)
     if tracker.innovation(law, measurement) > config.gate_sigma:
         if state.outliers + 1 < config.max_outliers:
-            return _counted(replace(state, outliers=state.outliers + 1), Outcome.OUTLIER), None
+            return _counted(state._replace(outliers=state.outliers + 1), Outcome.OUTLIER), None
         return _accept(config, _reset(state), measurement, tracker.meet(measurement), 0.0, evaluate)
     law = tracker.correct(law, measurement, _speed_variance(config, measurement))
     return _accept(config, state, measurement, law, dt_s, evaluate)
@@ -154,8 +153,7 @@ def _accept(
     window = state.window if dt_s <= config.max_gap_s else None
     if window is not None:
         window = window.extended(sample)
-    state = replace(
-        _counted(state, Outcome.ACCEPTED),
+    state = _counted(state, Outcome.ACCEPTED)._replace(
         newest=measurement,
         law=law,
         window=window,
@@ -165,7 +163,7 @@ def _accept(
     if brake == 0.0 or law.mean[1] < SLOWEST_MPS:
         return _release(config, state, evaluate)
     if window is None and tracker.is_settled(law, measurement.variance_m2 * dt_s):
-        state = replace(state, window=BrakingWindow(law, (sample,)))
+        state = state._replace(window=BrakingWindow(law, (sample,)))
     if state.since_estimate < config.step:
         return state, None
     state, result = _estimate(config, state, evaluate)
@@ -177,14 +175,14 @@ def _release(config: Config, state: State, evaluate: Evaluate) -> tuple[State, E
     if state.window is None and state.since_estimate < config.step:
         return state, None
     state, result = _estimate(config, state, evaluate)
-    return replace(state, window=None, law=result.law), result.estimate
+    return state._replace(window=None, law=result.law), result.estimate
 
 
 def _estimate(config: Config, state: State, evaluate: Evaluate) -> tuple[State, Result]:
     assert state.newest is not None  # an estimate follows an accepted measurement
     assert state.law is not None
     result = estimate(config, state.seed, state.newest, state.law, state.window, state.knowledge, evaluate)
-    return replace(state, window=result.window, knowledge=result.knowledge, since_estimate=0), result
+    return state._replace(window=result.window, knowledge=result.knowledge, since_estimate=0), result
 
 
 def _speed_variance(config: Config, measurement: Measurement) -> float:

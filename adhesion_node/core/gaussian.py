@@ -15,6 +15,8 @@ from .motion import LOG_2PI, Motion
 from .train import GRAVITY, Array
 from .window import Window
 
+UNIT = np.eye(2)
+
 
 class Gaussian(NamedTuple):
     """Mean (2,) and covariance (2, 2) of position, m, and speed, m/s."""
@@ -60,10 +62,10 @@ def coast(law: Gaussian, dt_s: float, speed_noise_rate: float) -> Gaussian:
 def observe(law: Gaussian, index: int, value: float, variance: float) -> Gaussian:
     """Condition on a measured position (`index` 0) or speed (`index` 1)."""
     gain = law.gain(index, variance)
-    kept = np.eye(2)
+    kept = UNIT.copy()
     kept[:, index] -= gain
     # Joseph form: stays symmetric and positive however small the variance is
-    covariance = kept @ law.covariance @ kept.T + variance * np.outer(gain, gain)
+    covariance = kept @ law.covariance @ kept.T + variance * (gain[:, None] * gain)
     return Gaussian(law.mean + gain * (value - law.mean[index]), covariance)
 
 
