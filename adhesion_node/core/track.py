@@ -70,6 +70,9 @@ class Tunnel:
 
 Section = Grade | Curve | Tunnel
 
+MANY = 1000
+"""Positions for which a look at their ends pays: most often they all lie between the same two borders."""
+
 
 @dataclass(frozen=True)
 class Track:
@@ -101,6 +104,10 @@ class Track:
         """Sum of grade, curve and tunnel resistance R2/(M g), N/N, at each position (7)."""
         if not self.sections:
             return np.zeros_like(position_m)
+        if position_m.size >= MANY:
+            first, last = self._breaks.searchsorted((position_m.min(), position_m.max()), side="right")
+            if first == last:
+                return np.full(position_m.shape, self._levels[first])
         return self._levels[self._breaks.searchsorted(position_m, side="right")]
 
     def least_resistance(self, from_m: float) -> float:

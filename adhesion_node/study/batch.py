@@ -41,12 +41,12 @@ def identify(
     mu = np.array([search.start for search in searches])
     iterations, tolerance, lowest = (np.array(column) for column in list(zip(*searches, strict=True))[1:])
     going, done = np.arange(len(searches)), 0
-    room = Room.of(going.size, len(windows.dt_s), count)
+    some, room = windows, Room.of(going.size, len(windows.dt_s), count)
     while going.size:
-        if going.size != len(room.draws.start):
-            room = Room.of(going.size, len(windows.dt_s), count)
+        if going.size < len(some.mean):
+            some, room = windows.of(going), Room.of(going.size, len(windows.dt_s), count)
         draw([rngs[int(run)] for run in going], room.draws)
-        expected = expectations(motion, windows.of(going), mu[going], room)
+        expected = expectations(motion, some, mu[going], room)
         previous, mu[going] = mu[going], maximise(expected, lowest[going])
         top = expected.limit.max(axis=1)
         inside = (lowest[going] < mu[going]) & (mu[going] < top)

@@ -64,6 +64,23 @@ class Draws(NamedTuple):
         return cls(np.empty((runs, 2, steps, count)), np.empty((runs, steps)), np.empty((runs, count, 2)))
 
 
+class Cloud(NamedTuple):
+    """The filter's particles at the times 0..K."""
+
+    states: Array
+    """Positions and speeds, (2, K + 1, R, N)."""
+    stepped: Array
+    """Where the noise-free step leads those of the times 0..K-1, (2, K, R, N)."""
+    log_weights: Array
+    """(K + 1, R, N)."""
+
+    @classmethod
+    def empty(cls, runs: int, steps: int, count: int) -> Cloud:
+        """Room for that of R runs, K steps and N particles."""
+        shape = steps, runs, count
+        return cls(np.empty((2, steps + 1, *shape[1:])), np.empty((2, *shape)), np.empty((steps + 1, *shape[1:])))
+
+
 def stack(priors: Sequence[Gaussian], windows: Sequence[Window]) -> Windows:
     """Put windows of equal length together."""
     names = ("dt_s", "brake", "position_m", "variance_m2", "speed_mps", "speed_variance")
@@ -89,62 +106,47 @@ def draw(rngs: Sequence[np.random.Generator], draws: Draws) -> None:
                 numbers[run] = numbers[drawn]
 
 
-def particle_filter(motion: Motion, windows: Windows, mu: Array, draws: Draws, particles: Array) -> tuple[Array, Array]:
-    """Bootstrap filter: log likelihoods and smallest ESS (R,).
-
-    Positions, speeds and log weights are written to `particles`, (3, K + 1, R, N).
-    """
-    _begin(motion, windows, draws, particles)
-    position, speed, log_weights = particles
-    steps, (runs, count) = len(windows.dt_s), position.shape[1:]
-    precision, measured_speed = -0.5 / windows.variance_m2, np.isfinite(windows.speed_variance)
-    top, relative = np.zeros((runs, 1)), np.ones((runs, count))
-    ess, log_likelihood = np.full((steps + 1, runs), float(count)), np.zeros(runs)
+def particle_filter(motion: Motion, windows: Windows, mu: Array, draws: Draws, cloud: Cloud) -> tuple[Array, Array]:
+    """Bootstrap filter that writes the cloud: log likelihoods and smallest ESS (R,); `mu` has shape (R, 1)."""
+    _begin(motion, windows, draws, cloud)
+    states, stepped, log_weights = cloud
+    steps, (runs, count) = len(windows.dt_s), log_weights.shape[1:]
+    precision, measured_speed = -0.5 / windows.variance_m2, np.isfinite(windows.speed_variance.min(axis=(1, 2)))
+    numbers = (np.arange(count) + draws.uniform.T[:, :, None]) / count
+    relative, top = np.ones((runs, count)), np.zeros((steps + 1, runs, 1))
+    total, square = np.full((2, steps + 1, runs), float(count))
+    ends = np.zeros((steps + 1, runs), dtype=bool)  # of the stretches between two resamplings
+    ends[-1] = True
     for k in range(steps):
-        s, v, log_w = position[k], speed[k], log_weights[k]
-        poor = np.flatnonzero(ess[k] < count / 2)
+        s, v = states[:, k]
+        stepped[0, k], stepped[1, k] = motion.advance(s, v, windows.dt_s[k], windows.brake[k], mu)
+        moved, log_w = stepped[:, k], log_weights[k]
+        poor = (total[k] * total[k] < 0.5 * count * square[k]).nonzero()[0]
         if poor.size:
-            weights, log_mean = _normalised(top[poor], relative[poor])
-            log_likelihood[poor] += log_mean
-            parents = poor[:, None], _parents(weights, draws.uniform[poor, k])
-            s, v, log_w = s.copy(), v.copy(), log_w.copy()
-            s[poor], v[poor], log_w[poor] = s[parents], v[parents], 0.0
-        s, v = motion.advance(s, v, windows.dt_s[k], windows.brake[k], mu)
-        s, v = np.add(position[k + 1], s, out=position[k + 1]), np.add(speed[k + 1], v, out=speed[k + 1])
+            ends[k, poor] = True
+            parents = _parents(relative[poor], numbers[k, poor])
+            moved, log_w = moved.copy(), log_w.copy()
+            moved[:, poor], log_w[poor] = moved[:, poor[:, None], parents], 0.0
+        s, v = np.add(states[:, k + 1], moved, out=states[:, k + 1])
         log_w = np.add(log_w, precision[k] * (windows.position_m[k] - s) ** 2, out=log_weights[k + 1])
-        if measured_speed[k].any():
+        if measured_speed[k]:
             log_w -= (0.5 / windows.speed_variance[k]) * (windows.speed_mps[k] - v) ** 2
-        top = log_w.max(axis=1, keepdims=True)
-        relative = np.exp(log_w - top)
-        ess[k + 1] = np.einsum("rn->r", relative) ** 2 / np.einsum("rn,rn->r", relative, relative)
-    log_likelihood += _normalised(top, relative)[1] + windows.log_constant
-    return log_likelihood, ess.min(axis=0)
+        relative = np.exp(log_w - np.maximum.reduce(log_w, axis=1, keepdims=True, out=top[k + 1]))
+        np.einsum("rn->r", relative, out=total[k + 1])
+        np.einsum("rn,rn->r", relative, relative, out=square[k + 1])
+    log_means = top[:, :, 0] + np.log(total / count)
+    return np.sum(log_means, axis=0, where=ends) + windows.log_constant, (total**2 / square).min(axis=0)
 
 
-def _begin(motion: Motion, windows: Windows, draws: Draws, particles: Array) -> None:
-    """Write the first positions, speeds and log weights, and of the later ones the noise alone."""
+def _begin(motion: Motion, windows: Windows, draws: Draws, cloud: Cloud) -> None:
+    """Write the first states and log weights, and of the later states the noise alone."""
     first = windows.mean[:, None, :] + draws.start @ windows.root.transpose(0, 2, 1)
-    particles[0, 0], particles[1, 0], particles[2, 0] = first[..., 0], first[..., 1], 0.0
+    cloud.states[:, 0], cloud.log_weights[0] = first.transpose(2, 0, 1), 0.0
     for index, variance in enumerate(motion.noise(windows.dt_s)):
-        np.multiply(np.sqrt(variance), draws.normal[:, index].transpose(1, 0, 2), out=particles[index, 1:])
+        np.multiply(np.sqrt(variance), draws.normal[:, index].swapaxes(0, 1), out=cloud.states[index, 1:])
 
 
-def _parents(weights: Array, offsets: Array) -> Indices:
-    """Systematic resampling: the particle that each of the N evenly spaced numbers falls on."""
-    count = weights.shape[1]
-    numbers = (np.arange(count) + offsets[:, None]) / count
-    below = np.cumsum(weights, axis=1)[:, None, :] < numbers[:, :, None]
-    parents: Indices = np.minimum(below.sum(axis=2), count - 1)
-    return parents
-
-
-def normalised(log_weights: Array) -> tuple[Array, Array]:
-    """Normalised weights and the logarithms of the mean weights."""
-    top = log_weights.max(axis=1, keepdims=True)
-    return _normalised(top, np.exp(log_weights - top))
-
-
-def _normalised(top: Array, relative: Array) -> tuple[Array, Array]:
-    """The same of weights exp(top) * relative."""
-    total = relative.sum(axis=1, keepdims=True)
-    return relative / total, (top + np.log(total / relative.shape[1]))[:, 0]
+def _parents(relative: Array, numbers: Array) -> Indices:
+    """Systematic resampling: the particle on which each of N numbers falls, by relative weights; all (R, N)."""
+    upto = np.cumsum(relative, axis=1)
+    return np.asarray(np.argmax(upto[:, None, :] >= (upto[:, -1:] * numbers)[:, :, None], axis=2))
