@@ -25,7 +25,6 @@ from ..core.prediction import Prediction
 from ..core.train import CRH3, GRAVITY, KMH
 from ..pipeline import Pipeline
 from ..score import Truth
-from . import intervention_figure
 from .identified import BRAKINGS
 from .published import WORST
 
@@ -67,12 +66,14 @@ def run(options: argparse.Namespace) -> int:
 
 def _draw(said: list[Prediction], path: Path) -> None:
     """Draw the limits of the braking curve on the lower bound at 200 km/h."""
+    from .intervention_figure import draw
+
     last = _last(said, 200.0 * KMH)
     if last is None or last.safe is None:
         raise ValueError(f"figure = {path}: there is no braking curve at 200 km/h to draw")
     fixed = braking.curve(CRH3, last.estimate.speed_mps, WORST)
     title = f"Supervision limits by the lower bound of adhesion {last.estimate.mu_lower:.4f}"
-    intervention_figure.draw(SupervisionConfig(), last.safe, fixed, title, path)
+    draw(SupervisionConfig(), last.safe, fixed, title, path)
 
 
 def predictions(bag: Path, seed: int) -> list[Prediction]:
