@@ -13,7 +13,7 @@ import pytest
 from adhesion_node.core import braking
 from adhesion_node.core.adhesion import WET
 from adhesion_node.core.train import CRH3, KMH
-from adhesion_node.study import identified, sensitivity
+from adhesion_node.study import distances, identified, sensitivity, tables
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.methods import STARTS
 from adhesion_node.study.montecarlo import Chunk, Result
@@ -29,8 +29,8 @@ def a_run(from_kmh: float, to_kmh: float, scale: float) -> np.ndarray:
     return np.array([(i, speed, true, mu, 0.01, 0.0, True, True) for i, (speed, true, mu) in enumerate(rows)], ROW)
 
 
-def result(scenario: str, runs: Sequence[np.ndarray]) -> Result:
-    chunk = Chunk(scenario, "particle_em", 0.5, 1000, len(runs) // len(STARTS))
+def result(scenario: str, runs: Sequence[np.ndarray], method: str = "particle_em") -> Result:
+    chunk = Chunk(scenario, method, 0.5, 1000, len(runs) // len(STARTS))
     return Result(chunk, list(runs), 0.0, np.zeros(1))
 
 
@@ -60,6 +60,42 @@ def test_rows_tell_mean_band_and_saving() -> None:
         assert row["distance_m"] == pytest.approx(row["distance_m_true_law"], rel=0.02)
         fixed = braking.curve(CRH3, row["from_kmh"] * KMH, 0.0726, row["to_kmh"] * KMH)
         assert row["time_s_saved_percent"] == pytest.approx(100 - 100 * row["time_s"] / fixed.time_s[-1])
+
+
+def test_both_methods_stand_beside_each_other_on_the_chunks_of_the_tables(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Chunk] = []
+
+    def computed(wanted: Sequence[Chunk], _where: Running) -> list[Result]:
+        """Where the paper's method reads mu 10 % too low, and the default one is right."""
+        asked.extend(wanted)
+        found = []
+        for chunk in wanted:
+            run = a_run(*identified.BRAKINGS[chunk.scenario], 0.9 if chunk.method == "particle_em" else 1.0)
+            found.append(result(chunk.scenario, [run] * len(STARTS), chunk.method))
+        return found
+
+    monkeypatch.setattr(distances, "results", computed)
+    assert main(["distances", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
+    table = [row for row in json.loads((tmp_path / "table.json").read_text()) if row["case"] == "identified"]
+    assert [(row["from_kmh"], row["method"]) for row in table] == [
+        (start, method) for start in (300.0, 250.0) for method in ("particle_em", "rail_condition")
+    ]
+    for paper, default in (table[:2], table[2:]):
+        assert paper["distance_m"] > 1.05 * default["distance_m"]
+        assert default["distance_m"] == pytest.approx(default["distance_m_true_law"], rel=0.02)
+        assert paper["distance_m_true_law"] == default["distance_m_true_law"]
+    lines = capsys.readouterr().out.splitlines()[-4:]
+    assert [line.split()[3] for line in lines] == ["particle_em", "rail_condition"] * 2
+    assert [float(line.split()[4]) for line in lines] == pytest.approx([row["distance_m"] for row in table], abs=0.05)
+
+    by_distances = set(map(repr, asked))
+    asked.clear()
+    monkeypatch.setattr(tables, "results", computed)
+    monkeypatch.setattr(tables, "rows", lambda _cell: ())
+    assert main(["tables", "--runs", "1"]) == 0
+    assert by_distances <= set(map(repr, asked))
 
 
 def test_one_setting_at_a_time_leaves_the_nominal_ones() -> None:

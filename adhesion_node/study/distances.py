@@ -1,4 +1,8 @@
-"""`study distances`: braking distances and times of Xie et al. 2019 beside the published ones, without noise."""
+"""`study distances`: braking distances and times of Xie et al. 2019 beside the published ones, without noise.
+
+With `--runs` also those by the adhesion that the paper's method and the default one identify in the runs of
+`study tables`, whose cache both share.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +18,10 @@ from . import identified
 from .montecarlo import chunks, results
 from .published import BRAKING_CASES, SAVINGS, Saving
 from .running import Running, add_running_options, running
+from .tables import NOMINAL_SIGMA_M
+
+IDENTIFYING = ("particle_em", "rail_condition")
+"""The paper's method and the default one."""
 
 
 def rows() -> list[dict[str, Any]]:
@@ -59,8 +67,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 
 def by_identified(runs: int, where: Running) -> list[dict[str, Any]]:
-    """Distances by the adhesion that the paper's method identified in the runs of `study tables`."""
-    wanted = [chunk for scenario in identified.BRAKINGS for chunk in chunks(scenario, "particle_em", 0.5, runs)]
+    """Distances by the adhesion that each of the methods identified in the runs of `study tables`."""
+    wanted = [
+        chunk
+        for scenario in identified.BRAKINGS
+        for method in IDENTIFYING
+        for chunk in chunks(scenario, method, NOMINAL_SIGMA_M, runs)
+    ]
     return list(identified.rows(list(results(wanted, where))))
 
 
@@ -83,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
         for ours, paper in zip(savings(table), SAVINGS, strict=True)
     ]
     found = by_identified(options.runs, running(options)) if options.runs else []
-    lines += [line for row in found for line in identified.lines(row)]
+    lines += identified.lines(found) if found else []
     if options.figures:
         from .braking_figures import draw_all
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -44,12 +45,15 @@ def distance_and_time(rows: NDArray[np.void], from_kmh: float, to_kmh: float) ->
 
 
 def rows(results: Sequence[Result]) -> Iterator[dict[str, Any]]:
-    """A row per scenario: distance and time by the identified adhesion, by the true law, and what both save."""
-    for scenario, (from_kmh, to_kmh) in BRAKINGS.items():
-        runs = [rows for result in results if result.chunk.scenario == scenario for rows in result.rows]
+    """A row per scenario and method: distance and time by the identified adhesion, by the true law, and the saving."""
+    by_case: dict[tuple[str, str], list[NDArray[np.void]]] = defaultdict(list)
+    for result in results:
+        by_case[result.chunk.scenario, result.chunk.method] += result.rows
+    for (scenario, method), runs in by_case.items():
+        from_kmh, to_kmh = BRAKINGS[scenario]
         found = np.array([distance_and_time(run, from_kmh, to_kmh) for run in runs])
         true, worst = (braking.curve(CRH3, from_kmh * KMH, mu, to_kmh * KMH) for mu in (WET, WORST))
-        row: dict[str, Any] = {"from_kmh": from_kmh, "to_kmh": to_kmh, "case": "identified"}
+        row: dict[str, Any] = {"from_kmh": from_kmh, "to_kmh": to_kmh, "case": "identified", "method": method}
         row["runs"] = len(runs) // len(STARTS)
         for values, name in zip(found.T, ("distance_m", "time_s"), strict=True):
             fixed = float(getattr(worst, name)[-1])
@@ -63,12 +67,17 @@ def rows(results: Sequence[Result]) -> Iterator[dict[str, Any]]:
         yield row
 
 
-def lines(row: Mapping[str, Any]) -> Iterator[str]:
-    """A row in words."""
+def lines(table: Sequence[Mapping[str, Any]]) -> Iterator[str]:
+    """The rows in words."""
     yield ""
-    yield f"{row['from_kmh']:g} -> {row['to_kmh']:g} km/h by the identified mu, {row['runs']} runs from each start:"
-    for name, unit in (("distance_m", "m"), ("time_s", "s")):
-        yield (
-            f"  {row[name]:.1f} {unit} ({row[f'{name}_p5']:.1f} to {row[f'{name}_p95']:.1f}), by the true law "
-            f"{row[f'{name}_true_law']:.1f}; {row[f'{name}_saved_percent']:.2f} % less than by the fixed {WORST}"
+    yield f"by the mu identified in {table[0]['runs']} runs from each start, and saved against the fixed {WORST}"
+    yield (
+        f"{'km/h':>12} {'method':>14} {'m':>8} {'5 %':>8} {'95 %':>8} {'true law':>8} {'saved':>7}"
+        f" {'s':>6} {'5 %':>6} {'95 %':>6} {'true law':>8} {'saved':>7}"
+    )
+    for row in table:
+        yield f"{row['from_kmh']:>5g} -> {row['to_kmh']:>3g} {row['method']:>14}" + "".join(
+            f" {row[name]:{width}.1f} {row[f'{name}_p5']:{width}.1f} {row[f'{name}_p95']:{width}.1f}"
+            f" {row[f'{name}_true_law']:8.1f} {row[f'{name}_saved_percent']:5.2f} %"
+            for name, width in (("distance_m", 8), ("time_s", 6))
         )
