@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +42,7 @@ ROW = np.dtype(
 it counts for the mean error of `score`."""
 
 
+@lru_cache(maxsize=10)  # a small study takes the same few runs with every method
 def simulate(scenario: str, seed: int, sigma_m: float) -> Simulated:
     """Simulate a run whose positions have standard deviation `sigma_m`."""
     truth, measurements = Truth(), []
