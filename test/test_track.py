@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from adhesion_node.core.track import LEVEL, Curve, Grade, Section, Track, Tunnel, parse_track
+from adhesion_node.core.track import LEVEL, MANY, Curve, Grade, Section, Track, Tunnel, parse_track
 
 
 def test_equation_8_grade() -> None:
@@ -60,6 +60,14 @@ def test_profile_equals_the_sum_over_sections_at_random_places() -> None:
     for x in (-50.0, 1234.0, 7900.0):
         ahead = np.linspace(x, 9e3, 200_001)
         assert track.least_resistance(x) == pytest.approx(float(track.specific_resistance(ahead).min()), abs=1e-14)
+
+
+@pytest.mark.parametrize("middle_m", [400.0, 800.0, 1200.0])
+def test_many_places_at_once_are_each_in_their_section(middle_m: float) -> None:
+    track = Track((Grade(0.0, 1000.0, 5.0), Tunnel(800.0, 1200.0)))
+    places = np.random.default_rng(2).normal(middle_m, 20.0, (3, MANY))
+    one_by_one = [float(track.specific_resistance(np.array(place))) for place in places.flat]
+    assert track.specific_resistance(places).tolist() == np.reshape(one_by_one, places.shape).tolist()
 
 
 def test_level_line_and_least_resistance() -> None:
