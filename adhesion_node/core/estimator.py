@@ -27,6 +27,10 @@ SLOWEST_MPS = 3.0
 """Speed below which the windows stop: a train about to stand still says nothing of the adhesion."""
 
 
+MOST_WAITING = 12_000
+"""Measurements that wait for late ones at most, 60 s of 200 Hz: stamps that scatter about one time let none go."""
+
+
 class State(NamedTuple):
     """Everything the estimator remembers. Immutable: `step` returns a new one."""
 
@@ -78,7 +82,7 @@ def step(
     pending = list(state.pending)
     insort(pending, measurement, key=lambda waiting: waiting.t_ns)
     due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)
-    due = bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns)
+    due = max(bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns), len(pending) - MOST_WAITING)
     state = state._replace(pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
     state, later = _take_all(config, state, pending[:due], evaluate)
     return state, next(reversed(estimates + later), None)
