@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -40,7 +41,7 @@ class Listener(Node):
         self.clock: list[int] = []
         for topic in topics:
             self._listen(topic, profile)
-        subscribe(self, CLOCK, self._on_clock, SENSOR_SUBSCRIPTION)
+        subscribe(self, CLOCK, self._on_clock, profile)
 
     def _listen(self, topic: Topic, profile: QoSProfile) -> None:
         def keep(cdr: bytes) -> None:
@@ -63,8 +64,9 @@ def of(written: list[Record], topic: str) -> list[bytes]:
 def test_every_byte_arrives_and_the_clock_rises(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, rate: float
 ) -> None:
+    """At 20 times real time a machine that was busy for half a second catches up by more than a queue of 100 holds."""
     written = write_steps(tmp_path / "bag", 400)
-    listener = Listener(context, POSITION, BRAKE_PRESSURE)
+    listener = Listener(context, POSITION, BRAKE_PRESSURE, profile=UNLIMITED)
     executor.add_node(listener)
     with BagReader(tmp_path / "bag") as reader:
         node = Replay(reader, select(reader.topics), rate, context=context)
@@ -78,17 +80,49 @@ def test_every_byte_arrives_and_the_clock_rises(
     assert node.published == {"/position": 400, "/brake_pressure": 400}
 
 
-def test_the_rate_is_kept(
-    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
+def test_the_rate_is_kept(tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ticks of 10 ms: a step every 25 ms of a clock that the test turns."""
+    now_ms = turned_by_hand(monkeypatch)
     write_steps(tmp_path / "bag", 21)  # 2 s
     with BagReader(tmp_path / "bag") as reader:
         node = Replay(reader, select(reader.topics), 4.0, subscribers=0, context=context)
-        executor.add_node(node)
-        spin_until(executor, lambda: node.published["/position"] > 0)
-        begun = time.monotonic()
-        spin_until(executor, lambda: node.finished)
-    assert 0.4 <= time.monotonic() - begun <= 2.0
+        node.tick()
+        published = []
+        for now_ms[0] in range(5001, 5511, 10):
+            node.tick()
+            published.append(node.published["/position"])
+        node.destroy_node()
+    assert published == [1 + (10 * tick + 1) // 25 for tick in range(50)] + [21]
+    assert node.finished
+
+
+def turned_by_hand(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the time of the player's clock, ms, in a list to be changed."""
+    now_ms = [5000]
+    monkeypatch.setattr(player, "time", SimpleNamespace(monotonic=lambda: now_ms[0] / 1000))
+    return now_ms
+
+
+def test_a_machine_that_is_held_up_is_given_more_time_for_its_discovery(
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three ticks a second: not even the longest wait for a subscriber ends the wait for the others."""
+    now_ms = turned_by_hand(monkeypatch)
+    write_steps(tmp_path / "bag", 2)
+    executor.add_node(Listener(context, POSITION))
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 0.0, context=context)
+        spin_until(executor, lambda: node.count_subscribers("/position") == 1)
+        begun = []
+        for now_ms[0] in range(5000, 5000 + 300 * (player.SETTLE_TICKS + 3), 300):
+            node.tick()
+            begun.append(node.published["/position"] > 0)
+        node.destroy_node()
+    assert begun.index(True) == player.SETTLE_TICKS + 1
 
 
 def test_recorded_results_are_not_replayed_and_truth_is(
@@ -212,12 +246,11 @@ def test_a_best_effort_subscriber_at_full_speed_is_named(
     listener = Listener(context, POSITION)
     executor.add_node(listener)
     with replay_process(str(tmp_path / "bag"), "--rate", "0") as process:
-        spin_until(executor, lambda: process.poll() is not None, 20.0)
+        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == 5, 20.0)
         out, err = process.communicate()
     assert process.returncode == 0
     assert out.split() == ["5", "/brake_pressure", "5", "/position"]
     assert "listener subscribes /position best effort and may lose messages: start it with -p qos_overrides./pos" in err
-    assert len(listener.heard) == 5
 
 
 def test_a_bag_without_position_says_what_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,9 +30,10 @@ BURST = 20
 SUBSCRIBERS_S = 10.0
 """Longest wait for subscribers."""
 
-SETTLE_S = 0.5
-"""The subscribers count as found when no other one has appeared for so long: discovery is not finished on the other
-side, nor for its other topics, when the first one is seen."""
+SETTLE_S, SETTLE_TICKS = 0.5, 100
+"""The subscribers count as found when no other one has appeared for so long and in so many ticks: discovery is not
+finished on the other side, nor for its other topics, when the first one is seen. On a machine that is busy it takes
+longer, and so do the ticks."""
 
 ACKNOWLEDGED_S = 10.0
 """Longest wait for reliable subscribers to take what was published."""
@@ -68,6 +69,7 @@ class Replay(Node):
         self._waiting_since = time.monotonic()
         self._seen: tuple[int, ...] = ()
         self._seen_since = self._waiting_since
+        self._seen_ticks = 0
         period = PERIOD_S if rate else RUSH_PERIOD_S
         self.create_timer(period, self.tick, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
 
@@ -87,12 +89,14 @@ class Replay(Node):
     def _start_when_heard(self) -> None:
         now = time.monotonic()
         heard = tuple(publisher.get_subscription_count() for publisher in self._outputs.values())
+        self._seen_ticks += 1
         if heard != self._seen:
-            self._seen, self._seen_since = heard, now
+            self._seen, self._seen_since, self._seen_ticks = heard, now, 0
         enough = self._position().get_subscription_count() >= self._wanted
-        if enough and (now - self._seen_since >= SETTLE_S or not self._wanted):
+        settled = now - self._seen_since >= SETTLE_S and self._seen_ticks >= SETTLE_TICKS
+        if enough and (settled or not self._wanted):
             self._warn_of_losses()
-        elif now - self._waiting_since >= SUBSCRIBERS_S:
+        elif not enough and now - self._waiting_since >= SUBSCRIBERS_S:
             self.get_logger().warning(
                 f"{self._position().topic_name}: fewer than {self._wanted} subscribers after {SUBSCRIBERS_S:g} s: "
                 "replaying all the same"
