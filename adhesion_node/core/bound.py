@@ -25,7 +25,7 @@ from .motion import Motion
 from .train import Array
 
 MEAN_OF_STD = math.sqrt(2.0 / math.pi)
-"""Mean of |error| of a Gaussian error over its standard deviation."""
+"""Mean of ``|error|`` of a Gaussian error over its standard deviation."""
 
 SPEED_STEP_MPS, CONDITION_STEP = 1e-3, 1e-4
 """Half widths of the central differences; the model is smooth in v and, between its kinks, linear in kappa."""

@@ -65,7 +65,7 @@ class Search(NamedTuple):
     start: float
     iterations: int
     tolerance: float
-    """|mu_k+1 - mu_k| below which it has converged (34)."""
+    """``|mu_k+1 - mu_k|`` below which it has converged (34)."""
     lowest: float = 0.0
     """Least mu: 0, or a negative number where traction may be at work."""
 
@@ -76,7 +76,7 @@ class Identified(NamedTuple):
     mu: float
     iterations: int
     converged: bool
-    """Whether |mu_k+1 - mu_k| fell below the tolerance (34)."""
+    """Whether ``|mu_k+1 - mu_k|`` fell below the tolerance (34)."""
     weight: float
     """Complete-data information on mu, the sum of c_t over the steps that adhesion limits."""
     limit: float

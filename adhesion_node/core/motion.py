@@ -63,7 +63,7 @@ class Motion:
         return self.position_noise_rate * dt_s, self.speed_noise_rate * dt_s
 
     def transition_log_density(self, position_error: Array, speed_error: Array, dt_s: float | Array) -> Array:
-        """ln p(x'|x) of the deviations of x' from the noise-free step (11)."""
+        """``ln p(x'|x)`` of the deviations of x' from the noise-free step (11)."""
         var_s, var_v = self.noise(dt_s)
         return -0.5 * (
             position_error**2 / var_s + speed_error**2 / var_v + np.log(var_s) + np.log(var_v) + 2.0 * LOG_2PI
@@ -71,5 +71,5 @@ class Motion:
 
 
 def measurement_log_density(position_m: Array, measured_m: float | Array, variance_m2: float | Array) -> Array:
-    """ln p(y|x) of a measured position (11)."""
+    """``ln p(y|x)`` of a measured position (11)."""
     return -0.5 * ((measured_m - position_m) ** 2 / variance_m2 + np.log(variance_m2) + LOG_2PI)

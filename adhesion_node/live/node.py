@@ -1,6 +1,8 @@
 """The node behind the live page: subscribes to what the other nodes say and keeps a `View` of it.
 
-position, brake_pressure, speed, adhesion/*, atp/status, /diagnostics, truth/mu  ->  a page in the browser
+::
+
+    position, brake_pressure, speed, adhesion/*, atp/status, /diagnostics, truth/mu  ->  a page in the browser
 """
 
 from __future__ import annotations
