@@ -157,12 +157,12 @@ def _of_kappa(steps: Steps, candidates: Indices, std: float) -> _Jumps:
     (to_s, to_v), on_speed = steps.weighted[1], steps.on_speed[1]
     later = _later(to_s.size, candidates)
     border = np.zeros((to_s.size + 1, 2, candidates.size))
-    border[:-1, 0] = to_s[:, None] * later
+    border[:-1, 0] = moved = to_s[:, None] * later
     border[:-1, 1] = on_speed[:, None] * later
-    border[1:, 0] -= to_s[:, None] * later
+    border[1:, 0] -= moved
     border[1:, 1] -= to_v[:, None] * later
     free = steps.headroom > 0.0
-    own, pull = np.sum(steps.weighted[1] * steps.moving[1:], axis=1)
+    own, pull = (steps.weighted[1] * steps.moving[1:]).sum(axis=1)
     return _Jumps(
         border=border.reshape(-1, candidates.size),
         shared=(own * free) @ later,

@@ -112,7 +112,9 @@ def _begin(problem: Problem, kappa: float, near: Array) -> tuple[Array, float]:
     position, speed = near[-1:].T
     law, resistance = problem.model.law(speed), motion.resistance(position, speed)
     limit = motion.train.used_adhesion(np.inf, brake, resistance)
-    kappa = min(kappa, 0.98 * float(np.max(limit)) / float(law[0]))
+    kappa = min(kappa, 0.98 * float(limit.max()) / float(law[0]))
+    if known == problem.window.steps:
+        return near, kappa
     lost = GRAVITY * dt[known:] * (np.minimum(kappa * law, limit[known:]) + resistance)
     speeds = np.concatenate((speed, speed - np.cumsum(lost)))
     positions = position + np.cumsum(0.5 * dt[known:] * (speeds[:-1] + speeds[1:]))
