@@ -132,7 +132,7 @@ def _likeliest(problem: Problem, smoothed: Smoothed, candidates: Indices, jumps:
     good = problem.model.weights(np.zeros(problem.window.steps))
     weights = np.where(problem.squared(smoothed.trajectory) > FAR**2, smoothed.weights, good)
     found = _try(problem, smoothed, candidates, weights, jumps(weights))
-    if found.total > 0.0:
+    if found.log_odds > 0.0:
         weights = problem.model.weights(found.squared(problem))
         found = _try(problem, smoothed, candidates, weights, jumps(weights))
     return found
