@@ -191,5 +191,7 @@ def _estimate(config: Config, state: State, evaluate: Evaluate) -> tuple[State, 
 
 def _speed_variance(config: Config, measurement: Measurement) -> float:
     """Variance of the measured speed; infinite where there is none or a braked axle may slide."""
+    if measurement.speed_mps is None:
+        return math.inf
     rolling = config.speed_while_braking or config.brake(measurement.brake_pressure_pa) == 0.0
-    return config.speed_std_mps**2 if measurement.speed_mps is not None and rolling else math.inf
+    return config.speed_std_mps**2 if rolling else math.inf
