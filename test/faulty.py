@@ -54,10 +54,18 @@ class Outcome(NamedTuple):
 
 
 @cache
-def outcome(fault: str, seed: int = 1, start_s: float = 30.0, duration_s: float = 0.0, share: float = 0.0) -> Outcome:
-    plan = Plan(fault, start_s, duration_s, share)
-    pipeline, predictions, truths = Pipeline(Config(), 1), list[Prediction](), {}
-    for truth, sent in faulty_run(plan, find("tunnel_entry"), period_of(plan, 0.1), seed, SETTINGS):
+def outcome(
+    fault: str,
+    seed: int = 1,
+    start_s: float = 30.0,
+    duration_s: float = 0.0,
+    share: float = 0.0,
+    knows_track: bool = False,
+) -> Outcome:
+    plan, scenario = Plan(fault, start_s, duration_s, share), find("tunnel_entry")
+    config = Config(track=scenario.track) if knows_track else Config()
+    pipeline, predictions, truths = Pipeline(config, 1), list[Prediction](), {}
+    for truth, sent in faulty_run(plan, scenario, period_of(plan, 0.1), seed, SETTINGS):
         truths[truth.t_ns] = truth
         for message in sent:
             predictions += pipeline.push(READERS[message.topic](message_of(message)))
