@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import pytest
+from scipy.integrate import trapezoid
 
 from adhesion_node.core import Config, Outcome
 from adhesion_node.core.adhesion import SNOW
@@ -105,7 +106,7 @@ def test_a_coarse_sensor_is_not_stuck() -> None:
 def test_least_way_is_that_of_the_strongest_braking() -> None:
     times = np.linspace(0.0, 4.0, 4001)
     speeds = np.maximum(9.0 - STRONGEST_MPS2 * times, 0.0)
-    assert least_way(9.0, 4.0) == pytest.approx(np.trapezoid(speeds, times), abs=1e-3)
+    assert least_way(9.0, 4.0) == pytest.approx(trapezoid(speeds, times), abs=1e-3)
 
 
 def test_a_flood_is_thinned_to_200_a_second_of_every_sensor() -> None:

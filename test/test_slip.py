@@ -6,7 +6,7 @@ from itertools import islice
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import solve_ivp, trapezoid
 
 from adhesion_node.core.creep_curve import adhesion, parameters
 from sim_node import slip
@@ -46,7 +46,7 @@ def test_force_and_creep_lie_on_the_curve(dry: list[slip.SlipTruth]) -> None:
 def test_the_trains_momentum_is_the_forces_impulse(dry: list[slip.SlipTruth]) -> None:
     """M (v1 - v0) = integral of sum F - R, by the trapezoidal rule over the samples."""
     loco = Locomotive()
-    impulse = np.trapezoid([truth.force_n - loco.resistance_n for truth in dry], dx=0.01)
+    impulse = trapezoid([truth.force_n - loco.resistance_n for truth in dry], dx=0.01)
     assert loco.train_mass_kg * (dry[-1].speed_mps - dry[0].speed_mps) == pytest.approx(impulse, rel=1e-3)
 
 
