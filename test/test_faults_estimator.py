@@ -223,14 +223,17 @@ def test_a_stuck_position_is_an_error_and_nothing_is_said_of_mu(make_line: MakeL
 def test_silence_is_stale_within_the_timeout_and_a_tick(make_line: MakeLine) -> None:
     line = make_line(sensor_timeout_s=0.2)
     play(line, ticks("none", end_s=17.0))
-    line.spin_until(line.executor, is_stale(line))
-    first = next(m for m in line.heard[topics.DIAGNOSTICS] if m.status[0].level == DiagnosticStatus.STALE)
+    before = line.estimator.published[topics.DIAGNOSTICS]  # a busy machine may have been silent meanwhile, too
+    told = line.heard[topics.DIAGNOSTICS]
+    line.spin_until(line.executor, lambda: len(told) > before and is_stale(line)())
+    first = next(m for m in told[before:] if m.status[0].level == DiagnosticStatus.STALE)
     assert first.status[0].message.startswith("/position: nothing for 0.2 s: is the sensor alive?")
     age_s = first.header.stamp.sec + first.header.stamp.nanosec * 1e-9 - 16.9
     assert 0.2 <= age_s < 0.2 + 0.2 / 5
+    before = line.estimator.published[topics.DIAGNOSTICS]
     play(line, ticks("none", begin_s=17.2, end_s=18.4))
     line.hear_all()
-    assert last(line).level == DiagnosticStatus.OK
+    assert DiagnosticStatus.OK in [message.status[0].level for message in told[before:]]
     assert_published_is_sound(line)
 
 
