@@ -5,6 +5,7 @@ Stamps and values alone decide, never a clock: a live node and an offline replay
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,8 +18,9 @@ from .reading import NS, Reason, Rejected
 SHORTEST_NS = 5_000_000
 """Least time between two messages of a sensor: 200 a second are more than an estimate needs."""
 
-STUCK_M = 10.0
-"""A train that must have gone so far while its position stays the same to the bit has a stuck sensor."""
+STUCK_STEPS, LEAST_STUCK_M, MOST_STUCK_M = 2.0, 2.0, 10.0
+"""A position that repeats itself to the bit comes in steps, and steps of d alone have the variance d^2/12. A train that
+must have gone so many of the greatest steps that the variance allows, within these bounds, has a stuck sensor."""
 
 STRONGEST_MPS2 = 3.0
 """No train brakes harder."""
@@ -88,8 +90,17 @@ class Guard:
             self.stuck = False
         elif held.before is not None:
             known_s = abs(held.since_ns - held.before.t_ns) / NS
-            slowest = max(held.before.speed_mps - STRONGEST_MPS2 * known_s, 0.0)
-            self.stuck = least_way(slowest, (sample.t_ns - held.since_ns) / NS) >= STUCK_M
+            slowest = max(held.before.speed_mps - 3.0 * held.before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
+            self.stuck = least_way(slowest, (sample.t_ns - held.since_ns) / NS) >= stuck_way(sample.variance_m2)
+
+
+def stuck_way(variance_m2: float) -> float:
+    """Way, m, over which no working sensor of this variance repeats itself.
+
+    >>> [round(stuck_way(std_m**2), 2) for std_m in (0.1, 0.5, 5.0)]
+    [2.0, 3.46, 10.0]
+    """
+    return min(max(STUCK_STEPS * math.sqrt(12.0 * variance_m2), LEAST_STUCK_M), MOST_STUCK_M)
 
 
 def least_way(speed_mps: float, elapsed_s: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 import pytest
@@ -52,6 +52,41 @@ def test_a_stuck_position_is_told_within_2_s(rate_hz: float) -> None:
         pipeline.push(sample)
         told_ns = told_ns or (sample.t_ns if pipeline.stuck else 0)
     assert 30.0 < told_ns / S < 32.0
+
+
+@pytest.mark.parametrize("deceleration", [0.0, 0.6])
+@pytest.mark.parametrize("rate_hz", [5, 10, 50])
+def test_a_slow_train_whose_position_is_stuck_is_told_within_2_s(rate_hz: int, deceleration: float) -> None:
+    """6.5 m/s when it sticks at 24 s, with the brake on since 20 s where it brakes."""
+    pipeline, told_s = Pipeline(FAST, 1), 0.0
+    for t_s, sample in slow(rate_hz, 6.5 + 4.0 * deceleration, deceleration, 0.0):
+        sticks = isinstance(sample, PositionSample) and t_s >= 24.0
+        pipeline.push(PositionSample(sample.t_ns, 100.0, 0.25) if sticks else sample)
+        told_s = told_s or (t_s if pipeline.stuck else 0.0)
+    assert 24.0 < told_s < 26.0
+
+
+def slow(rate_hz: int, speed_mps: float, deceleration: float, step_m: float) -> Iterator[tuple[float, Sample]]:
+    """30 s of a slow train that brakes from 20 s on, measured with 0.5 m of noise and, above 0, in steps."""
+    rng, place_m = np.random.default_rng(1), 0.0
+    for tick in range(30 * rate_hz):
+        t_s = tick / rate_hz
+        braked = t_s >= 20.0 and deceleration > 0.0
+        speed_mps = max(speed_mps - braked * deceleration / rate_hz, 0.0)
+        place_m += speed_mps / rate_hz
+        shown_m = place_m + 0.5 * float(rng.standard_normal()) * (step_m == 0.0)
+        yield t_s, PressureSample(round(t_s * S), 410e3 * braked)
+        yield t_s, PositionSample(round(t_s * S), round(shown_m / step_m) * step_m if step_m else shown_m, 0.25)
+
+
+@pytest.mark.parametrize("rate_hz", [10, 50])
+@pytest.mark.parametrize("speed_mps", [2.0, 6.0, 12.0])
+def test_a_slow_train_with_a_coarse_sensor_is_not_stuck(rate_hz: int, speed_mps: float) -> None:
+    """Steps of 1.7 m, as many as a standard deviation of 0.5 m may stand for; it brakes to a stand."""
+    pipeline = Pipeline(FAST, 1)
+    for _, sample in slow(rate_hz, speed_mps, 0.7, 1.7):
+        pipeline.push(sample)
+        assert not pipeline.stuck
 
 
 def test_while_it_is_stuck_mu_is_withheld_and_the_curve_falls_back_to_the_low_law() -> None:
