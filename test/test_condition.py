@@ -72,6 +72,22 @@ def test_a_patch_is_found_within_seconds_and_counted(seed: int) -> None:
     assert found[-1].mu_std < 0.25 * found[0].mu_std
 
 
+def test_a_step_of_the_positions_is_no_change_of_the_rail() -> None:
+    """A balise corrects the odometry 12 s after the brakes came, at any of the samples between two windows."""
+    for seed in range(6):
+        journey, first = braking(wet(), 15.5, seed), 170 + seed % 5
+        plain = _estimates(Config(), journey)
+        for size_m in (2.0, -2.0):
+            later = [m._replace(position_m=m.position_m + size_m) for m in journey.measurements[first:]]
+            stepped = _estimates(Config(), journey._replace(measurements=journey.measurements[:first] + later))
+            for before, after in zip(plain, stepped, strict=True):
+                assert after.changes == 0
+                assert abs(after.mu - before.mu) < 2.0 * max(before.mu_std, after.mu_std)
+                assert 0.9 * before.mu_lower <= after.mu_lower <= max(journey.truth(after.t_ns), before.mu_lower)
+            moved = stepped[-1].position_m - plain[-1].position_m
+            assert moved == pytest.approx(size_m, abs=3.0 * stepped[-1].position_std_m)
+
+
 def test_a_steady_rail_has_no_changes() -> None:
     for seed in range(3):
         assert _estimates(Config(), braking(wet(), 25.0, seed))[-1].changes == 0

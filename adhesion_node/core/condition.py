@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .braking_window import BrakingWindow, Verdict
-from .changes import change, position_step
+from .changes import Change, change, position_step
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
@@ -36,7 +36,10 @@ STEP_STD_M = 3.0
 """By how much a balise may correct the positions."""
 
 RARER = 5.0
-"""Logarithm of how much rarer such a correction is than a change of the rail; heavy tails look like one."""
+"""Log odds that such a correction needs beyond those of a change of the rail; heavy tails look like one."""
+
+CLEARLY = 2.0
+"""By how much the log odds of one must exceed those of the other; else the next windows decide."""
 
 PLAUSIBLE = 0.005
 """Probability from which a hypothesis may lower the bound."""
@@ -67,7 +70,7 @@ def evaluate_condition(
     `before` is the rail as it was known, which a new braking begins with; `start` the adhesion to start from.
     """
     if not window.hypotheses:
-        window = _opened(config, with_rail(window.prior, before), window._replace(known=before))
+        window = window._replace(hypotheses=_opened(config, with_rail(window.prior, before)), known=before)
     arrays = window_of(window.samples, window.noise.factor)
     found = list[Found]()
     for hypothesis in window.hypotheses:
@@ -76,15 +79,14 @@ def evaluate_condition(
         problem = Problem(model, arrays, hypothesis.belief)
         found.append(_find(config, problem, hypothesis, (start, lowest), near))
     leading = max(found, key=lambda each: each.now.log_weight)
-    changed = _changed(config, leading)
-    if changed is None:
-        following = _following(config, window, found)
-        law, now = _state(leading.now.belief), tuple(each.now for each in found)
+    changed = _changed(config, found, leading)
+    now = tuple(each.now for each in found) if changed is None else changed.hypotheses
+    law = _state(leading.now.belief if changed is None else now[0].belief)
+    if changed is not None and changed.certain:
+        known = None if changed.of_rail else window.known
+        following = BrakingWindow(law, window.samples[-1:], now, window.noise, known=known)
     else:
-        following = _opened(
-            config, changed.belief, BrakingWindow(window.prior, window.samples[-1:], noise=window.noise)
-        )
-        law, now = following.prior, following.hypotheses
+        following = _following(config, window, found)
     regime, rail = _judge(config, now, before, following.known, _limit(config, window, leading))
     return Verdict(
         regime=regime,
@@ -100,10 +102,9 @@ def evaluate_condition(
     )
 
 
-def _opened(config: Config, belief: Belief, window: BrakingWindow) -> BrakingWindow:
-    """The window with all hypotheses, from the law of (s, v, mu) at its first sample."""
-    shapes = hypotheses(config.speed_law, config.low_law, config.law_probability, belief)
-    return window._replace(prior=_state(belief), hypotheses=shapes)
+def _opened(config: Config, belief: Belief) -> tuple[Hypothesis, ...]:
+    """All hypotheses, from the law of (s, v, mu)."""
+    return hypotheses(config.speed_law, config.low_law, config.law_probability, belief)
 
 
 def _state(belief: Belief) -> Gaussian:
@@ -134,25 +135,39 @@ def _find(
 class Changed(NamedTuple):
     """A change within the window."""
 
-    belief: Belief
-    """Law of (s, v, mu) at the newest sample."""
+    hypotheses: tuple[Hypothesis, ...]
+    """At the newest sample."""
     of_rail: bool
     """Of the rail, or only of the positions' origin."""
+    certain: bool
+    """Whether it has happened; else the rail is taken as it was, until the next windows tell."""
 
 
-def _changed(config: Config, leading: Found) -> Changed | None:
-    """The change that the window has seen, of the rail or of the positions, whichever is the likelier."""
-    law, last = leading.before.law, leading.problem.window.steps - EDGE
-    if last < EDGE:
+def _changed(config: Config, found: Sequence[Found], leading: Found) -> Changed | None:
+    """The change that the window has seen, of the rail or of the positions, whichever explains it better."""
+    if leading.problem.window.steps < 2 * EDGE:
         return None
-    jump_std = config.unknown_std / float(law(leading.before.belief.mean[1]))
-    rail = change(leading.problem, leading.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), jump_std)
-    place = position_step(leading.problem, leading.smoothed, np.arange(EDGE, last + 3, dtype=np.intp), STEP_STD_M)
-    log_odds, likelier = max((rail.log_odds, rail), (place.log_odds - RARER, place), key=lambda pair: pair[0])
-    if log_odds < config.change_threshold:
+    rail, place = _rail_change(config, leading), _place_step(leading)
+    if max(rail.log_odds, place.log_odds) < config.change_threshold:
         return None
-    belief = scaled(likelier.belief, float(law(likelier.belief.mean[1])))
-    return Changed(belief, of_rail=likelier is rail)
+    if rail.log_odds > place.log_odds + CLEARLY:
+        belief = scaled(rail.belief, float(leading.before.law(rail.belief.mean[1])))
+        return Changed(_opened(config, belief), of_rail=True, certain=True)
+    # the laws as they weighed before: each explains a part of the step as best it can
+    stepped = tuple(each.before._replace(belief=_place_step(each).belief) for each in found)
+    needed = max(config.change_threshold + RARER, rail.log_odds + CLEARLY)
+    return Changed(stepped, of_rail=False, certain=place.log_odds > needed)
+
+
+def _rail_change(config: Config, found: Found) -> Change:
+    before, last = found.before, found.problem.window.steps - EDGE
+    jump_std = config.unknown_std / float(before.law(before.belief.mean[1]))
+    return change(found.problem, found.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), jump_std)
+
+
+def _place_step(found: Found) -> Change:
+    last = found.problem.window.steps - EDGE + 2
+    return position_step(found.problem, found.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), STEP_STD_M)
 
 
 def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:
