@@ -18,16 +18,13 @@ from .changes import Change, change, position_step
 from .config import Config
 from .gaussian import Gaussian
 from .hypothesis import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
+from .judgement import judge, most_used
 from .noise import learn_noise
-from .outcome import Regime
-from .rail import Rail, learn_bound, lower_bound
+from .rail import Rail
 from .smoother import Search, Smoothed, posterior, smooth
 from .train import Array
 from .window import window_of
 from .window_model import Belief, Model, Problem
-
-UNDECIDED = 0.5
-"""Share of ignorance's standard deviation above which a window has seen too little to tell what limits the motion."""
 
 EDGE = 5
 """Steps at either end of a window in which a change of the rail is not looked for."""
@@ -40,12 +37,6 @@ RARER = 5.0
 
 CLEARLY = 2.0
 """By how much the log odds of one must exceed those of the other; else the next windows decide."""
-
-PLAUSIBLE = 0.005
-"""Probability from which a hypothesis may lower the bound."""
-
-RECENT = 10
-"""Samples over which the wheels are taken to roll or to slide."""
 
 CLEAR = 2.0
 """Standard deviations by which kappa must stay below the brake's limit for a step to tell of it."""
@@ -87,7 +78,8 @@ def evaluate_condition(
         following = BrakingWindow(law, window.samples[-1:], now, window.noise, known=known)
     else:
         following = _following(config, window, found)
-    regime, rail = _judge(config, now, before, following.known, _limit(config, window, leading))
+    limit = most_used(config, window.samples, leading.smoothed.trajectory[:, 1], leading.now.mu)
+    regime, rail = judge(config, now, before, following.known, limit)
     return Verdict(
         regime=regime,
         rail=rail,
@@ -168,45 +160,6 @@ def _rail_change(config: Config, found: Found) -> Change:
 def _place_step(found: Found) -> Change:
     last = found.problem.window.steps - EDGE + 2
     return position_step(found.problem, found.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), STEP_STD_M)
-
-
-def _limit(config: Config, window: BrakingWindow, leading: Found) -> float:
-    """The most that the brake can use, as far as the wheels do not tell better.
-
-    Sliding wheels show that adhesion limits, whatever the brake; rolling ones that the brake does, however weak.
-    """
-    recent = np.array([sample.wheel_mps for sample in window.samples[-RECENT:]])
-    creep = 1.0 - recent / leading.smoothed.trajectory[-recent.size :, 1]
-    measured = creep[np.isfinite(creep)]
-    if measured.size == 0:
-        return window.samples[-1].brake
-    typical = float(np.median(measured))
-    if typical >= config.sliding_creep:
-        return math.inf
-    return leading.now.mu if typical < 0.5 * config.sliding_creep else window.samples[-1].brake
-
-
-def _judge(
-    config: Config, now: Sequence[Hypothesis], before: Rail, known: Rail | None, limit: float
-) -> tuple[Regime, Rail]:
-    """Regime and rail at the newest sample, over all hypotheses; `limit` is the most that the brake can use.
-
-    The bound holds under every hypothesis that is plausible. A braking begins with that of `known`, and must not
-    withdraw it before it has seen anything.
-    """
-    weights, mus = probabilities(now), np.array([each.mu for each in now])
-    variances = np.array([each.variance for each in now]) + config.grade_std**2
-    mu = max(float(weights @ mus), 0.0)
-    std = math.sqrt(float(weights @ (variances + (mus - mu) ** 2)))
-    limit_std = config.brake_error * limit if math.isfinite(limit) else 0.0
-    spreads = np.sqrt(variances + np.where(mus < limit, 0.0, limit_std**2))
-    bounds = lower_bound(np.minimum(mus, limit), spreads, known, config.confidence)
-    lower = min(max(float(np.min(bounds[weights >= PLAUSIBLE])), 0.0), mu)
-    if std > UNDECIDED * config.unknown_std:
-        return Regime.COASTING, Rail(mu, std, lower) if known is None else before
-    if mu + math.hypot(std, limit_std) < limit:
-        return Regime.ADHESION_LIMITED, Rail(mu, std, lower)
-    return Regime.BRAKE_LIMITED, learn_bound(before, Rail(min(mu, limit), std, min(lower, limit)))
 
 
 def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) -> BrakingWindow:
