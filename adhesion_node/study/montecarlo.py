@@ -42,7 +42,7 @@ class Chunk(NamedTuple):
     @property
     def weight(self) -> float:
         """How much work it is, in that of a Kalman filter, about."""
-        return self.seeds * {"particle_em": 6.0, "rail_condition": 2.0}.get(self.method, 1.0)
+        return self.seeds * {"particle_em": 12.0, "rail_condition": 6.0}.get(self.method, 1.0)
 
     @property
     def sources(self) -> tuple[str, ...]:
