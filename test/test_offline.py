@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
+from adhesion_node import cli
 from adhesion_node.bag import BagWriter, deserialize, sensors, serialize
 from adhesion_node.bag.writer import file_name
 from adhesion_node.core import Config, Estimate, Measurement, finish, init, step
@@ -109,8 +111,12 @@ Offline = Callable[..., Outcome]
 
 
 @pytest.fixture
-def offline(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> Offline:
-    """Return a function that runs `replay BAG --offline` with quick settings."""
+def offline(tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Offline:
+    """Return a function that runs `replay BAG --offline` with quick settings.
+
+    It gives no sign of life on standard error: how many there are would depend on the machine's speed.
+    """
+    monkeypatch.setattr(cli, "PROGRESS_S", math.inf)
 
     def _offline(bag: Path, *options: str, fast: bool = True) -> Outcome:
         file = tmp_path / "result.json"
