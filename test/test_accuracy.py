@@ -1,4 +1,4 @@
-"""Simulated runs: accuracy of the paper's method at its nominal noise over seeds and starts, and the regimes."""
+"""Simulated runs: accuracy at the nominal noise over seeds, starts and rates, and the regimes."""
 
 from __future__ import annotations
 
@@ -36,15 +36,31 @@ class Scored(NamedTuple):
     speed_error: np.ndarray
 
 
-def _simulated(name: str, seed: int, until_s: float = math.inf) -> tuple[list[Truth], list[Measurement]]:
+def _simulated(
+    name: str, seed: int, until_s: float = math.inf, rate_hz: float = 10.0
+) -> tuple[list[Truth], list[Measurement]]:
     """Truth and measurements with the nominal 0.5 m."""
-    pairs = [(truth, r) for truth, r in run(find(name), 0.1, seed) if truth.t_ns < until_s * 1e9]
+    pairs = [(truth, r) for truth, r in run(find(name), 1.0 / rate_hz, seed) if truth.t_ns < until_s * 1e9]
     measurements = [
         Measurement(r.t_ns, r.position_m, 0.25, r.pressure_pa - ATMOSPHERE_PA)
         for _, r in pairs
         if r.position_m is not None
     ]
     return [truth for truth, _ in pairs], measurements
+
+
+@pytest.mark.parametrize("rate_hz", [2.0, 50.0, 100.0])
+def test_the_adhesion_is_found_at_other_rates(rate_hz: float) -> None:
+    """50 measurements last 25 s, 1 s, 0.5 s."""
+    simulated, measurements = _simulated("tunnel_entry", 1, 40.0, rate_hz)
+    truths = {truth.t_ns: truth for truth in simulated}
+    _, estimates = drive(Config(track=find("tunnel_entry").track), measurements)
+    late = [(e, truths[e.t_ns].mu) for e in estimates if e.t_ns >= 30e9]
+    assert len(late) >= 4
+    for estimate, true in late:
+        assert estimate.regime is Regime.ADHESION_LIMITED
+        assert estimate.mu == pytest.approx(true, rel=0.06)
+        assert estimate.mu_lower < true
 
 
 @cache

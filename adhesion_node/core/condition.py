@@ -42,6 +42,10 @@ CLEAR = 2.0
 """Standard deviations by which kappa must stay below the brake's limit for a step to tell of it."""
 
 
+SHORT_S = 4.5
+"""Time up to which a window grows beyond S measurements while it cannot yet tell kappa from the brake's limit."""
+
+
 class Found(NamedTuple):
     """What a window says under one hypothesis."""
 
@@ -51,6 +55,11 @@ class Found(NamedTuple):
     smoothed: Smoothed
     now: Hypothesis
     """As it stands at the newest one."""
+
+    @property
+    def margin(self) -> float:
+        """Headroom from which a step tells of kappa."""
+        return CLEAR * math.sqrt(self.now.belief.covariance[2, 2])
 
 
 def evaluate_condition(
@@ -165,14 +174,13 @@ def _place_step(found: Found) -> Change:
 def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) -> BrakingWindow:
     """The window moved on, each hypothesis with the law that the samples left behind give."""
     spent, trajectory = window.spent(config), found[0].smoothed.trajectory
-    if not spent:
+    if not spent or _waits(window, found):
         return window._replace(trajectory=trajectory)
     gone = found[0].problem.window.beginning(spent)
     drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
     passed = []
     for each in found:
-        margin = CLEAR * math.sqrt(each.now.belief.covariance[2, 2])
-        left = posterior(replace(each.problem, window=gone), each.smoothed, margin)
+        left = posterior(replace(each.problem, window=gone), each.smoothed, each.margin)
         weight = each.before.log_weight + left.log_evidence
         passed.append(Hypothesis(each.before.law, drifted(left.belief, drift), weight))
     kept = tuple(
@@ -184,3 +192,9 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
         learn_noise(window.noise, found[0].problem, found[0].smoothed, spent) if config.identify_noise else window.noise
     )
     return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, noise, trajectory[spent:], window.known)
+
+
+def _waits(window: BrakingWindow, found: Sequence[Found]) -> bool:
+    """Whether to leave nothing behind yet, as no step would tell of kappa: S measurements at 50 Hz are but a second."""
+    lasts_s = (window.samples[-1].t_ns - window.samples[0].t_ns) * 1e-9
+    return lasts_s < SHORT_S and all(np.max(each.smoothed.steps.headroom) < each.margin for each in found)
