@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Take the README's pictures of the pages, bags/live.png and bags/report.png, in a real browser.
 
 Usage: PYTHONPATH=.:test python .ci/screenshots.py, with the extras `ros`, `live` and `test`, and with chromium. Takes

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The way of a creep sample: paired, turned into creep and adhesion, identified; the same live and offline."""
 
 from __future__ import annotations

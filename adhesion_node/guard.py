@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Refuses what is well formed and must not be used all the same: too many messages, a stuck sensor, a wrong unit.
 
 Stamps and values alone decide, never a clock: a live node and an offline replay refuse alike.

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The whole line in one process: simulator, estimator, ATP monitor and recorder, with a simulated clock.
 
 The clock waits until all nodes have taken what they were sent, and no node watches the machine's own clock. So a run

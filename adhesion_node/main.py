@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The nodes as programs: signals are taken over first, then the node's module, with numpy and ROS, is imported.
 
 So a Ctrl-C ends a program that is still importing as cleanly as one that spins.

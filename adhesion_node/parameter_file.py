@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Settings of an offline estimator from a ROS parameter file and the command line."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The way of a sample through the estimator, the same for the live node and the offline replay."""
 
 from __future__ import annotations

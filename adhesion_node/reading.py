@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Sensor messages to samples: the one place that knows fields, frames, units and what is plausible.
 
 Takes any object with the fields of the message, so it serves rclpy's messages and those that rosbags reads from a

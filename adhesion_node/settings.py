@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The estimator's settings by name: what its ROS parameters, parameter files and command lines have in common."""
 
 from __future__ import annotations

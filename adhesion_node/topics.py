@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The topics of the package: relative names, message types and what they mean. Pure data, no ROS."""
 
 from __future__ import annotations

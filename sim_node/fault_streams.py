@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Faults of the sensors as functions from a stream of ticks to a stream of ticks.
 
 Every function has the signature of `Change`: it takes the ticks, the `Dose` and a generator of random numbers, and

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The faults by name, as data: what each one does to the run, to the sensors or to their messages, and how much.
 
     simulator --ros-args -p fault:=dropout -p fault_start_s:=30.0 -p fault_duration_s:=5.0

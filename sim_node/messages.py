@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Truth and readings as ROS messages: SI, frame `track`, one stamp for all sensors of a sample."""
 
 from __future__ import annotations

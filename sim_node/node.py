@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The simulator: publishes a scenario's sensors, its truth and /clock.
 
     position, brake_pressure            measurements, one stamp per sample

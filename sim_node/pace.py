@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What both simulators share: the parameters of a run, and a timer that calls for samples as simulated time asks for.
 
 It paces itself by the monotonic clock: with use_sim_time the node's own clock would stand still until this node

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The true train: a point mass integrated in steps of at most 10 ms, with process noise once per sample.
 
 It shares the forces (`core.train`, `core.track`) with the estimator but not the motion model: this one integrates

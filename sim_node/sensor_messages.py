@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What the sensors send, as plain data: a tick holds the truth of a sample and the messages that leave at its time."""
 
 from __future__ import annotations

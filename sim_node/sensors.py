@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The sensors: position with Gaussian or heavy-tailed noise, outliers and dropouts; brake pressure; odometer.
 
 The wheel-speed sensors have a file of their own, `wheels`.

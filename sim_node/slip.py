@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The slip plant: a locomotive whose drive pulls until the wheels creep to the peak, eases off, and pulls again.
 
     J dw/dt = T - r F,   F = mu(l) N g,   l = (r w - v)/v,   M dv/dt = sum F - R

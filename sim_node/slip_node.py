@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The slip simulator: publishes a pulling locomotive's creep sensors, the surface's truth and /clock.
 
     wheel_speed, speed, traction_force  measurements, one stamp per sample

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The wheel-speed sensors: one per axle group, whose wheels roll with micro-creep or slide under slip protection.
 
     w r = v (1 - c)

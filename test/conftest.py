@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What every test shares: a private ROS graph, a fresh context and executor, and bounded waiting.
 
 The tests run on the tree's copy of the packages (`pythonpath` in pyproject.toml), and so do the programs that they

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Simulated runs with a fault through the pipeline, to be held beside the same run without it."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Independent oracles for the core: numpy only, textbook form, with model matrices of their own.
 
 The oracle's train has a resistance that is affine in speed, so that its motion is exactly linear and the Kalman

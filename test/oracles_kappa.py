@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Independent oracles for the rail condition: the oracle's linear train with kappa as a third state.
 
 On a law that does not depend on the speed, mu = kappa floor, its motion is exactly linear in (s, v, kappa), so that

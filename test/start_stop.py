@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Start a node, send it signals at a random moment, and look at what it leaves behind.
 
     python test/start_stop.py 100       # so many tries; exit code 1 when one of them was not clean

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Pairing of the streams by their stamps alone."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Recordings: round trips read back by three readers, equal bytes, interruption, truncation, damage, other forms."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The factorised window against dense numpy matrices."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The studies' batched estimator gives the core's numbers, whatever runs share a batch."""
 
 from __future__ import annotations

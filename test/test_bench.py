@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`bench`: the comparisons run, agree with exact smoothers and have the shape that others rely on. Nothing is timed."""
 
 from __future__ import annotations

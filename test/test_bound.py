@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The posterior Cramér-Rao bound against the information matrix of the whole trajectory, and the published table."""
 
 from __future__ import annotations

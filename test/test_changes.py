@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """A change of the rail within a window against brute force: every instant's dense Gaussian, and their mixture."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The default method over whole brakings of an independent integrator: calibration, outliers, patches, limits, laws."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The configuration: nominal values of model.md, ranges, messages, brake and noise."""
 
 from __future__ import annotations

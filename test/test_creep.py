@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The creep identification sample by sample: estimates, what is withheld and why, what becomes of bad samples."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Pairing of wheel speeds with speeds and forces: by stamps alone, in any order of arrival."""
 
 from __future__ import annotations

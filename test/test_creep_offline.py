@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`replay --offline` of a creep recording: what it reports, and the digest of the live node."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study creep`: the paper's claims as this project states them, the JSON, the figures."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The file of defaults: every parameter of every node with its default, read by ROS and by the offline replay alike."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The demo on a scenario cut short: live equals offline, what it leaves behind, and its words."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What the faults of the sensors cost: each faulty run beside the same run without the fault."""
 
 from __future__ import annotations

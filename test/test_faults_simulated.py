@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The simulator's faults: each one does what its name says, and nothing else."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study robust --only faults`: its figures are those of the runs, and its messages those that the simulator sends."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Whatever a file holds, the readers stand: recordings, CSV logs, parameter files and settings.
 
 Each ends in a result or in a ValueError with a message; never in another exception, never in a hang.

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Whatever the sensors send, the pipeline stands: arbitrary streams of good and bad samples and messages.
 
 Hypothesis draws what follows what: pieces of a real braking, garbage, duplicates, late ones, jumps of the clock.

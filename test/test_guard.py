@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What is refused although it is well formed: a stuck sensor, a flood, km/h; and time that goes back a little."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """A person's own log: units, exact times, a message for every kind of fault, nothing silently dropped."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The layouts for Foxglove and PlotJuggler: of the form that the programs read, every path a field of a topic of ours.
 
 The form is that of the programs' sources: Lichtblick, the open fork of Foxglove, at 66adecb; PlotJuggler at ddcbd05.

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The state-space model, (2)(3)(5)(11): steps by hand, finite differences, scipy's densities; the window's data."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`replay --offline`: what it reports, that it repeats itself to the bit, and every kind of bad input."""
 
 from __future__ import annotations

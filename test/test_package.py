@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The package's papers agree with each other and with the tree: manifest, setup, changelog, README, scripts."""
 
 from __future__ import annotations
@@ -171,6 +174,17 @@ def test_only_bench_imports_its_peers() -> None:
     importing = {path for path in sources() if named.search(path.read_text(encoding="utf-8"))}
     assert {path.name for path in importing} == {f"{peer}_smoother.py" for peer in PEERS}
     assert {path.parent.name for path in importing} == {"bench"}
+
+
+HEAD = "# Copyright 2026 the adhesion_node authors\n# SPDX-License-Identifier: Apache-2.0\n"
+
+
+def test_every_python_file_states_copyright_and_license() -> None:
+    written = [path for folder in (*OWN, "test", ".ci") for path in (ROOT / folder).rglob("*.py")]
+    assert len(written) > len(sources())
+    texts = {path: path.read_text(encoding="utf-8") for path in (*written, ROOT / "setup.py")}
+    bare = [str(path) for path, text in texts.items() if not re.match(rf"(#!.*\n)?{re.escape(HEAD)}", text)]
+    assert not bare
 
 
 REP_2004 = (

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Particle filter and smoother, (24)-(27), against the Kalman/RTS oracle, plain loops and a grid posterior.
 
 Monte-Carlo bounds are K standard errors of the mean over independent runs, seeds fixed.

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`recover` makes a complete recording of an interrupted, cut or foreign one."""
 
 from __future__ import annotations

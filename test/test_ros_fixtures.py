@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The shared fixtures themselves: messages pass, nothing outside is heard, waiting is bounded."""
 
 from __future__ import annotations

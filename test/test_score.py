@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The score of a run: hand-computed, and which estimates count."""
 
 from __future__ import annotations

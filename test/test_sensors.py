@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The sensors: their noise laws, and that no setting of theirs changes the true run."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Series out of a recording: which time counts, what is missing, interpolation between."""
 
 from __future__ import annotations

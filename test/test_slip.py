@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The slip plant: its curve, its balances, its drive and its sensors, against closed forms and a second integrator."""
 
 from __future__ import annotations

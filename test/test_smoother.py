@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The Gaussian smoother of a window: textbook recursions, plain EM, brute force, and the least squares of scipy."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study`: the published braking distances and times, as a table and as JSON."""
 
 from __future__ import annotations

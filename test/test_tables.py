@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study tables`: the figures of a table, the cache, the independence of workers, the JSON and the pictures."""
 
 from __future__ import annotations

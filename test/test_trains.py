@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Ten trains in one network: namespaces keep them apart. And who asks for security gets it or nothing."""
 
 from __future__ import annotations

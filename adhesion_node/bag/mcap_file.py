@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Reads one MCAP file whether or not its recording was finished.
 
 The index at the end of a file is missing when the recorder died, so it is not used at all: one pass over the file

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """One MCAP file while it is written: cut into chunks, with room set aside on the disk for all that has to follow.
 
 A chunk is complete on the disk or not there at all, so what a killed process leaves is a row of complete chunks. The

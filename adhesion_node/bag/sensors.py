@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The sensor messages as CDR, built without ROS: what a simulator or a converter puts into a recording."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Gaussian update of one window: ours as one banded system beside an RTS loop of `filterpy`.
 
 Both look for a constant adhesion of which nothing is known before. Ours ends with the law of the last state, which

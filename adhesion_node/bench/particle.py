@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Particle E and M step of one window: ours, with exact pairwise smoothing, beside the package `particles`.
 
 All use the same model, window, number of particles and M-step. The peers draw trajectories where ours has weights;

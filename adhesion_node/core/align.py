@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Pairs the position, brake-pressure, speed and wheel-speed streams by their stamps, whatever order they arrive in.
 
 A position waits until the pressure of its own time is known, that is, until a pressure with the same or a later

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """A window's normal equations: block-tridiagonal in its states, bordered by one parameter that all steps share.
 
     [ A    c ] [ dx ]   [ b ]

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Posterior Cramér-Rao bound: how well any estimator can know mu from noisy positions of a braking train.
 
 The unknowns are the state (s, v) and the rail condition kappa in mu = kappa law(v), the law being known. With J_k

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The sliding window of one braking: grows to S measurements, then moves on by L (steps 1, 4 and 5 of the paper)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """A change within a window, of the rail or of the positions' origin: when, how likely, and what is known after it.
 
 Every instant is tried with a jump as one more unknown of the window's normal equations, as Willsky and Jones

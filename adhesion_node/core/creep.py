@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Identification of the creep curve, sample by sample, live and offline: `init` and `creep_step`, He et al. 2017.
 
 Every accepted sample updates the sums (12) with the forgetting factor (13); every `every` of them give an estimate

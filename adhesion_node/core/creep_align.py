@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Pairs wheel speeds, train speeds and traction forces by their stamps, whatever order they arrive in.
 
 A wheel speed waits until the other two of its own time are known, that is, until both have come with the same or a

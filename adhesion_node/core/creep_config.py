@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Settings of the creep identification, and what becomes of samples and peaks."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Maximum likelihood with noise on the creep as well as on the adhesion (errors in variables).
 
 The paper's least squares takes the creep as exact. A speed sensor's noise on it bends the fitted curve, and more data

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Recursive least squares of the linear form with forgetting, He et al. 2017, (8)-(13).
 
 With y = (Z, U1, U2) the sum over the data of w y y^T holds all of (10) and (12): its lower right block is H, its first

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The baseline: an extended Kalman filter of (s, v, mu) with the adhesion a random walk.
 
     s' = s + T (v + v')/2 + w_s,   v' = v - T g (min(mu, B) + R) + w_v,   mu' = mu + w_mu     (2)(3)

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Expectation maximisation of the adhesion in one window, Xie et al. 2019, (18)-(34).
 
 The E-step comes in behind the `Smoother` protocol. What the M-step needs of it is small: while adhesion limits,

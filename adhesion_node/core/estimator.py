@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The one way in, live and offline: `init`, `step` for every measurement, `finish` at the end of the data.
 
 A measurement is put in order, gated, and joins the window of the present braking; every L accepted measurements

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Supervision limits before a target, from the braking curve, in the manner of ETCS: SUBSET-026-3, section 3.13.9.
 
 ::

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Gaussian laws of (s, v): the prior that windows hand on, and the two Kalman filters that carry it.
 
 `coast` needs no adhesion: it follows position and speed while the brake tells nothing of them. `filter_window`

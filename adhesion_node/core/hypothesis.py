@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What the rail's adhesion may do while the train slows down: follow a speed law, or stay as it is.
 
 Either way a factor kappa scales it. Each hypothesis has its own Gaussian law of (s, v, kappa) and a weight, which

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The state-space model x = (s, v): step (2)(3), Jacobian, noise and log densities, Xie et al. 2019.
 
     s' = s + T (v + v')/2 + w_s          w_s ~ N(0, q_s T)

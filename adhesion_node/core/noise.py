@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Measurement noise identified by EM: a factor on the variances that the positions come with.
 
 The M-step of a variance is the mean of its expected squared noise over the smoothed window (Shumway and Stoffer 1982).

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What became of a measurement, and which part of the motion can be seen."""
 
 from __future__ import annotations

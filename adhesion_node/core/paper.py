@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The paper's method for one window: mu constant, identified by EM with particles, Xie et al. 2019."""
 
 from __future__ import annotations

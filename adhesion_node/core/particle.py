@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Bootstrap particle filter and marginal smoother of one window, Xie et al. 2019, (24)-(27).
 
 Times run 0..K: time 0 is the prior, times 1..K carry the window's measurements. N particles; weights are kept as

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What is known of the rail: an adhesion, its standard deviation and a lower bound, learnt and forgotten.
 
 While nothing can be seen, the knowledge ages exponentially with time and distance towards the configured

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Settings: dataclass fields that carry their description, unit and range, for checks, parameters and tables."""
 
 from __future__ import annotations

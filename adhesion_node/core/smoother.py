@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Gaussian smoother of a window and its EM for the rail condition kappa.
 
 E-step: all states of the window at once, as one banded system. M-step: kappa. For a linear Gaussian model EM moves

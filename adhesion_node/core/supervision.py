@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Supervision of a target: the present speed against the limits of `etcs`, and what has to be done.
 
 The statuses are those of SUBSET-026-3, section 3.13.10, with the intervention told apart by brake. Whatever is

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The node behind the live page: subscribes to what the other nodes say and keeps a `View` of it.
 
 ::

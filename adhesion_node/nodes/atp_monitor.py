@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The ATP monitor: supervises a target with the braking curve and says what has to be done.
 
 ::

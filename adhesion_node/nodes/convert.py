@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Results to ROS messages, and back for those who consume them; sensor messages are read by `reading`."""
 
 from __future__ import annotations

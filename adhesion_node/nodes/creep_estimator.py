@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The creep estimator: wheel speeds, train speed and traction force in, the peak of the creep curve out.
 
 ::

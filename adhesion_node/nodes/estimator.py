@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The estimator: position and brake pressure in, adhesion with its bound and the braking curves out.
 
 ::

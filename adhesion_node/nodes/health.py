@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """How the estimation stands, for /diagnostics: findings in words, and the numbers behind them."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """ROS parameters from one table per node: typed, with ranges, checked as a whole before the node does anything."""
 
 from __future__ import annotations

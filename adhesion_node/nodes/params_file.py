@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Notices a parameter file that is meant for other nodes: ROS passes over it without a word."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Quality of service of the topics, and the two functions that open a topic by its entry in `topics`."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Notices that a topic has fallen silent. For /diagnostics alone: no result depends on it.
 
 Silence is counted in ticks of a monotonic timer, so that a process that was held up does not blame its sensors. With

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`report BAG`: what a recording shows, as one HTML page that needs no network, and as PNG and PDF pictures.
 
 A recording that holds the results of the estimator is shown as recorded; of one that holds sensor messages alone the

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """From the rows of many runs to the figures of a table: mean errors with their spread, convergence, coverage."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The EM of many runs at once, as `core.em` has it for one."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The core's extended Kalman filter of a window for many runs at once (`core.gaussian.filter_window`)."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The core's particle filter with a leading axis of runs.
 
 R runs whose windows have K steps each; N particles. Every run draws from its own generator in the core's order, so

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The core's particle smoother and the statistics of its E-step, with a leading axis of runs.
 
 The backward kernels are formed for as many steps at a time as stay in the processor's cache.

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Counterparts of Figs. 2, 3, 10-13, 20 and 21 of Xie et al. 2019: the rail, the forces, the brakings without noise."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study creep`: the experiments of He et al. 2017 on the creep curve, and what the paper leaves out.
 
 Experiment 1: one dry rise of the creep, no forgetting; the peak as predicted from creeps up to 0.03. Experiments 2 and

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The counterparts of Figs. 5-11 of He et al. 2017: p1, p2 and the peak, on one surface and over a switch."""
 
 from __future__ import annotations

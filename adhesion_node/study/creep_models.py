@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The counterparts of Figs. 1-3 of He et al. 2017: measured adhesion over creep, Burckhardt's model, Kiencke beside it.
 
 The paper prints no coefficients. Burckhardt's are those he gives for roads; Kiencke's curve has the same initial slope

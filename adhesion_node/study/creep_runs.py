@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The experiments of He et al. 2017, many seeds at once through the recursion that also runs live.
 
 The paper prints neither the surfaces' parameters nor the number of samples nor how the creep moves. Here mu_0 = 20 and

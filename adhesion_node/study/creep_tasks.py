@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The parts of `study creep` as tasks."""
 
 from __future__ import annotations

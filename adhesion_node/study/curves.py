@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Counterparts of Figs. 4-9 and 14-19: adhesion, its error and its relative error over speed, from every start."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The faults of `study robust` as data: what goes wrong from when to when, and how the estimator is set."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The figures of a fault beside B, the same runs without it, from its beginning on.
 
 Errors count while adhesion limits, after the first 30 km/h of braking; B's are those at the same times. Differences to

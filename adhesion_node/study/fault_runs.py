@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The faulty runs of `study robust` as tasks: message by message through the pipeline, as a live node takes them."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The second table of `study robust`: faults of sensors, messages, clock and train, each beside the run without it."""
 
 from __future__ import annotations

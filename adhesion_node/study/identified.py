@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Braking distances by the *identified* adhesion, over Monte-Carlo runs: the paper shows them for the true law only."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study intervention`: where a train is braked by the identified adhesion, by its lower bound and by fixed values.
 
 Replays the reference recordings offline and holds the braking curves of a few speeds against the limits of the ATP

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Many estimators side by side: the core's own `step`, with the windows that fall due together evaluated as one batch.
 
 `step` is pure. Where it comes to a window it is stopped, the windows of all runs are evaluated at once, and the

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The estimators that the tables compare, each from a batch of simulated runs to rows against the truth."""
 
 from __future__ import annotations

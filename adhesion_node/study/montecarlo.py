@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The Monte-Carlo runs of the tables as tasks: a chunk of seeds of one scenario with one method."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What a simulated sensor sends, as objects with the fields of its ROS message: `reading` needs no more, no ROS."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """The runs of `study robust` as tasks: a scenario, its sensors and an estimator's settings, some seeds at a time."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Runs the tasks that the cache lacks, with a progress bar; the numbers do not depend on where they are computed."""
 
 from __future__ import annotations

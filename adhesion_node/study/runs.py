@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """Simulated runs for the studies, and what of an estimate goes into a table."""
 
 from __future__ import annotations

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """`study sensitivity`: what the paper leaves out: the error against position noise, window, step, particles and seeds.
 
 One setting at a time leaves the nominal ones (0.5 m, S = 50, L = 10, M = 20); scenario tunnel_entry, all starts, the

@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """How far a train really runs until it stands: what a braking curve is held against.
 
 The true rail, track and brake of a scenario without process noise, integrated over speed at the places that the train

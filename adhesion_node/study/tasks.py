@@ -1,3 +1,6 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
 """What studies compute: tasks that are pure functions of their fields and of the code, kept in a cache of files.
 
 Fields and code name a task's file. So a study that was killed goes on with the tasks that are missing, and a change

@@ -1,3 +1,6 @@
+// Copyright 2026 the adhesion_node authors
+// SPDX-License-Identifier: Apache-2.0
+
 "use strict";
 // The speed dial in the manner of a driver-machine interface: bands up to the permitted speed, to the service brake's
 // and to the emergency brake's intervention. The bands grow wider with urgency, to be told apart without colours.
