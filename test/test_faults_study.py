@@ -127,6 +127,12 @@ def test_what_is_withheld_counts_for_the_safe_curve_alone() -> None:
     assert found["safe_curve_holds"] == pytest.approx(6 / 7)
 
 
+def test_changes_of_the_rail_are_counted_from_the_fault_on_and_beyond_a_reset() -> None:
+    changes = [0, 1, 1, 2, 2, 0, 0, 1, 5, 5, 5, 5, 5, 5, 5, 6]
+    own, b = arrays([0.001] * 8, runs=2, changes=np.reshape(changes, (2, 8))), arrays([0.001] * 8, runs=2)
+    assert figures(STEP, own, b)["rail_changes"] == 3
+
+
 def test_a_run_counts_what_was_dropped_and_when() -> None:
     case = Case("bad", Plan("nan", 2.0, fault_share=1.0), scenario="cruise")
     (drop,) = one(case, 1)["drops"]

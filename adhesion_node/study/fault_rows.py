@@ -67,6 +67,7 @@ def figures(case: Case, own: Arrays, b: Arrays) -> dict[str, Any]:
         **_errors(runs),
         **_bounds(rows, known),
         **_differences(case, runs),
+        "rail_changes": _changes(known),
         **_recovery(case, own["runs"]["run"], known),
         **_told(case, own["drops"], len(runs)),
         "resets": float(np.mean(own["runs"]["resets"])),
@@ -126,6 +127,12 @@ def _differences(case: Case, runs: Sequence[Beside]) -> dict[str, Any]:
         "within_3_std": _of(np.mean, np.abs(settled) <= NEAR),
         "lowest_difference_std": _of(np.min, lowest),
     }
+
+
+def _changes(known: NDArray[np.void]) -> int:
+    """How many changes of the rail, which does not change in any case, all runs together were told."""
+    told = (known["changes"][known["run"] == seed] for seed in np.unique(known["run"]))
+    return sum(int(np.sum(np.maximum(np.diff(of_run), 0))) for of_run in told)  # a reset counts from 0 again
 
 
 def _recovery(case: Case, seeds: NDArray[np.int64], known: NDArray[np.void]) -> dict[str, Any]:

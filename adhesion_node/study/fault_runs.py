@@ -33,12 +33,13 @@ ROW = np.dtype(
         ("run", np.int64),
         *((name, np.float64) for name in ("t_s", "out_s", "true_mu", "mu", "std", "lower", "safe_m", "true_m")),
         *((name, np.bool_) for name in ("limited", "late", "withheld")),
-        *((name, np.int64) for name in ("window", "fresh")),
+        *((name, np.int64) for name in ("window", "fresh", "changes")),
     ]
 )
 """An estimate under the brake: true times of its measurement and of its publication; length of its safe curve (NaN:
 none) and the true distance to a standstill; whether adhesion truly limits, whether the first 30 km/h of braking are
-over, whether mu is withheld; measurements in its window, and accepted since the fault is over."""
+over, whether mu is withheld; measurements in its window, and accepted since the fault is over; changes of the rail told
+so far."""
 
 RUN = np.dtype([("run", np.int64), ("resets", np.int64), ("finite", np.bool_)])
 """A run: how often the estimation started anew, and whether every number of the estimates was finite."""
@@ -136,7 +137,7 @@ def _rows(case: Case, seed: int, seen: Sequence[Seen], born: Mapping[int, Truth]
             (
                 *(seed, truth.t_ns * 1e-9, s.out_s, truth.mu, *s.prediction.estimate[1:4], _length(s.prediction), way),
                 *(truth.regime == ADHESION_LIMITED, truth.speed_mps < slow_enough, s.prediction.withheld),
-                *(s.prediction.estimate.window, s.accepted - old),
+                *(s.prediction.estimate.window, s.accepted - old, s.prediction.estimate.changes),
             )
             for (s, truth), way in zip(braked, true_m.tolist(), strict=True)
         ],

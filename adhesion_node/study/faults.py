@@ -41,7 +41,7 @@ def lines(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
     """The table for people."""
     yield (
         f"{'fault':>32} {'error %':>7} {'B':>5} {'ratio':>5} {'cover':>5} {'bound':>6}"
-        f" {'safe curve':>10} {'to B, std':>9} {'again s':>7}  dropped in a run, from s on"
+        f" {'safe curve':>10} {'to B, std':>9} {'rail':>4} {'again s':>7}  dropped in a run, from s on"
     )
     for row in rows:
         cells = (
@@ -52,6 +52,7 @@ def lines(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
             _text(row["lower_bound_holds"], "6.3f"),
             _text(row["safe_curve_holds"], "10.3f"),
             _text(row["largest_difference_std"], "9.1f"),
+            f"{row['rail_changes']:4}",
             _text(row["full_window_again_s"], "7.1f"),
         )
         told = row["told_s"]

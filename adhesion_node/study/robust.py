@@ -8,7 +8,8 @@ whose lower bound is not above the true adhesion; *claimed*: those that claim to
 brake limits. The rail changes in low_adhesion_patch only: *found* after, and error again below 10 % after, the fall
 and the rise. The second table, from the beginning of each fault on: *B* is the same run without it; *cover*: of the
 90 % interval; *safe curve*: safe braking curves that are not shorter than the true distance to a standstill; *to B*:
-largest difference after a full window; *again*: longest time from the end of the fault to a full window.
+largest difference after a full window; *rail*: changes of the rail told in all runs, of which none is true; *again*:
+longest time from the end of the fault to a full window.
 """
 
 from __future__ import annotations
