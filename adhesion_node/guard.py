@@ -50,7 +50,7 @@ class Guard:
 
     def refusal(self, sample: Sample, last: Estimate | None) -> Rejected | None:
         """Say why a sample must not be used; None when it may. `last` is the newest estimate."""
-        if isinstance(sample, PositionSample):
+        if isinstance(sample, PositionSample) and 0.0 < sample.variance_m2 < math.inf:  # others are no measurements
             self._watch(sample, last)
             if self.stuck:
                 return Rejected(Reason.STUCK, f"position x = {sample.position_m:.12g}")

@@ -104,7 +104,7 @@ class Pipeline:
             if estimate is not None:
                 predictions += self._published([estimate])
             if self._went_back(measurement.t_ns):
-                return predictions + self.reset()
+                predictions += self.reset()
         return predictions
 
     def _went_back(self, t_ns: int) -> bool:

@@ -19,7 +19,7 @@ from sim_node.scenario import SCENARIOS
 FAULTS = (
     *("no positions for 30 s", "30 % of the positions lost", "5 % outliers of 20 m", "Student t, 2 degrees of freedom"),
     *("0.3 s late, too late", "stamps 100 s back", "stamps stand still for 60 s", "stuck position for 10 s"),
-    *("10, 1, 50 Hz in turn, ±30 %", "balise step of 2 m", "gauge pressure"),
+    *("10, 1, 50 Hz in turn, ±30 %", "balise step of 2 m forward", "gauge pressure"),
     *("the same, grade_std 0.005", "the same, mass_std 0.1"),  # unless told so, no sensor knows of grade and mass
 )
 """Those that the estimator can know of; with the others not a bit changes, or nothing is published."""

@@ -29,6 +29,7 @@ from adhesion_node.core import Config, Measurement, Outcome, align, step
 from adhesion_node.core.align import PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.braking import BrakingCurve
 from adhesion_node.core.braking_window import BrakingWindow
+from adhesion_node.core.condition import SHORT_S
 from adhesion_node.core.em import Search
 from adhesion_node.core.paper import Evaluation, evaluate
 from adhesion_node.core.prediction import Prediction
@@ -109,6 +110,11 @@ def shifted(number: int, origin_ns: int) -> Measurement:
     return GOOD[index]._replace(t_ns=origin_ns + rounds * (GOOD[-1].t_ns + S // 10) + GOOD[index].t_ns)
 
 
+def _lasted_s(window: BrakingWindow, step: int) -> float:
+    """How long it was at most when it was last evaluated."""
+    return (window.samples[-step].t_ns - window.samples[0].t_ns) * 1e-9
+
+
 class Watched:
     """A pipeline whose promises are checked at each sample."""
 
@@ -122,9 +128,11 @@ class Watched:
     def push(self, sample: Sample) -> None:
         self.positions += isinstance(sample, PositionSample)
         self._check(self.pipeline.push(sample))
+        self.refused_positions += isinstance(sample, PositionSample) and self.pipeline.refusal is not None
         pipeline, config = self.pipeline, self.pipeline.config
         window = pipeline.state.window
-        assert window is None or len(window.samples) < config.window + config.step
+        if window is not None and len(window.samples) >= config.window + config.step:
+            assert _lasted_s(window, config.step) < SHORT_S
 
     def refuse(self, topic: str, refusal: Rejected) -> None:
         assert Reason[refusal.reason].value in str(refusal)

@@ -215,3 +215,25 @@ def test_a_reset_forgets_all_but_the_counts() -> None:
     assert [p.estimate for p in feed(again, later)] == [p.estimate for p in feed(fresh, later)]
     assert (again.accepted - counted, again.windows - windows) == (fresh.accepted, fresh.windows)
     assert again.state.counts[Outcome.RESET] == 1
+
+
+@pytest.mark.parametrize("variance_m2", [-0.25, 0.0, float("nan"), float("inf")])
+def test_a_repeated_position_of_any_variance_is_judged_behind_the_guard(variance_m2: float) -> None:
+    pipeline = Pipeline(FAST, 1)
+    feed(pipeline, ride(10.0, 15.0))
+    accepted = pipeline.accepted
+    for tick in (1, 2):
+        pipeline.push(PositionSample(15 * S + tick * S // 10, 1e3, variance_m2))
+    pipeline.finish()
+    assert pipeline.accepted <= accepted + 2
+    assert pipeline.dropped == {"INVALID": 2}
+
+
+def test_what_waits_behind_a_step_back_in_time_is_used_and_counted() -> None:
+    """The pressure that the last positions wait for never comes, so the end of the data finds several of them."""
+    pipeline = Pipeline(Config(max_outliers=1), 1)
+    forth = [PositionSample(k * S // 10, 8.0 * k, 0.25) for k in range(3)]
+    feed(pipeline, [*forth, PressureSample(0, 0.0), forth[0], PressureSample(S // 10, 0.0), forth[1]])
+    pipeline.finish()
+    assert pipeline.measurements == 5
+    assert pipeline.accepted + pipeline.state.counts[Outcome.LATE] == 5
