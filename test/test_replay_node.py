@@ -22,8 +22,8 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from recorded import write_steps
 from rosbags.rosbag2 import StoragePlugin, Writer
-from test_bag import write_steps
 
 from adhesion_node.bag import BagReader, BagWriter, Record, select, sensors, serialize, typestore
 from adhesion_node.nodes import player, replay

@@ -1,0 +1,81 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Messages of every type with known contents, and recordings of them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adhesion_node.bag import (
+    BagWriter,
+    Record,
+    sensors,
+)
+from adhesion_node.topics import BRAKE_PRESSURE, POSITION
+
+S = 10**9
+
+
+def ros_class(type_name: str) -> type[Any]:
+    package, *_, name = type_name.split("/")
+    found: type[Any] = getattr(import_module(f"{package}.msg"), name)
+    return found
+
+
+def filled(type_name: str, numbers: Iterator[int]) -> Any:
+    """Return an rclpy message with another value in every field, sequences of two."""
+    message = ros_class(type_name)()
+    for field, kind in message.get_fields_and_field_types().items():
+        element = kind.removeprefix("sequence<").removesuffix(">").split("[")[0].split(",")[0]
+        count = int(kind.split("[")[1][:-1]) if "[" in kind else 2
+        values = [_value(element, numbers) for _ in range(count)]
+        setattr(message, field, values if "[" in kind or kind.startswith("sequence") else values[0])
+    return message
+
+
+def _value(element: str, numbers: Iterator[int]) -> Any:
+    number = next(numbers)
+    if "/" in element:
+        return filled(element, numbers)
+    if element == "string":
+        return f"text {number}"
+    if element == "octet":
+        return bytes([number % 100])
+    return number + 0.5 if element in ("double", "float") else number % 100
+
+
+def plain(value: Any) -> Any:
+    """Return a message of any of the libraries as nested dicts and lists."""
+    if hasattr(value, "get_fields_and_field_types"):
+        return {name: plain(getattr(value, name)) for name in value.get_fields_and_field_types()}
+    if dataclasses.is_dataclass(value):
+        names = [field.name for field in dataclasses.fields(value)]  # among them the message's constants, OK = 0
+        return {name: plain(getattr(value, name)) for name in names if name.islower() and name != "__msgtype__"}
+    if hasattr(value, "__slots__") and not isinstance(value, (np.ndarray, np.generic, bytes)):
+        return {name: plain(getattr(value, name)) for name in value.__slots__}
+    if isinstance(value, bytes):
+        return value[0]
+    if isinstance(value, (list, tuple, np.ndarray)) or hasattr(value, "tolist"):
+        listed = value.tolist() if hasattr(value, "tolist") else value
+        return [plain(item) for item in listed] if isinstance(listed, (list, tuple)) else listed
+    return value
+
+
+def write_steps(path: Path, steps: int, first: int = 0) -> list[Record]:
+    """Write positions and pressures at 10 Hz and return what was written."""
+    records = []
+    for step in range(first, first + steps):
+        t_ns = step * S // 10
+        records.append(Record("/brake_pressure", BRAKE_PRESSURE.type, sensors.brake_pressure(t_ns, 101325.0), t_ns))
+        records.append(Record("/position", POSITION.type, sensors.position(t_ns, step / 3, 0.25), t_ns))
+    with BagWriter(path) as writer:
+        for record in records:
+            writer.write(*record)
+    return records
