@@ -14,9 +14,9 @@ MANIFEST = ElementTree.parse(HERE / "package.xml")
 
 NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "simulator", "slip_simulator")
 TOOLS = {
-    "import_csv": "adhesion_node.import_csv",
-    "recover": "adhesion_node.recover",
-    "demo": "adhesion_node.demo",
+    "import_csv": "adhesion_node.tools.import_csv",
+    "recover": "adhesion_node.tools.recover",
+    "demo": "adhesion_node.tools.demo",
     "report": "adhesion_node.report.__main__",
     "live": "adhesion_node.live.__main__",
     "study": "adhesion_node.study.__main__",

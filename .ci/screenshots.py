@@ -23,7 +23,9 @@ from adhesion_node.report.__main__ import main as report
 BAGS = Path(__file__).resolve().parent.parent / "bags"
 SHOWN_AT = "45 s"
 PATIENCE_MS = 90_000.0
-DEMO = "from adhesion_node.demo import main; raise SystemExit(main(['--live', '--port', '{}', '--output', r'{}']))"
+DEMO = (
+    "from adhesion_node.tools.demo import main; raise SystemExit(main(['--live', '--port', '{}', '--output', r'{}']))"
+)
 
 
 def picture_live(folder: Path) -> None:

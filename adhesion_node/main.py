@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 
-from .signals import stop_on_signals
+from .command.signals import stop_on_signals
 
 
 def _node(module: str) -> Callable[[], int]:
@@ -27,8 +27,8 @@ estimator = _node("adhesion_node.nodes.estimator")
 creep_estimator = _node("adhesion_node.nodes.creep_estimator")
 atp_monitor = _node("adhesion_node.nodes.atp_monitor")
 recorder = _node("adhesion_node.nodes.recorder")
-simulator = _node("sim_node.node")
-slip_simulator = _node("sim_node.slip_node")
+simulator = _node("sim_node.nodes.simulator")
+slip_simulator = _node("sim_node.nodes.slip_simulator")
 
 
 def replay() -> int:

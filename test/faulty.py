@@ -13,17 +13,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from adhesion_node import reading, topics
 from adhesion_node.core import Config, Estimate
-from adhesion_node.core.align import Sample
+from adhesion_node.core.intake.inbox import Sample
+from adhesion_node.core.physics.train import Array
 from adhesion_node.core.prediction import Prediction
-from adhesion_node.core.train import Array
-from adhesion_node.pipeline import Pipeline
-from sim_node.faults import Plan, faulty_run, period_of
-from sim_node.messages import message_of
-from sim_node.plant import Truth
-from sim_node.scenario import find
-from sim_node.sensors import SensorSettings
+from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.wire import codecs as reading
+from adhesion_node.wire import topics
+from sim_node.faults.plan import Plan, faulty_run, period_of
+from sim_node.nodes.messages import message_of
+from sim_node.train.plant import Truth
+from sim_node.train.scenario import find
+from sim_node.train.sensors import SensorSettings
 
 S = 10**9
 SETTINGS = SensorSettings()

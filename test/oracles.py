@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from adhesion_node.core import Config, Estimate, State, finish, init, step
-from adhesion_node.core.em import Expectation
-from adhesion_node.core.gaussian import Gaussian
-from adhesion_node.core.measurement import Measurement
-from adhesion_node.core.motion import Motion
-from adhesion_node.core.track import LEVEL
-from adhesion_node.core.train import Train
-from adhesion_node.core.window import Window
+from adhesion_node.core.belief.gaussian import Gaussian
+from adhesion_node.core.belief.window import Window
+from adhesion_node.core.intake.samples import Measurement
+from adhesion_node.core.methods.particle_em.em import Expectation
+from adhesion_node.core.physics.motion import Motion
+from adhesion_node.core.physics.track import LEVEL
+from adhesion_node.core.physics.train import Train
 
 Array = NDArray[np.float64]
 G = 9.8

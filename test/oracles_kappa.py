@@ -18,10 +18,10 @@ import numpy as np
 from oracles import Array, Linear, rts
 from scipy import stats
 
-from adhesion_node.core.adhesion import SpeedLaw
-from adhesion_node.core.gaussian import Gaussian
-from adhesion_node.core.window import Window
-from adhesion_node.core.window_model import Belief, Model, Problem
+from adhesion_node.core.belief.gaussian import Gaussian
+from adhesion_node.core.belief.window import Window
+from adhesion_node.core.methods.rail_condition.problem import Belief, Model, Problem
+from adhesion_node.core.physics.adhesion import SpeedLaw
 
 
 class Conditioned(NamedTuple):

@@ -13,12 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from adhesion_node.bag import (
-    BagWriter,
-    Record,
-    sensors,
-)
-from adhesion_node.topics import BRAKE_PRESSURE, POSITION
+from adhesion_node.bag import BagWriter, Record, sensors
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
 

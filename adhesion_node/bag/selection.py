@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from .. import topics
+from ..wire import topics
 from .types import same_name
 
 _OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH)}

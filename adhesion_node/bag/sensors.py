@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED
+from ..wire.topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED
 from .types import serialize, typestore
 
 NS = 1_000_000_000

@@ -15,7 +15,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
 
-from ..cli import DONE, help_texts, json_option, report, run_tool
+from ..command.options import DONE, help_texts, json_option, report, run_tool
 from . import gaussian, particle, step
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."

@@ -10,12 +10,12 @@ from typing import NamedTuple
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from ..core.em import expectation, maximise
-from ..core.gaussian import Gaussian
-from ..core.motion import Motion
-from ..core.particle import Particles, Smoothed
-from ..core.train import Array
-from ..core.window import Window
+from ..core.belief.gaussian import Gaussian
+from ..core.belief.window import Window
+from ..core.methods.particle_em.em import expectation, maximise
+from ..core.methods.particle_em.particles import Particles, Smoothed
+from ..core.physics.motion import Motion
+from ..core.physics.train import Array
 from .scene import Update
 
 SPEED_STEP_MPS = 1e-3

@@ -15,9 +15,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.adhesion import SpeedLaw
-from ..core.smoother import Search, posterior, smooth
-from ..core.window_model import Belief, Model, Problem
+from ..core.methods.rail_condition.problem import Belief, Model, Problem
+from ..core.methods.rail_condition.smoother import Search, posterior, smooth
+from ..core.physics.adhesion import SpeedLaw
 from .scene import Scene, Update, braking_window
 from .timing import Contender, Timed, figures, interleave
 
@@ -41,7 +41,7 @@ NOTHING_KNOWN = 1e3
 
 def compare(steps: int, rounds: int, seed: int) -> list[dict[str, Any]]:
     """Rows of the table for a window of so many steps."""
-    from . import filterpy_smoother  # the peer is an extra
+    from . import filterpy_smoother
 
     scene = braking_window(steps, np.random.default_rng(seed))
     em = partial(filterpy_smoother.em, *scene, START_MU)

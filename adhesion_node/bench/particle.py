@@ -16,9 +16,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.em import expectation, maximise
-from ..core.particle import Particles, Smoothed, particle_filter, particle_smoother
-from ..core.train import Array
+from ..core.methods.particle_em.em import expectation, maximise
+from ..core.methods.particle_em.particles import Particles, Smoothed, particle_filter, particle_smoother
+from ..core.physics.train import Array
 from .scene import MU, Scene, braking_window
 from .timing import Contender, Timed, figures, interleave
 
@@ -38,7 +38,7 @@ class Result(NamedTuple):
 
 def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, Any]]:
     """Rows of the table for windows of so many steps and so many particles."""
-    from . import particles_smoother  # the peer is an extra
+    from . import particles_smoother
 
     rng = np.random.default_rng(seed)
     scene = braking_window(steps, rng)

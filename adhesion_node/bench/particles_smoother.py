@@ -12,7 +12,7 @@ import particles
 from particles import distributions
 from particles.state_space_models import Bootstrap, StateSpaceModel
 
-from ..core.train import Array
+from ..core.physics.train import Array
 from .scene import Scene
 
 UNSEEN_M = 1e6

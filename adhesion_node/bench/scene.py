@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.adhesion import WET
-from ..core.align import PositionSample, PressureSample
+from ..core.belief.gaussian import Gaussian
+from ..core.belief.window import Window
 from ..core.config import Config
-from ..core.gaussian import Gaussian
-from ..core.motion import Motion
-from ..core.train import GRAVITY, KMH, Array, Train
-from ..core.window import Window
+from ..core.intake.inbox import PositionSample, PressureSample
+from ..core.physics.adhesion import WET
+from ..core.physics.motion import Motion
+from ..core.physics.train import GRAVITY, KMH, Array, Train
 
 SIGMA_M = 0.5
 MU = 0.0726

@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..cli import progress
-from ..core.align import PositionSample, PressureSample
+from ..command.options import progress
 from ..core.config import Config
-from ..pipeline import Pipeline
+from ..core.intake.inbox import PositionSample, PressureSample
+from ..run.pipeline import Pipeline
 from .scene import journey
 from .timing import figures
 

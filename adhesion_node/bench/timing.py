@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..cli import progress
+from ..command.options import progress
 
 Result = TypeVar("Result")
 

@@ -3,10 +3,10 @@
 
 """The estimator as pure functions of arrays: no ROS, no files, no clock, no logging."""
 
+from .belief.outcome import Outcome, Regime
 from .config import Config
 from .estimate import Estimate
 from .estimator import State, finish, init, step
-from .measurement import Measurement
-from .outcome import Outcome, Regime
+from .intake.samples import Measurement
 
 __all__ = ["Config", "Estimate", "Measurement", "Outcome", "Regime", "State", "finish", "init", "step"]

@@ -8,11 +8,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from .adhesion import LAWS, SpeedLaw
-from .motion import Motion
+from .physics.adhesion import LAWS, SpeedLaw
+from .physics.motion import Motion
+from .physics.track import LEVEL, Track
+from .physics.train import CRH3, KMH, Train
 from .setting import check_settings, setting
-from .track import LEVEL, Track
-from .train import CRH3, KMH, Train
 
 
 @dataclass(frozen=True, slots=True)

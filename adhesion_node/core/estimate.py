@@ -9,16 +9,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .adhesion import SpeedLaw
-from .braking_window import BrakingWindow, Verdict
-from .condition import evaluate_condition
+from .belief.gaussian import Gaussian
+from .belief.outcome import Regime
+from .belief.rail import Rail, age, ignorance
 from .config import Config
-from .em import Search
-from .gaussian import Gaussian
-from .measurement import Measurement
-from .outcome import Regime
-from .paper import Evaluate, evaluate, judge
-from .rail import Rail, age, ignorance
+from .intake.samples import Measurement
+from .methods.particle_em.em import Search
+from .methods.particle_em.method import Evaluate, evaluate, judge
+from .methods.protocol import BrakingWindow, Verdict
+from .methods.rail_condition.method import evaluate_condition
+from .physics.adhesion import SpeedLaw
 
 LOWEST_NET_ADHESION = -0.05
 """Where the brake pressure is not measured, traction may be at work: the net force may point forward."""

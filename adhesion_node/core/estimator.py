@@ -16,15 +16,15 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from . import tracker
-from .braking_window import BrakingWindow
+from .belief import tracker
+from .belief.gaussian import Gaussian
+from .belief.outcome import Outcome
+from .belief.window import Sample
 from .config import Config
 from .estimate import Estimate, Knowledge, Result, estimate
-from .gaussian import Gaussian
-from .measurement import Measurement
-from .outcome import Outcome
-from .paper import Evaluate, evaluate
-from .window import Sample
+from .intake.samples import Measurement
+from .methods.particle_em.method import Evaluate, evaluate
+from .methods.protocol import BrakingWindow
 
 SLOWEST_MPS = 3.0
 """Speed below which the windows stop: a train about to stand still says nothing of the adhesion."""

@@ -11,12 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
-from . import braking
-from .adhesion import AdhesionLaw
-from .braking import BrakingCurve
 from .config import Config
 from .estimate import Estimate
-from .train import Train
+from .physics import braking
+from .physics.adhesion import AdhesionLaw
+from .physics.braking import BrakingCurve
+from .physics.train import Train
 
 
 class Prediction(NamedTuple):

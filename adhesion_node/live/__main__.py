@@ -9,8 +9,8 @@ import argparse
 import sys
 from collections.abc import Sequence
 
-from ..cli import help_texts, run_tool
-from ..nodes import runtime
+from ..command.options import help_texts, run_tool
+from ..nodes.ros import runtime
 from .address import address_options
 from .node import Live
 

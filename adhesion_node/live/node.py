@@ -16,9 +16,11 @@ from typing import Any
 
 from rclpy.node import Node
 
-from .. import reading, topics
-from ..core.measurement import MAX_POSITION_M
-from ..nodes import convert, qos
+from ..core.intake.samples import MAX_POSITION_M
+from ..nodes.ros import messages as convert
+from ..nodes.ros import qos
+from ..wire import codecs as reading
+from ..wire import topics
 from .view import View
 
 PERIOD_S = 0.1

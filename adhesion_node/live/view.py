@@ -13,10 +13,10 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.braking import BrakingCurve
-from ..core.supervision import TrainState
-from ..core.train import KMH
-from ..topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, POSITION, SPEED, STATE, Topic
+from ..core.atp.supervision import TrainState
+from ..core.physics.braking import BrakingCurve
+from ..core.physics.train import KMH
+from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, POSITION, SPEED, STATE, Topic
 
 EXPECTED = {
     POSITION: "position",

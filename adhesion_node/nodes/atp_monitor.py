@@ -22,10 +22,8 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
-from adhesion_node import reading, topics
-from adhesion_node.core.etcs_config import SupervisionConfig
-from adhesion_node.core.setting import setting, settings_of
-from adhesion_node.core.supervision import (
+from adhesion_node.core.atp.config import SupervisionConfig
+from adhesion_node.core.atp.supervision import (
     NS_PER_S,
     Decision,
     Level,
@@ -36,10 +34,14 @@ from adhesion_node.core.supervision import (
     decide,
     unsafe,
 )
-from adhesion_node.topics import Topic
+from adhesion_node.core.setting import setting, settings_of
+from adhesion_node.wire import codecs as reading
+from adhesion_node.wire import topics
+from adhesion_node.wire.topics import Topic
 
-from . import convert, qos, runtime
-from .params import declare, spec_of
+from .ros import messages as convert
+from .ros import qos, runtime
+from .ros.params import declare, spec_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,17 +19,19 @@ from typing import Any
 
 from rclpy.node import Node
 
-from adhesion_node import reading, topics
-from adhesion_node.core.creep import CreepEstimate
-from adhesion_node.core.creep_config import CreepOutcome
-from adhesion_node.core.supervision import Severity
-from adhesion_node.creep_pipeline import READERS, SETTINGS, CreepPipeline, setup_of
-from adhesion_node.topics import Topic
+from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.core.creep.config import CreepOutcome
+from adhesion_node.core.creep.estimator import CreepEstimate
+from adhesion_node.run.creep_pipeline import READERS, SETTINGS, CreepPipeline, setup_of
+from adhesion_node.wire import codecs as reading
+from adhesion_node.wire import topics
+from adhesion_node.wire.topics import Topic
 
-from . import convert, qos, runtime
-from .diagnostics import Finding, next_stamp, status_message
-from .intake import Intake
-from .params import declare, spec_of
+from .ros import messages as convert
+from .ros import qos, runtime
+from .ros.diagnostics import Finding, next_stamp, status_message
+from .ros.intake import Intake
+from .ros.params import declare, spec_of
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
 

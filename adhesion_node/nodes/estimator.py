@@ -21,18 +21,20 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from adhesion_node import reading, topics
 from adhesion_node.core import Config, Estimate
 from adhesion_node.core.prediction import Prediction
-from adhesion_node.pipeline import Pipeline
-from adhesion_node.settings import SETTINGS, setup_of
-from adhesion_node.topics import Topic
+from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.wire import codecs as reading
+from adhesion_node.wire import topics
+from adhesion_node.wire.settings import SETTINGS, setup_of
+from adhesion_node.wire.topics import Topic
 
-from . import convert, qos, runtime
-from .diagnostics import next_stamp, status_message
 from .health import findings, values
-from .intake import Intake
-from .params import declare, spec_of
+from .ros import messages as convert
+from .ros import qos, runtime
+from .ros.diagnostics import next_stamp, status_message
+from .ros.intake import Intake
+from .ros.params import declare, spec_of
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
 

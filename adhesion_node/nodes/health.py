@@ -6,11 +6,11 @@
 from __future__ import annotations
 
 from adhesion_node.core import Estimate, Outcome, Regime
-from adhesion_node.core.supervision import Severity
-from adhesion_node.pipeline import Pipeline
-from adhesion_node.reading import Reason
+from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.wire.codecs import Reason
 
-from .diagnostics import Finding
+from .ros.diagnostics import Finding
 
 UNMEASURED = "no brake pressure: a full brake is assumed"
 

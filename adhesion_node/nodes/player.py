@@ -20,9 +20,9 @@ from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
-from .. import topics
 from ..bag import BagReader, Record
-from .qos import SENSOR_PUBLISHER, advertise
+from ..wire import topics
+from .ros.qos import SENSOR_PUBLISHER, advertise
 
 PERIOD_S, RUSH_PERIOD_S = 0.002, 0.0005
 """Between two ticks at a given rate and as fast as possible."""

@@ -20,12 +20,12 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosgraph_msgs.msg import Clock
 
-from .. import topics
 from ..bag import BagWriter, Limits, deserialize, serialize
 from ..bag.writer import MB
-from ..cli import help_texts, run_tool
-from . import runtime
-from .qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
+from ..command.options import help_texts, run_tool
+from ..wire import topics
+from .ros import runtime
+from .ros.qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 from functools import partial
 
 from ..bag import BagReader, parse_remap, select
-from ..cli import DONE, FAILED, help_texts, json_option, report, run_tool
-from ..topics import POSITION
+from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
+from ..wire.topics import POSITION
 
 EXAMPLES = (
     "replay my_run --offline",
@@ -31,15 +31,15 @@ def main(args: Sequence[str] | None = None) -> int:
     if "--offline" in arguments:
         return run_tool(_parser(), _offline, arguments)
     # Only here: ROS is neither needed nor loaded for --offline.
-    from . import runtime
+    from .ros import runtime
 
     own, ros = runtime.split_ros_arguments(arguments)
     return run_tool(_parser(), partial(_live, ros=ros), own)
 
 
 def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
-    from . import runtime
     from .player import Replay
+    from .ros import runtime
 
     if options.set or options.params or options.seed is not None or options.estimator is not None:
         own = "--set, --params, --seed and --estimator are for --offline"
@@ -66,7 +66,7 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
 
 
 def _offline(options: argparse.Namespace) -> int:
-    from .. import creep_offline, offline
+    from ..run import creep_offline, offline
 
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 from ..bag import BagReader, parse_remap, select
-from ..cli import DONE, help_texts, json_option, report, run_tool
-from ..offline import parameters_of
-from ..settings import Setup, setup_of
+from ..command.options import DONE, help_texts, json_option, report, run_tool
+from ..run.offline import parameters_of
+from ..wire.settings import Setup, setup_of
 from .curves import Subject
 from .estimated import estimate_run
 from .findings import findings

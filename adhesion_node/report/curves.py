@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core import Config, Regime, braking
-from ..core.train import KMH, Array
-from ..reading import ATMOSPHERE_PA
+from ..core import Config, Regime
+from ..core.physics import braking
+from ..core.physics.train import KMH, Array
+from ..wire.codecs import ATMOSPHERE_PA
 from .findings import distances, first_identified
 from .run import FIXED_MU, Curve, Run, bands
 from .series import Series, Times

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from .. import offline
 from ..bag import BagReader
-from ..cli import progress
-from ..core.braking import BrakingCurve
+from ..command.options import progress
+from ..core.physics.braking import BrakingCurve
 from ..core.prediction import Prediction
-from ..pipeline import Pipeline
-from ..score import Truth
-from ..settings import Setup
-from ..topics import BRAKE_PRESSURE, TRUTH_MU, TRUTH_STATE, Topic
+from ..run import offline
+from ..run.pipeline import Pipeline
+from ..run.score import Truth
+from ..wire.settings import Setup
+from ..wire.topics import BRAKE_PRESSURE, TRUTH_MU, TRUTH_STATE, Topic
 from .run import Curve, Run, position_of, speed_of
 from .series import Series, read_series
 

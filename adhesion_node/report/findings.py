@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core import Config, Regime
-from ..core.train import KMH, Array, Train
-from ..reading import ATMOSPHERE_PA
-from ..score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
+from ..core.physics.train import KMH, Array, Train
+from ..run.score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
+from ..wire.codecs import ATMOSPHERE_PA
 from .run import FIXED_MU, Run, distance_to_target
 from .series import Series
 

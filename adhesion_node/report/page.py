@@ -11,8 +11,8 @@ from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
-from ..settings import SETTINGS
 from ..web import as_json, page
+from ..wire.settings import SETTINGS
 from .curves import Subject, changes, chart_data
 from .findings import findings
 from .run import FIXED_MU

@@ -13,8 +13,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from ..core.train import CRH3, KMH, Train
-from ..reading import ATMOSPHERE_PA
+from ..core.physics.train import CRH3, KMH, Train
+from ..wire.codecs import ATMOSPHERE_PA
 from .findings import Distances, distances
 from .run import FIXED_MU, Run, bands
 

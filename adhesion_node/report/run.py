@@ -12,11 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import reading
 from ..bag import BagReader
-from ..core import Regime, braking
-from ..core.train import Array, Train
-from ..topics import (
+from ..core import Regime
+from ..core.physics import braking
+from ..core.physics.train import Array, Train
+from ..wire import codecs as reading
+from ..wire.topics import (
     ATP_STATUS,
     BRAKE_PRESSURE,
     BRAKING_CURVE,

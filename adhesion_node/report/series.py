@@ -11,10 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import reading
 from ..bag import BagReader
-from ..core.train import Array
-from ..topics import Topic
+from ..core.physics.train import Array
+from ..wire import codecs as reading
+from ..wire.topics import Topic
 
 Times = NDArray[np.int64]
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.train import CRH3, KMH, Train
+from ..core.physics.train import CRH3, KMH, Train
 from .findings import distances
 from .run import FIXED_MU, Run
 

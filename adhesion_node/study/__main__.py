@@ -8,8 +8,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from ..cli import help_texts, json_option, run_tool
-from . import bound, creep, distances, intervention, robust, sensitivity, tables, tune_ekf
+from ..command.options import help_texts, json_option, run_tool
+from .baselines import tune_ekf
+from .bound import study as bound
+from .he import study as creep
+from .intervention import study as intervention
+from .robust import study as robust
+from .xie import distances, sensitivity, tables
 
 PURPOSE = "Reproduces the figures of the papers, and shows what follows from them."
 

@@ -1,0 +1,90 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What the rail's adhesion may do while the train slows down: follow a speed law, or stay as it is.
+
+Either way a factor kappa scales it. Each hypothesis has its own Gaussian law of (s, v, kappa) and a weight, which
+the measurements shift by their evidence.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ...belief.gaussian import Gaussian
+from ...belief.rail import Rail
+from ...physics.adhesion import SpeedLaw
+from ...physics.train import Array
+from .problem import Belief
+
+NEGLIGIBLE = 1e-4
+"""Probability below which a hypothesis is given up, until the rail changes."""
+
+
+class Hypothesis(NamedTuple):
+    """One shape of the adhesion over speed."""
+
+    law: SpeedLaw
+    belief: Belief
+    """Law of (s, v, kappa) at some instant."""
+    log_weight: float
+
+    @property
+    def mu(self) -> float:
+        """Adhesion at that instant."""
+        _, speed, kappa = self.belief.mean
+        return float(kappa * self.law(speed))
+
+    @property
+    def variance(self) -> float:
+        """Variance of `mu`."""
+        _, speed, kappa = self.belief.mean
+        slope = np.array([kappa * self.law.slope(speed), self.law(speed)])
+        return float(slope @ self.belief.covariance[1:, 1:] @ slope)
+
+
+def hypotheses(law: SpeedLaw, other: SpeedLaw, probability: float, belief: Belief) -> tuple[Hypothesis, ...]:
+    """The speed law with that probability, another one and constant adhesion; all know the same of mu.
+
+    `belief` is that of (s, v, mu).
+    """
+    constant = SpeedLaw(float(law(belief.mean[1])))
+    rest = (1.0 - probability) / 2.0
+    return tuple(
+        Hypothesis(shape, scaled(belief, 1.0 / float(shape(belief.mean[1]))), math.log(weight))
+        for shape, weight in ((law, probability), (other, rest), (constant, rest))
+        if weight > 0.0
+    )
+
+
+def scaled(belief: Belief, factor: float) -> Belief:
+    """Law of (s, v, factor x) of the law of (s, v, x)."""
+    by = np.array([1.0, 1.0, factor])
+    return Belief(belief.mean * by, belief.covariance * np.outer(by, by))
+
+
+def with_rail(state: Gaussian, rail: Rail) -> Belief:
+    """Law of (s, v, mu) where the state tells nothing of the rail."""
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = state.covariance
+    covariance[2, 2] = rail.std**2
+    return Belief(np.array([*state.mean, rail.mu]), covariance)
+
+
+def probabilities(hypotheses: Sequence[Hypothesis]) -> Array:
+    """Normalised weights, shape (H,)."""
+    logs = np.array([hypothesis.log_weight for hypothesis in hypotheses])
+    weights = np.exp(logs - np.max(logs))
+    result: Array = weights / np.sum(weights)
+    return result
+
+
+def drifted(belief: Belief, variance: float) -> Belief:
+    """Law after kappa has drifted, relative to itself, by that variance."""
+    covariance = belief.covariance.copy()
+    covariance[2, 2] += variance * belief.mean[2] ** 2
+    return belief._replace(covariance=covariance)

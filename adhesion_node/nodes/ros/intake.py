@@ -1,0 +1,133 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The way of sensor messages into a node: subscribed, counted, read or refused, and what an operator must know."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from typing import Any, Protocol
+
+from rclpy.clock import ROSClock
+from rclpy.node import Node
+
+from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import NS, Reason, Rejected
+from adhesion_node.wire.topics import Topic
+
+from . import qos
+from .diagnostics import Finding
+from .silence import Silence
+
+Read = Callable[[Any, str], Any]
+"""Reads a message that must be in a frame; raises Rejected."""
+
+
+class Listener(Protocol):
+    """What a node does with what comes in."""
+
+    def take(self, topic: Topic, sample: Any) -> None:
+        """Use a sample."""
+
+    def refuse(self, topic: Topic, refusal: Rejected) -> None:
+        """Count a message that was refused."""
+
+    def report(self) -> None:
+        """Publish the state of affairs in /diagnostics."""
+
+
+class Intake:
+    """Subscribes the sensors in `readers`; the last one of them must not fall silent for longer than `timeout_s`.
+
+    `heard` counts the messages by topic, refused ones included. While `enabled` is False all are refused.
+    """
+
+    def __init__(
+        self, node: Node, listener: Listener, readers: Mapping[Topic, Read], frame: str, timeout_s: float
+    ) -> None:
+        self.heard: Counter[Topic] = Counter()
+        self.enabled = True
+        self._node, self._listener, self._frame = node, listener, frame
+        self._newest_ns = 0
+        self._counts: Counter[str] = Counter()
+        self._refusals: dict[str, str] = {}
+        self._events: dict[str, str] = {}
+        self._watched = list(readers)[-1]
+        self._watched_name = node.resolve_topic_name(self._watched.name)
+        self._silence = Silence(node, timeout_s, listener.report)
+        for topic, read in readers.items():
+            qos.subscribe(node, topic, self._receiver(topic, read), qos.SENSOR_SUBSCRIPTION, tell=self.tell)
+        node.get_logger().info(f"ready: waiting for {self._watched_name}")
+
+    @property
+    def now_ns(self) -> int:
+        """The newest stamp, moved on by the silence since."""
+        return self._newest_ns + round((self._silence.for_s or 0.0) * NS)
+
+    def note(self, topic: Topic, refusal: Rejected) -> None:
+        """Keep a refusal for the next report; the 1st, 2nd, 4th, 8th ... of a reason is logged and reported at once."""
+        self._counts[refusal.reason] += 1
+        count = self._counts[refusal.reason]
+        self._refusals[refusal.reason] = f"{topic.name}: message refused: {refusal} ({count} so far)"
+        if count & (count - 1) == 0:
+            self._node.get_logger().warning(self._refusals[refusal.reason])
+            self._listener.report()
+
+    def tell(self, event: str) -> None:
+        """Keep an event of DDS, the last one of each topic, log and report it at once."""
+        self._events[event.partition(":")[0]] = event
+        self._node.get_logger().warning(event)
+        self._listener.report()
+
+    def findings(self) -> list[Finding]:
+        """Return what is wrong now and what has been refused or has happened since the last call."""
+        found = [Finding(Severity.WARN, text) for text in (*self._refusals.values(), *self._events.values())]
+        self._refusals.clear()
+        # What happened to the watched topic stands until that is heard again: it may be why it is silent.
+        self._events = {name: text for name, text in self._events.items() if name == self._watched_name}
+        if self._silence.for_s is not None:
+            found.append(Finding(Severity.STALE, self._silent(self._silence.for_s)))
+        if not self.enabled:
+            found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
+        clocks = self._clocks()
+        if clocks > 1:
+            found.append(
+                Finding(Severity.WARN, f"{clocks} publishers of {topics.CLOCK.name}: time jumps, stop all but one")
+            )
+        return found
+
+    def _silent(self, for_s: float) -> str:
+        name = self._watched_name
+        if self._silence.ever_heard:
+            return f"{name}: nothing for {for_s:.1f} s: is the sensor alive? If it is that slow, raise sensor_timeout_s"
+        publishers = self._node.count_publishers(name)
+        return f"{name}: nothing received yet, publishers: {publishers}: is the sensor running, its topic remapped?"
+
+    def _clocks(self) -> int:
+        clock = self._node.get_clock()
+        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
+        return self._node.count_publishers(topics.CLOCK.name) if simulated else 0
+
+    def _receiver(self, topic: Topic, read: Read) -> Callable[[Any], None]:
+        def receive(message: Any) -> None:
+            self.heard[topic] += 1
+            if topic == self._watched:
+                self._silence.heard()
+                self._events.pop(self._watched_name, None)
+            try:
+                sample = self._sample(read, message)
+            except Rejected as refusal:
+                self._listener.refuse(topic, refusal)
+                self.note(topic, refusal)
+            else:
+                self._newest_ns = sample.t_ns
+                self._listener.take(topic, sample)
+
+        return receive
+
+    def _sample(self, read: Read, message: Any) -> Any:
+        if not self.enabled:
+            raise Rejected(Reason.DISABLED, "disabled")
+        return read(message, self._frame)

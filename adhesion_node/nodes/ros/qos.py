@@ -1,0 +1,124 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Quality of service of the topics, and the two functions that open a topic by its entry in `topics`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from copy import copy
+from importlib import import_module
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.duration import Duration
+from rclpy.exceptions import ParameterException
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
+from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
+from rclpy.subscription import Subscription
+
+from adhesion_node.wire.topics import Topic
+
+from .qos_events import Tell, of_publisher, of_subscription
+
+MAX_DEPTH = 10_000
+"""Longest queue that an override may ask for: minutes of a 100 Hz sensor."""
+
+SENSOR_SUBSCRIPTION = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+"""Best effort, so that every publisher matches; deep, so that one slow window loses nothing."""
+
+SENSOR_PUBLISHER = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+RESULT = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
+
+LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+"""The last message waits for subscribers that come later."""
+
+EXPIRING = QoSProfile(
+    depth=1,
+    reliability=ReliabilityPolicy.RELIABLE,
+    durability=DurabilityPolicy.TRANSIENT_LOCAL,
+    lifespan=Duration(seconds=5.0),
+)
+"""The same, but no longer than this: who comes later than that must not get an old braking curve."""
+
+
+def _check(profile: QoSProfile) -> SetParametersResult:
+    fits = 1 <= profile.depth <= MAX_DEPTH
+    return SetParametersResult(successful=fits, reason="" if fits else f"depth = {profile.depth}")
+
+
+OVERRIDES = QoSOverridingOptions(
+    (
+        *(QoSPolicyKind.RELIABILITY, QoSPolicyKind.DURABILITY, QoSPolicyKind.HISTORY, QoSPolicyKind.DEPTH),
+        *(QoSPolicyKind.DEADLINE, QoSPolicyKind.LIFESPAN),
+        *(QoSPolicyKind.LIVELINESS, QoSPolicyKind.LIVELINESS_LEASE_DURATION),
+    ),
+    callback=_check,
+)
+"""Lets parameters such as `qos_overrides./position.subscription.reliability` change a profile at start."""
+
+REMEDY = (
+    "give reliability reliable|best_effort, durability volatile|transient_local, history keep_last|keep_all, "
+    f"depth 1 to {MAX_DEPTH}, liveliness automatic|manual_by_topic, deadline, lifespan, liveliness_lease_duration in ns"
+)
+
+
+def subscribe(
+    node: Node,
+    topic: Topic,
+    callback: Callable[..., None],
+    profile: QoSProfile,
+    *,
+    raw: bool = False,
+    tell: Tell | None = None,
+) -> Subscription:
+    """Subscribe `node` to `topic`, parameters overriding `profile`; ValueError when an override is bad.
+
+    `tell` hears of the events of DDS; without it rclpy logs what does not fit.
+    """
+    try:
+        return node.create_subscription(
+            message_class(topic),
+            topic.name,
+            callback,
+            copy(profile),  # rclpy writes the overrides of this topic into the profile it is given
+            qos_overriding_options=OVERRIDES,
+            raw=raw,
+            event_callbacks=tell and of_subscription(node.resolve_topic_name(topic.name), tell),
+        )
+    except _BAD_OVERRIDE as error:
+        raise ValueError(_refusal(node, topic, "subscription")) from error
+
+
+def advertise(node: Node, topic: Topic, profile: QoSProfile, *, tell: Tell | None = None) -> Publisher:
+    """Open `topic` for publishing from `node`, as `subscribe` does."""
+    try:
+        return node.create_publisher(
+            message_class(topic),
+            topic.name,
+            copy(profile),
+            qos_overriding_options=OVERRIDES,
+            event_callbacks=tell and of_publisher(node.resolve_topic_name(topic.name), tell),
+        )
+    except _BAD_OVERRIDE as error:
+        raise ValueError(_refusal(node, topic, "publisher")) from error
+
+
+def message_class(topic: Topic) -> type[Any]:
+    """Return the Python class of a topic's messages."""
+    package, _, name = topic.type.split("/")
+    found: type[Any] = getattr(import_module(f"{package}.msg"), name)
+    return found
+
+
+_BAD_OVERRIDE = (AssertionError, AttributeError, TypeError, RuntimeError, InvalidQosOverridesError, ParameterException)
+"""What rclpy raises for an override of a wrong type or value."""
+
+
+def _refusal(node: Node, topic: Topic, end: str) -> str:
+    prefix = f"qos_overrides.{node.resolve_topic_name(topic.name)}.{end}"
+    given = [node.get_parameter(name) for name in node.list_parameters([prefix], 0).names]
+    values = ", ".join(f"{parameter.name.rpartition('.')[2]} = {parameter.value}" for parameter in given)
+    return f"{prefix}: {values}: {REMEDY}"

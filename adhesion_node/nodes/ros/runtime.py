@@ -1,0 +1,170 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The one main of every node: start, spin until a signal or the node's own end, close, exit code.
+
+rclpy's own signal handlers end in a traceback or a wrong exit code when SIGTERM or a second signal meets a
+spinning node. Here the handlers only note the first signal; the loop sees the note between two callbacks.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import os
+import sys
+import time
+from collections.abc import Callable, Sequence
+
+import argcomplete
+import rclpy
+from rclpy.duration import Duration
+from rclpy.exceptions import NameValidationException, ParameterException
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor, TimeoutException
+from rclpy.node import Node
+from rclpy.signals import SignalHandlerOptions
+from rclpy.utilities import ok, try_shutdown
+
+from adhesion_node.command.signals import StopRequest, stop_on_signals
+
+from ...command.options import help_texts
+from ...wire.parameter_sections import unheeded
+from .params import Spec
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+"""Exit codes of every program."""
+
+POLL_S = 0.1
+"""Longest time until a signal is seen: no signal interrupts rclpy's wait."""
+
+DRAIN_S, QUIET_S = 1.0, 0.05
+"""After a signal what is queued is still taken: for so long at most, or until nothing has come for so long."""
+
+GOODBYE_S = 0.5
+"""Longest wait at the end for reliable subscribers to have the last messages."""
+
+_BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidationException)
+"""What a node's start raises for bad input; the RuntimeErrors are those of rcl."""
+
+
+def run(
+    make_node: Callable[[], Node],
+    args: Sequence[str] | None = None,
+    parameters: Sequence[Spec] = (),
+    examples: Sequence[str] = (),
+) -> int:
+    """Run one node as a program and return its exit code: 0 after a clean stop, 1 failed, 2 bad input.
+
+    `args` are ROS arguments alone, without the program's name (None: those of the command line); anything else
+    is refused, a forgotten --ros-args for one. --help shows the first paragraph of the docstring of `make_node`,
+    `parameters` and `examples`; both end the program, as argparse does. A ValueError, OSError or rclpy error at
+    start is one line on stderr and code 2; an OSError later, a full disk for one, is one line and code 1. The node
+    ends on SIGINT or SIGTERM or when it sets its attribute `finished`; it still takes what has come, and its method
+    `close`, if it has one, may publish a last time.
+    """
+    with stop_on_signals() as stop:
+        own, ros = split_ros_arguments(sys.argv[1:] if args is None else args)
+        _parser(make_node, parameters, examples).parse_args(own)
+        try:
+            return _start_and_spin(make_node, ros, stop)
+        finally:
+            try_shutdown()
+
+
+def split_ros_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
+    """Split a command line into the program's own arguments and those for ROS.
+
+    >>> split_ros_arguments(["--output", "x", "--ros-args", "-p", "a:=1", "--", "y"])
+    (['--output', 'x', 'y'], ['--ros-args', '-p', 'a:=1', '--'])
+    """
+    own: list[str] = []
+    ros: list[str] = []
+    inside = False
+    for argument in args:
+        inside = inside or argument == "--ros-args"
+        (ros if inside else own).append(argument)
+        inside = inside and argument != "--"
+    return own, ros
+
+
+def _parser(
+    make_node: Callable[[], Node], parameters: Sequence[Spec], examples: Sequence[str]
+) -> argparse.ArgumentParser:
+    """Return the parser of a node's own arguments; asked by a shell, it answers for those of ROS too and ends."""
+    purpose, _, _ = (inspect.getdoc(make_node) or "").partition("\n\n")
+    described = [f"  {spec.name} (default {spec.default}): {spec.description}; {spec.allowed()}" for spec in parameters]
+    listed = "\n".join(["parameters:", *described]) if described else ""
+    parser = argparse.ArgumentParser(
+        usage="%(prog)s [--help] [--ros-args -p NAME:=VALUE ... --params-file FILE -r FROM:=TO ...]",
+        **help_texts(purpose, *examples, more=listed),
+    )
+    if "_ARGCOMPLETE" in os.environ:
+        parser.add_argument("--ros-args", action="store_true")
+        parser.add_argument("-p", "--param", action="append", choices=[f"{spec.name}:=" for spec in parameters])
+        parser.add_argument("--params-file", action="append")
+        argcomplete.autocomplete(parser)
+    return parser
+
+
+def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopRequest) -> int:
+    if stop.requested:
+        return DONE
+    try:
+        rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
+        node = make_node()
+    except _BAD_START as error:
+        return _complain(error, BAD_INPUT)
+    for warning in unheeded(ros, node.get_fully_qualified_name()):
+        node.get_logger().warning(warning)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    try:
+        _spin(executor, node, stop)
+        return DONE
+    except OSError as error:
+        return _complain(error, FAILED)
+    finally:
+        executor.shutdown()
+        node.destroy_node()
+
+
+def _spin(executor: SingleThreadedExecutor, node: Node, stop: StopRequest) -> None:
+    try:
+        while not stop.requested and not getattr(node, "finished", False):
+            executor.spin_once(timeout_sec=POLL_S)
+        _drain(executor, node)
+    except ExternalShutdownException:  # the node itself shut rclpy down
+        return
+    finally:
+        close = getattr(node, "close", None)
+        if close is not None:
+            close()
+        if ok():
+            _say_goodbye(node)
+
+
+def _drain(executor: SingleThreadedExecutor, node: Node) -> None:
+    """Take the messages that are queued; the timers, which would go on for ever, are over."""
+    for timer in node.timers:
+        timer.cancel()
+    now = time.monotonic()
+    end, quiet = now + DRAIN_S, now + QUIET_S
+    while (now := time.monotonic()) < min(end, quiet):
+        try:
+            work, *_ = executor.wait_for_ready_callbacks(timeout_sec=min(end, quiet) - now)
+        except TimeoutException:
+            return
+        work()
+        work.result()  # raises what the callback raised
+        quiet = time.monotonic() + QUIET_S
+
+
+def _say_goodbye(node: Node) -> None:
+    deadline = time.monotonic() + GOODBYE_S
+    for publisher in node.publishers:
+        publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
+
+
+def _complain(error: Exception, code: int) -> int:
+    print(" ".join(str(error).split()), file=sys.stderr)
+    return code

@@ -1,0 +1,118 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`replay --offline`: a recording straight through the estimator, without ROS."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..bag import BagReader
+from ..command.options import DONE, FAILED, progress, report
+from ..core.intake.inbox import PressureSample, Sample
+from ..core.prediction import Prediction
+from ..wire import codecs as reading
+from ..wire import parameter_file
+from ..wire.settings import SEED, SETTINGS, setup_of
+from ..wire.topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED, TRUTH_MU, TRUTH_STATE, WHEEL_SPEED
+from .pipeline import Pipeline
+from .score import Truth, mean_relative_error_percent
+
+READERS: dict[str, Callable[[Any, str], Sample]] = {
+    POSITION.name: reading.position,
+    BRAKE_PRESSURE.name: reading.brake_pressure,
+    SPEED.name: reading.speed,
+    WHEEL_SPEED.name: reading.wheel_speed,
+}
+"""How the messages of a sensor topic become samples."""
+
+
+def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
+    """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
+    if POSITION.name not in selection.values():
+        raise ValueError(f"bag = {reader.path}: holds no {POSITION.name}, without which nothing is identified")
+    setup, truth = setup_of(parameters_of(options)), Truth()
+    pipeline = Pipeline(setup.config, setup.seed)
+    replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.frame)
+    result = summary(pipeline, replayed, truth)
+    report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
+    return DONE if replayed.predictions else FAILED
+
+
+def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
+    """Settings by name from the options --params, --set and --seed, the later ones over the earlier."""
+    values = parameter_file.given(options, "estimator", SETTINGS)
+    return values if options.seed is None else {**values, SEED.name: options.seed}
+
+
+class Replayed(NamedTuple):
+    """Result of a replay."""
+
+    predictions: list[Prediction]
+    window_ms: list[float]
+    """How long each full window took, estimate and curves included."""
+
+
+def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, int]], frame: str = FRAME) -> Replayed:
+    """Feed recorded messages to the pipeline, and the simulator's truth to `truth`.
+
+    A message comes with our name of its topic and its log time in ns; sensor messages must be in `frame`.
+    """
+    replayed = Replayed([], [])
+    for name, message, log_ns in recorded:
+        if name in READERS:
+            try:
+                sample = READERS[name](message, frame)
+            except reading.Rejected as refusal:
+                pipeline.refuse(name, refusal.reason)
+            else:
+                _take_sample(pipeline, truth, replayed, sample)
+        elif name == TRUTH_MU.name:
+            truth.mu[log_ns] = float(message.data)
+        elif name == TRUTH_STATE.name:
+            truth.speed_mps[reading.stamp_ns(message.header)] = float(message.twist.twist.linear.x)
+    replayed.predictions.extend(pipeline.finish())
+    return replayed
+
+
+def _take_sample(pipeline: Pipeline, truth: Truth, replayed: Replayed, sample: Sample) -> None:
+    if isinstance(sample, PressureSample):
+        truth.pressure_pa[sample.t_ns] = sample.pressure_pa
+    started = time.perf_counter()
+    predictions = pipeline.push(sample)
+    if any(prediction.estimate.window >= pipeline.config.window for prediction in predictions):
+        replayed.window_ms.append(1e3 * (time.perf_counter() - started))
+    replayed.predictions.extend(predictions)
+
+
+def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, Any]:
+    """What a replay reports; without any estimate the final values are None."""
+    estimates = [prediction.estimate for prediction in replayed.predictions]
+    last = estimates[-1] if estimates else None
+    result: dict[str, Any] = {
+        "measurements": pipeline.measurements,
+        "accepted": pipeline.accepted,
+        "dropped": pipeline.dropped,
+        "windows": pipeline.windows,
+        "mu_final": last and last.mu,
+        "mu_lower_final": last and last.mu_lower,
+        "regime_final": last and last.regime.name,
+        "digest": pipeline.digest,
+    }
+    error = mean_relative_error_percent(pipeline.config, truth, estimates)
+    if error is not None:
+        result["mean_relative_error_percent"] = error
+    if replayed.window_ms:
+        result |= {f"ms_per_window_p{p}": float(np.percentile(replayed.window_ms, p)) for p in (50, 99)}
+    return result
+
+
+def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[tuple[str, Any, int]]:
+    """Yield the recorded messages of `selection` under our names."""
+    for record in reader.messages(selection):
+        yield selection[record.topic], record.message, record.log_ns

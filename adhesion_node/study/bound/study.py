@@ -1,0 +1,134 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`study bound`: the posterior Cramér-Rao bound of mu over a braking: what no estimator can beat.
+
+Rail condition unknown, speed law known, 10 Hz, nominal process noise. The speed before braking is what 20 s of
+cruising leave known of it or, for comparison, a given standard deviation.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_node.train.plant import ADHESION_LIMITED, NO_NOISE, simulate
+from sim_node.train.scenario import find
+
+from ...command.options import DONE, report
+from ...core.config import Config
+from ...core.physics.adhesion import WET
+from ...core.physics.motion import Motion
+from ...core.physics.train import KMH
+from ...run.score import CONVERGED_AFTER_MPS
+from .cramer_rao import MEAN_OF_STD, Bound, Path, Start, bound, speed_lost, std_that_stays_within
+
+PERIOD_S = 0.1
+
+CONDITION_STD = 0.6
+"""Before braking: from hardly any adhesion to more than that of a dry rail."""
+
+UNKNOWN_SPEED_MPS = 100.0
+"""Before cruising."""
+
+LOST_KMH = (10, 15, 20, 30, 50, 100)
+"""Speeds lost at which the table gives the bound."""
+
+ERROR_PERCENT = 5.0
+
+
+class Case(NamedTuple):
+    """A line of the table."""
+
+    scenario: str
+    sigma_m: float
+    speed_std_kmh: float | None = None
+    """Speed known so well when the brake is applied; None: as well as the cruising left it."""
+
+
+CASES = (
+    *(Case(scenario, sigma_m) for scenario in ("tunnel_entry", "tunnel_exit") for sigma_m in (0.1, 0.5, 2.0)),
+    *(Case("tunnel_entry", *known) for known in ((0.5, 1.0), (0.5, 0.15), (0.1, 0.15), (2.0, 0.15))),
+)
+
+
+class Nominal(NamedTuple):
+    """The bound over a scenario; `limited` marks the samples at which adhesion limits."""
+
+    bound: Bound
+    limited: NDArray[np.bool_]
+
+    @property
+    def mean_error_percent(self) -> float:
+        """Mean relative error of an estimator at the bound, over the times that `score` counts."""
+        scored = self.limited & (self.bound.lost_mps > CONVERGED_AFTER_MPS)
+        return 100.0 * MEAN_OF_STD * float(self.bound.mu_relative_std[scored].mean())
+
+
+def nominal(case: Case) -> Nominal:
+    """Bound along the noise-free run of a scenario with a wet rail at the nominal noise."""
+    config, scenario = Config(), find(case.scenario)
+    truths = list(simulate(scenario, PERIOD_S, np.random.default_rng(0), NO_NOISE))
+    if case.speed_std_kmh is not None:
+        truths = [truth for truth in truths if truth.pressure_pa > 0.0]
+    path = Path(
+        t_s=np.array([truth.t_ns for truth in truths]) * 1e-9,
+        position_m=np.array([truth.position_m for truth in truths]),
+        speed_mps=np.array([truth.speed_mps for truth in truths]),
+        brake=np.array([config.brake(truth.pressure_pa) for truth in truths]),
+    )
+    speed_std = UNKNOWN_SPEED_MPS if case.speed_std_kmh is None else case.speed_std_kmh * KMH
+    motion = Motion(scenario.train, scenario.track, config.motion.position_noise_rate, config.motion.speed_noise_rate)
+    found = bound(motion, WET, path, case.sigma_m**2, Start(case.sigma_m, speed_std, CONDITION_STD))
+    return Nominal(found, np.array([truth.regime == ADHESION_LIMITED for truth in truths]))
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """`study bound` has none of its own."""
+    del parser
+
+
+def row(case: Case) -> dict[str, Any]:
+    """The figures of a line: standard deviations of mu in %, and speeds lost in km/h, None where not reached."""
+    found = nominal(case)
+    braked = found.bound.lost_mps > 0.0
+    lost, std = found.bound.lost_mps[braked], 100.0 * found.bound.mu_relative_std[braked]
+    thresholds = {
+        "mean": ERROR_PERCENT / MEAN_OF_STD,
+        "half": std_that_stays_within(ERROR_PERCENT, 0.5),
+        "most": std_that_stays_within(ERROR_PERCENT, 0.95),
+    }
+    reached = {name: speed_lost(found.bound, std / 100.0) / KMH for name, std in thresholds.items()}
+    return {
+        **case._asdict(),
+        "std_percent": {str(kmh): float(np.interp(kmh * KMH, lost, std)) for kmh in LOST_KMH},
+        "mean_error_percent": found.mean_error_percent,
+        "lost_kmh": {name: kmh if math.isfinite(kmh) else None for name, kmh in reached.items()},
+    }
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the table."""
+    table = [row(case) for case in CASES]
+    report(options.json, table, "\n".join(_lines(table)))
+    return DONE
+
+
+def _lines(table: list[dict[str, Any]]) -> Iterator[str]:
+    yield "least standard deviation of mu, %, after so many km/h of braking; mean |error|, %, after 30 km/h;"
+    yield f"km/h lost until |error| is below {ERROR_PERCENT:g} %: on average, for good in half and in 95 % of the runs"
+    columns = " ".join(f"{kmh:5}" for kmh in LOST_KMH)
+    yield f"{'scenario':>12} {'sigma m':>7} {'speed known':>11}  {columns}  error  mean  half  95 %"
+    for entry in table:
+        known = "20 s" if entry["speed_std_kmh"] is None else f"{entry['speed_std_kmh']:g} km/h"
+        stds = " ".join(f"{value:5.2f}" for value in entry["std_percent"].values())
+        reached = " ".join("never" if kmh is None else f"{kmh:5.1f}" for kmh in entry["lost_kmh"].values())
+        yield (
+            f"{entry['scenario']:>12} {entry['sigma_m']:7g} {known:>11}  {stds}  "
+            f"{entry['mean_error_percent']:5.2f} {reached}"
+        )

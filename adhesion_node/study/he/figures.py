@@ -1,0 +1,88 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The counterparts of Figs. 5-11 of He et al. 2017: p1, p2 and the peak, on one surface and over a switch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.physics.train import Array
+from ...report.picture import BLACK, BLUE, GREY, ORANGE
+from ..trial.drawing import picture
+from .runs import BAND, DRY, DRY_PEAK, ENOUGH, WET, WET_PEAK, peaks, rise, swings
+
+POINTS = 1500
+"""Points of a curve at most."""
+
+
+class Panel(NamedTuple):
+    """A figure of the paper: its number, the experiment, what it shows, the truths before and after the switch."""
+
+    number: int
+    experiment: str
+    quantity: str
+    truths: tuple[float, ...]
+    title: str
+
+
+PEAK = "largest adhesion coefficient"
+PANELS = (
+    Panel(5, "1", "p1", (DRY[0],), "one surface"),
+    Panel(6, "1", "p2", (DRY[1],), "one surface"),
+    Panel(7, "1", PEAK, (DRY_PEAK,), "one surface"),
+    Panel(8, "2", "p1", (DRY[0], WET[0]), "dry to wet, factor 0.99"),
+    Panel(9, "2", "p2", (DRY[1], WET[1]), "dry to wet, factor 0.99"),
+    Panel(10, "2", PEAK, (DRY_PEAK, WET_PEAK), "dry to wet, factor 0.99"),
+    Panel(11, "3", PEAK, (DRY_PEAK, WET_PEAK), "dry to wet, varying factor"),
+)
+
+
+def draw(thetas: Mapping[str, Array], folder: Path) -> None:
+    """Draw fig05.png to fig11.png into `folder`, made when missing; thetas (samples, runs, 2) by experiment."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for panel in PANELS:
+        title = f"Fig. {panel.number}: {panel.quantity}, {panel.title}"
+        with picture(folder / f"fig{panel.number:02d}.png", title) as axis:
+            _draw_panel(axis, panel, _values(thetas[panel.experiment], panel.quantity))
+
+
+def _values(theta: Array, quantity: str) -> Array:
+    """What a panel shows, shape (samples, runs)."""
+    return peaks(theta) if quantity == PEAK else theta[..., int(quantity[1]) - 1]
+
+
+def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
+    every = max(values.shape[0] // POINTS, 1)
+    places = _places(panel)[::every]
+    low, high = np.quantile(values[::every], [0.05, 0.95], axis=1)
+    axis.fill_between(places, low, high, color="0.85", label=f"5 to 95 % of {values.shape[1]} runs")
+    axis.plot(places, values[::every, 0], color=ORANGE, lw=1.2, label="one run")
+    edges = np.linspace(places[0], places[-1], len(panel.truths) + 1)
+    for index, truth in enumerate(panel.truths):
+        ends = edges[index : index + 2]
+        axis.plot(ends, [truth, truth], color=BLACK, ls="--", lw=1.8, label="true" if index == 0 else None)
+        if panel.quantity == PEAK:
+            band = [truth * (1 - BAND), truth * (1 + BAND)]
+            axis.hlines(band, *ends, color=BLUE, ls=":", lw=1.2, label="true +- 5 %" if index == 0 else None)
+    mark = ENOUGH if len(panel.truths) == 1 else edges[1]
+    axis.axvline(mark, color=GREY, lw=1.0)
+    named = f" creep {ENOUGH}" if len(panel.truths) == 1 else " the surface changes"
+    axis.annotate(named, (mark, 0.02), xycoords=("data", "axes fraction"), color="0.25", fontsize="small")
+    axis.set_ylim(0.0, 2.0 * max(panel.truths))
+    axis.set_xlim(places[0], places[-1])
+    axis.set_xlabel("creep" if len(panel.truths) == 1 else "samples on a surface, each from 0 to 1")
+    axis.set_ylabel(panel.quantity)
+    axis.legend(loc="upper right", fontsize="small")
+
+
+def _places(panel: Panel) -> Array:
+    """Where the samples stand on the horizontal axis: at their creep, or at the share of their surface's samples."""
+    if len(panel.truths) == 1:
+        return rise()
+    samples = swings().size
+    return np.arange(1, 2 * samples + 1) / samples

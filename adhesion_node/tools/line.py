@@ -1,0 +1,121 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The whole line in one process: simulator, estimator, ATP monitor and recorder, with a simulated clock.
+
+The clock waits until all nodes have taken what they were sent, and no node watches the machine's own clock. So a run
+depends neither on the machine's speed nor on the order in which the executor turns to the nodes: equal runs leave equal
+recordings.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import closing, contextmanager
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.logging import LoggingSeverity, set_logger_level
+from rclpy.parameter import Parameter
+from rclpy.signals import SignalHandlerOptions
+
+from sim_node.nodes.simulator import Simulator
+
+from ..core import Estimate
+from ..nodes.atp_monitor import AtpMonitor
+from ..nodes.estimator import Estimator
+from ..nodes.recorder import Recorder
+from ..wire.topics import CLOCK, POSITION, STATE
+
+TARGET_M, STOP_M = 8000.0, 9000.0
+"""The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
+
+PATIENCE_S = 10.0
+"""Longest wait for a message between two nodes of the process."""
+
+NEVER_S = 3600.0
+"""By the machine's own clock: longer than a tick can take."""
+
+NODES = ("recorder", "estimator", "atp_monitor", "simulator", "live")
+"""Their errors are shown, the rest of their log is not: who runs the line says himself how far it is."""
+
+Pace = Callable[[int, Estimate | None], bool]
+"""Called before every sample with the number of those before and the newest estimate; False ends the run."""
+
+
+def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag: Path, seed: int, pace: Pace) -> str:
+    """Run the nodes until the scenario or `pace` ends; the digest of what the estimator published.
+
+    However it ends, by a full disk (OSError) or Ctrl-C too, the recording is complete up to there.
+    """
+    common: dict[str, Any] = {"context": executor.context}
+    # First: a bad seed ends here, before anything is written.
+    simulator = Simulator(paced=False, parameter_overrides=_parameters(scenario=scenario, seed=seed), **common)
+    simulated = {"use_sim_time": True}
+    recorder = Recorder(bag, by_log_time=True, parameter_overrides=_parameters(**simulated), **common)
+    identifying = _parameters(**simulated, seed=seed, sensor_timeout_s=NEVER_S)
+    estimator = Estimator(parameter_overrides=identifying, **common)
+    target = {"target_position_m": TARGET_M if target_kmh else STOP_M, "target_speed_kmh": target_kmh}
+    supervising = _parameters(**simulated, **target, clock_timeout_s=NEVER_S)
+    monitor = AtpMonitor(parameter_overrides=supervising, **common)
+    for node in (recorder, estimator, monitor, simulator):
+        executor.add_node(node)
+    at_rest = partial(_at_rest, simulator, estimator, monitor, recorder)
+    with closing(recorder):
+        while pace(simulator.samples, estimator.latest) and simulator.tick():
+            spin_until(executor, at_rest)
+        estimator.close()
+        spin_until(executor, at_rest)
+    return estimator.digest
+
+
+@contextmanager
+def executor_of_line() -> Iterator[SingleThreadedExecutor]:
+    """An executor in a context of its own; its nodes are destroyed at the end."""
+    context = rclpy.Context()
+    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    executor = SingleThreadedExecutor(context=context)
+    for name in NODES:
+        set_logger_level(name, LoggingSeverity.ERROR)
+    try:
+        yield executor
+    finally:
+        for name in NODES:
+            set_logger_level(name, LoggingSeverity.UNSET)
+        nodes = list(executor.get_nodes())
+        executor.shutdown()
+        for node in nodes:
+            node.destroy_node()
+        context.try_shutdown()
+
+
+def spin_until(executor: SingleThreadedExecutor, done: Callable[[], bool]) -> None:
+    """Spin until `done()`; OSError when that takes too long."""
+    deadline = time.monotonic() + PATIENCE_S
+    while not done():
+        if time.monotonic() > deadline:
+            raise OSError(f"no message between the nodes for {PATIENCE_S:g} s: is the loopback network there?")
+        executor.spin_once(timeout_sec=0.1)
+
+
+def _at_rest(simulator: Simulator, estimator: Estimator, monitor: AtpMonitor, recorder: Recorder) -> bool:
+    """Whether every node has taken what the others sent, and its time is that of the newest sample."""
+    sensed = Counter({POSITION: simulator.samples, CLOCK: simulator.samples})
+    return (
+        estimator.heard[POSITION] == simulator.samples
+        and monitor.heard[STATE] == estimator.published[STATE]
+        and all(
+            recorder.heard[topic] == sent for topic, sent in (sensed + estimator.published + monitor.published).items()
+        )
+        and all(node.get_clock().now().nanoseconds == simulator.now_ns for node in (estimator, monitor, recorder))
+        and not any(timer.is_ready() for timer in monitor.timers)
+    )
+
+
+def _parameters(**values: Any) -> list[Parameter]:
+    return [Parameter(name, value=value) for name, value in values.items()]

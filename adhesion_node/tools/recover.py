@@ -1,0 +1,64 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Rewrites an interrupted or damaged recording as a complete one that every reader opens."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ..bag import BagReader, BagWriter
+from ..command.options import DONE, help_texts, json_option, progress, report, run_tool
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run `recover BAG --output DIR`."""
+    return run_tool(_parser(), _work, args)
+
+
+def recover(source: Path, output: Path) -> dict[str, Any]:
+    """Copy every readable message, unchanged and in the order of log time, into a new recording.
+
+    Returns the summary: messages by topic, lost ones as far as the metadata tells, and a sentence for each loss.
+    Raises ValueError, and leaves nothing behind, when the source is unreadable or the output exists.
+    """
+    with BagReader(source) as reader:
+        writer = BagWriter(output)
+        try:
+            for name, info in reader.infos.items():
+                writer.add_topic(name, info.type, latched=info.latched, known_as=info.definition)
+            for record in progress(reader.messages(), "messages", sum(reader.counts.values())):
+                writer.write(record.topic, record.type, record.cdr, record.log_ns)
+            writer.close()
+        except BaseException:
+            writer.discard()
+            raise
+        return {
+            "complete": reader.complete,
+            "damage": list(reader.damage),
+            "messages": writer.counts,
+            "lost": reader.lost,
+        }
+
+
+def _work(options: argparse.Namespace) -> int:
+    summary = recover(Path(options.bag), Path(options.output))
+    for loss in summary["damage"]:
+        print(loss, file=sys.stderr)
+    lines = [f"{sum(summary['messages'].values())} messages written to {options.output}"]
+    lines += [f"{count} {name}" for name, count in summary["messages"].items()]
+    report(options.json, summary, "\n".join(lines))
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        "recover", parents=[json_option()], **help_texts(__doc__, "recover broken_run --output whole_run")
+    )
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory or an .mcap file")
+    parser.add_argument("--output", metavar="DIR", required=True, help="the new recording, a new directory")
+    return parser

@@ -1,0 +1,146 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Faults of the sensors as functions from a stream of ticks to a stream of ticks.
+
+Every function has the signature of `Change`: it takes the ticks, the `Dose` and a generator of random numbers, and
+yields the ticks with their messages changed. The truth stays what it is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, Topic
+
+from ..train.messages import SensorMessage, Tick
+from ..train.plant import Truth
+from ..train.sensors import ATMOSPHERE_PA
+
+Messages = tuple[SensorMessage, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Dose:
+    """When and how much: from `start_s` of the run for `duration_s`, in `share` of the samples, of `size`."""
+
+    start_s: float = 30.0
+    duration_s: float = math.inf
+    share: float = 1.0
+    size: float = 0.0
+
+    def now(self, truth: Truth) -> bool:
+        """Whether the fault is on at this sample."""
+        return 0.0 <= truth.t_ns * 1e-9 - self.start_s < self.duration_s
+
+
+Change = Callable[[Iterator[Tick], Dose, np.random.Generator], Iterator[Tick]]
+
+Alter = Callable[[SensorMessage, Dose, np.random.Generator], SensorMessage | None]
+
+
+def each(topic: Topic, alter: Alter) -> Change:
+    """Alter the messages of a topic one by one; None loses the message."""
+
+    def change(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+        for truth, messages in ticks:
+            hit = rng.random() < dose.share and dose.now(truth)
+            altered = (alter(m, dose, rng) if hit and m.topic == topic else m for m in messages)
+            yield truth, tuple(message for message in altered if message is not None)
+
+    return change
+
+
+def moved(message: SensorMessage, by: float) -> SensorMessage:
+    """Return the message with its value moved."""
+    return message._replace(values=(message.values[0] + by,))
+
+
+lost = each(POSITION, lambda message, dose, rng: None)
+outlying = each(POSITION, lambda message, dose, rng: moved(message, math.copysign(dose.size, rng.standard_normal())))
+shifted = each(POSITION, lambda message, dose, rng: moved(message, dose.size))
+misframed = each(POSITION, lambda message, dose, rng: message._replace(frame="map"))
+in_kmh = each(SPEED, lambda message, dose, rng: message._replace(values=(3.6 * message.values[0],)))
+gauge = each(BRAKE_PRESSURE, lambda message, dose, rng: moved(message, -ATMOSPHERE_PA))
+
+
+def bad(value: float | None = None, variance: float | None = None) -> Change:
+    """Send, before good messages, one that nobody can use: this value or this variance in all that they hold."""
+
+    def spoilt(message: SensorMessage) -> SensorMessage:
+        values = message.values if value is None else (value,) * len(message.values)
+        return message._replace(values=values, variance=message.variance if variance is None else variance)
+
+    def change(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+        for truth, messages in ticks:
+            hit = rng.random() < dose.share and dose.now(truth)
+            useless = (m for m in messages if value is not None or m.topic == POSITION)
+            yield truth, (*(map(spoilt, useless) if hit else ()), *messages)
+
+    return change
+
+
+def duplicated(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+    """Send messages twice."""
+    for truth, messages in ticks:
+        hit = rng.random() < dose.share and dose.now(truth)
+        yield truth, messages * 2 if hit else messages
+
+
+def late(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+    """Hold messages back: they leave `size` seconds after their time."""
+    waiting: list[tuple[int, Messages]] = []
+    for truth, messages in ticks:
+        hit = rng.random() < dose.share and dose.now(truth)
+        if hit:
+            waiting.append((truth.t_ns + round(dose.size * 1e9), messages))
+        due = [held for until_ns, held in waiting if until_ns <= truth.t_ns]
+        waiting = [(until_ns, held) for until_ns, held in waiting if until_ns > truth.t_ns]
+        yield truth, (*(() if hit else messages), *(message for held in due for message in held))
+
+
+def restamped(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+    """Let the sensors' clock jump by `size` seconds, for good."""
+    for truth, messages in ticks:
+        by_ns = round(dose.size * 1e9) if dose.now(truth) else 0
+        yield truth, tuple(message._replace(t_ns=message.t_ns + by_ns) for message in messages)
+
+
+def paused(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+    """Let the sensors' clock stand still; afterwards it shows the right time again."""
+    still_ns = round(dose.start_s * 1e9)
+    for truth, messages in ticks:
+        yield truth, tuple(m._replace(t_ns=still_ns) if dose.now(truth) else m for m in messages)
+
+
+def stuck(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+    """Repeat the last good position under fresh stamps."""
+    shown: tuple[float, ...] | None = None
+    for truth, messages in ticks:
+        if shown is None or not dose.now(truth):
+            shown = next((message.values for message in messages if message.topic == POSITION), shown)
+            yield truth, messages
+        else:
+            yield truth, tuple(m._replace(values=shown) if m.topic == POSITION else m for m in messages)
+
+
+RATES_HZ = (10.0, 1.0, 50.0)
+"""Rates of `irregular`, one after the other."""
+
+FINE_HZ = 500.0
+"""Rate of the run from which `irregular` picks its samples."""
+
+
+def irregular(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+    """Thin a run of `FINE_HZ` to each of `RATES_HZ` for `duration_s` in turn, uneven by `size` of the period."""
+    due_s = 0.0
+    for truth, messages in ticks:
+        now_s = truth.t_ns * 1e-9
+        yield truth, messages if now_s >= due_s else ()
+        if now_s >= due_s:
+            turns = max(now_s - dose.start_s, 0.0) / dose.duration_s
+            due_s += (1.0 + dose.size * rng.uniform(-1.0, 1.0)) / RATES_HZ[int(turns) % len(RATES_HZ)]

@@ -1,0 +1,80 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What both simulators share: the parameters of a run, and a timer that calls for samples as simulated time asks for.
+
+It paces itself by the monotonic clock: with use_sim_time the node's own clock would stand still until this node
+moves it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
+
+from adhesion_node.nodes.ros.params import Spec
+from adhesion_node.wire.topics import Topic
+
+MAX_BURST = 10
+"""Samples that one timer callback publishes at most, so that the node stays responsive while it catches up."""
+
+SHORTEST_TIMER_S = 1e-3
+
+
+def run_parameters(scenarios: Iterable[str], scenario: str, rate_hz: float, awaited: Topic) -> tuple[Spec, ...]:
+    """Return the parameters of every simulated run: name, default, meaning, unit, least and most."""
+    return (
+        Spec("scenario", scenario, "what happens", choices=tuple(scenarios)),
+        Spec("seed", 1, "seed of all noise", "", 0, 2**31 - 1),
+        Spec("rate_hz", rate_hz, "samples per simulated second", "Hz", 0.1, 1000.0),
+        Spec("real_time_factor", 1.0, "simulated seconds per second; 0 = as fast as possible", "", 0.0, 1000.0),
+        Spec("start_time_s", 1000.0, "stamp of the first sample", "s", 0.0, 2e9),
+        Spec("wait_for", 0, f"start when so many subscribers to {awaited.name} are there", "", 0, 100),
+        Spec("exit_at_end", True, "end the program with the scenario"),
+    )
+
+
+class Pace:
+    """Calls `tick`, which publishes a sample and returns False at the end of the run, in time; begins once `ready`."""
+
+    def __init__(
+        self, node: Node, period_s: float, factor: float, ready: Callable[[], bool], tick: Callable[[], bool]
+    ) -> None:
+        """Begin with the node's spinning; `factor` 0 is as fast as possible."""
+        self._period_s, self._factor = period_s, factor
+        self._ready, self._tick = ready, tick
+        self._monotonic = Clock(clock_type=ClockType.STEADY_TIME)
+        self._begun_ns: int | None = None
+        self._ticked = 0
+        fitting_s = period_s / factor if factor else 0.0
+        self._timer = node.create_timer(max(fitting_s, SHORTEST_TIMER_S), self._on_timer, clock=self._monotonic)
+
+    def _on_timer(self) -> None:
+        now_ns = self._monotonic.now().nanoseconds
+        if self._begun_ns is None:
+            if not self._ready():
+                return
+            self._begun_ns = now_ns
+        for _ in range(due(now_ns - self._begun_ns, self._factor, self._period_s, self._ticked)):
+            if not self._tick():
+                self._timer.cancel()
+                return
+            self._ticked += 1
+
+
+def due(elapsed_ns: int, factor: float, period_s: float, published: int) -> int:
+    """Samples to publish now, 0 to `MAX_BURST`.
+
+    Rounded to the nearest sample, so that a timer that fires a little early does not put two into the next call.
+
+    >>> due(0, 1.0, 0.1, 0), due(99_000_000, 1.0, 0.1, 1), due(10_000_000_000, 1.0, 0.1, 5), due(0, 0.0, 0.1, 50)
+    (1, 1, 10, 10)
+    """
+    if factor == 0.0:
+        return MAX_BURST
+    total = math.floor(elapsed_ns / 1e9 * factor / period_s + 0.5) + 1
+    return min(max(total - published, 0), MAX_BURST)

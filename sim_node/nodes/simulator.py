@@ -1,0 +1,151 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The simulator: publishes a scenario's sensors, its truth and /clock.
+
+    position, brake_pressure            measurements, one stamp per sample
+    speed, wheel_speed                  more of them, where their noise is above 0
+    truth/state, truth/mu               the true train
+    /clock                              time of the sample
+
+The parameter `fault` lets something go wrong; `faults` lists what.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import fields
+from typing import Any
+
+from rclpy.node import Node
+
+from adhesion_node.core.physics.train import KMH
+from adhesion_node.nodes.ros import runtime
+from adhesion_node.nodes.ros.params import Spec, declare
+from adhesion_node.nodes.ros.qos import SENSOR_PUBLISHER, advertise
+from adhesion_node.wire import topics
+
+from ..faults.plan import FAULTS, Plan, faulty_run, period_of
+from ..train import scenario
+from ..train.messages import SensorMessage
+from ..train.plant import Truth
+from ..train.sensors import SensorSettings
+from . import messages
+from .pace import Pace, run_parameters
+
+_NOISE = SensorSettings()
+_PLAN = Plan()
+
+# name, default, meaning, unit, least and most
+PARAMETERS = (
+    *run_parameters(scenario.SCENARIOS, "tunnel_entry", 10.0, topics.POSITION),
+    Spec("position_std_m", _NOISE.position_std_m, "noise of the position", "m", 1e-3, 100.0),
+    Spec("student_dof", _NOISE.student_dof, "0, or degrees of freedom of Student-t position noise", "", 0.0, 100.0),
+    Spec("outlier_fraction", _NOISE.outlier_fraction, "fraction of positions that are outliers", "", 0.0, 1.0),
+    Spec("outlier_size_m", _NOISE.outlier_size_m, "size of an outlier", "m", 0.0, 1e4),
+    Spec("dropout_fraction", _NOISE.dropout_fraction, "fraction of positions that are missing", "", 0.0, 1.0),
+    Spec("pressure_std_pa", _NOISE.pressure_std_pa, "noise of the brake pressure", "Pa", 0.0, 1e5),
+    Spec("speed_std_mps", _NOISE.speed_std_mps, "noise of the speed; 0 = no odometer", "m/s", 0.0, 10.0),
+    Spec(
+        *("wheel_speed_std_radps", _NOISE.wheel_speed_std_radps, "noise of the wheel speeds; 0 = no such sensors"),
+        *("rad/s", 0.0, 10.0),
+    ),
+    Spec("fault", _PLAN.fault, "what goes wrong", choices=tuple(FAULTS)),
+    Spec("fault_start_s", _PLAN.fault_start_s, "time of the run at which the fault begins", "s", 0.0, 1e6),
+    Spec("fault_duration_s", _PLAN.fault_duration_s, "how long the fault lasts; 0 = as it is usual", "s", 0.0, 1e6),
+    Spec("fault_share", _PLAN.fault_share, "share of the samples that it meets; 0 = as it is usual", "", 0.0, 1.0),
+    Spec("fault_size", _PLAN.fault_size, "its size in the unit of the fault; 0 = as it is usual", "", -1e6, 1e6),
+)
+
+EXAMPLES = (
+    "simulator --ros-args -p scenario:=tunnel_exit -p seed:=2",
+    "simulator --ros-args -p real_time_factor:=10.0 -p wait_for:=1",
+)
+
+
+class Simulator(Node):
+    """Simulates a braking train: publishes its sensors, the truth and /clock until the scenario ends.
+
+    The parameter `scenario` says what happens, `fault` what goes wrong, `seed` which noise, `real_time_factor` how
+    fast.
+    """
+
+    def __init__(self, *, paced: bool = True, **kwargs: Any) -> None:
+        """Read the parameters; ValueError when one is out of range.
+
+        With `paced=False` the node has no timer: its owner asks for every sample by `tick`.
+        """
+        super().__init__("simulator", automatically_declare_parameters_from_overrides=True, **kwargs)
+        self.finished = False
+        values = declare(self, PARAMETERS)
+        settings = SensorSettings(**{field.name: values[field.name] for field in fields(SensorSettings)})
+        plan = Plan(**{field.name: values[field.name] for field in fields(Plan)})
+        self._scenario = scenario.find(values["scenario"])
+        self._exit_at_end = values["exit_at_end"]
+        self._start_ns = round(values["start_time_s"] * 1e9)
+        period_s = period_of(plan, 1.0 / values["rate_hz"])
+        self._ticks = faulty_run(plan, self._scenario, period_s, values["seed"], settings)
+        self.samples = 0
+        """Number of samples published."""
+        self.now_ns = 0
+        """Time of the newest one, as on /clock."""
+        self._regime = ""
+        self._ended = False
+        optional = ((topics.SPEED, settings.speed_std_mps), (topics.WHEEL_SPEED, settings.wheel_speed_std_radps))
+        there = (topics.BRAKE_PRESSURE, *(topic for topic, std in optional if std > 0), topics.POSITION)
+        self._outputs = {
+            topic: advertise(self, topic, SENSOR_PUBLISHER) for topic in (topics.CLOCK, *topics.TRUTH, *there)
+        }
+        if paced:
+            self._wait_for(values["wait_for"], period_s, values["real_time_factor"])
+
+    def tick(self) -> bool:
+        """Publish the next sample; False when the scenario has ended and nothing was published."""
+        sample = next(self._ticks, None)
+        if sample is None:
+            self._end()
+            return False
+        self._report(sample[0])
+        self._publish(*sample)
+        self.samples += 1
+        return True
+
+    def _wait_for(self, subscribers: int, period_s: float, factor: float) -> None:
+        if subscribers:
+            _log(self, f"waiting for {subscribers} subscriber(s) to {topics.POSITION.name}")
+        awaited = self._outputs[topics.POSITION]
+        Pace(self, period_s, factor, lambda: awaited.get_subscription_count() >= subscribers, self.tick)
+
+    def _publish(self, truth: Truth, sent: Sequence[SensorMessage]) -> None:
+        t_ns = self.now_ns = self._start_ns + truth.t_ns
+        self._outputs[topics.CLOCK].publish(messages.clock(t_ns))
+        self._outputs[topics.TRUTH_STATE].publish(messages.truth_state(t_ns, truth))
+        self._outputs[topics.TRUTH_MU].publish(messages.truth_mu(truth))
+        for one in sent:
+            stamped = one._replace(t_ns=max(self._start_ns + one.t_ns, 0))
+            self._outputs[one.topic].publish(messages.message_of(stamped))
+
+    def _report(self, truth: Truth) -> None:
+        if not self.samples:
+            _log(self, f"scenario {self._scenario.name}: started at {self._start_ns / 1e9:.1f} s")
+        if truth.regime != self._regime:
+            self._regime = truth.regime
+            _log(
+                self, f"{truth.t_ns / 1e9:.1f} s: {truth.regime} at {truth.speed_mps / KMH:.0f} km/h, mu {truth.mu:.4f}"
+            )
+
+    def _end(self) -> None:
+        if self._ended:
+            return
+        self._ended = True
+        self.finished = self._exit_at_end
+        _log(self, f"scenario {self._scenario.name}: ended after {self.samples} samples")
+
+
+def _log(node: Node, text: str) -> None:
+    node.get_logger().info(text)
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run the simulator until its scenario ends or a signal comes."""
+    return runtime.run(Simulator, args, PARAMETERS, EXAMPLES)

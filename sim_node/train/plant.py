@@ -1,0 +1,149 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The true train: a point mass integrated in steps of at most 10 ms, with process noise once per sample.
+
+It shares the forces (`core.train`, `core.track`) with the estimator but not the motion model: this one integrates
+by the midpoint rule, so that an error in the estimator's steps shows instead of cancelling.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from adhesion_node.core.physics.train import KMH, Array
+
+from .scenario import RUN_ON_S, Scenario
+
+SUBSTEP_S = 0.01
+"""Longest step of the integration."""
+
+REFERENCE_PERIOD_S = 0.1
+"""Period to which the noise of `PlantNoise` belongs."""
+
+COASTING, BRAKE_LIMITED, ADHESION_LIMITED = "COASTING", "BRAKE_LIMITED", "ADHESION_LIMITED"
+"""The regimes, named as the estimator's."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlantNoise:
+    """Process noise: standard deviations per `REFERENCE_PERIOD_S`; they grow with the root of the period.
+
+    Raises ValueError naming the value that is not finite or negative.
+    """
+
+    position_m: float = 0.02
+    speed_mps: float = 0.02 * KMH
+
+    def __post_init__(self) -> None:
+        for name, value in (("position_m", self.position_m), ("speed_mps", self.speed_mps)):
+            if not math.isfinite(value) or value < 0:
+                raise ValueError(f"process noise {name} = {value!r}: give a finite number of at least 0")
+
+
+NOMINAL_NOISE = PlantNoise()
+NO_NOISE = PlantNoise(0.0, 0.0)
+
+
+class Truth(NamedTuple):
+    """The train at one sample.
+
+    `mu` is the adhesion available at this place and speed, `applied` the part of it that the brake makes use of,
+    min(F, B)/(M g), both without unit.
+    """
+
+    t_ns: int
+    position_m: float
+    speed_mps: float
+    mu: float
+    applied: float
+    pressure_pa: float
+    """Brake-cylinder pressure, gauge."""
+    regime: str
+
+
+def simulate(
+    scenario: Scenario,
+    period_s: float,
+    rng: np.random.Generator,
+    noise: PlantNoise = NOMINAL_NOISE,
+) -> Iterator[Truth]:
+    """Yield the true state every `period_s` from time 0 to the end of the scenario.
+
+    The train never runs backwards, and once at rest stays there. Raises ValueError, at the call, when the period
+    is not finite or shorter than 1 ns.
+    """
+    if not math.isfinite(period_s) or round(period_s * 1e9) < 1:
+        raise ValueError(f"simulation period_s = {period_s!r}: give a finite number of seconds, at least 1e-9")
+    return _run(scenario, round(period_s * 1e9), rng, noise)
+
+
+def _run(scenario: Scenario, period_ns: int, rng: np.random.Generator, noise: PlantNoise) -> Iterator[Truth]:
+    growth = math.sqrt(period_ns / 1e9 / REFERENCE_PERIOD_S)
+    position, speed = 0.0, scenario.speed_mps
+    t_ns, last_ns = 0, round(scenario.end_s * 1e9)
+    ending = False
+    while t_ns <= last_ns:
+        yield _truth(scenario, t_ns, position, speed)
+        if not ending and scenario.end_speed_mps is not None and speed <= scenario.end_speed_mps:
+            ending = True
+            last_ns = min(last_ns, t_ns + round(RUN_ON_S * 1e9))
+        moved, slower = advance(scenario, t_ns / 1e9, period_ns / 1e9, position, speed)
+        jitter = rng.standard_normal(2) * growth
+        if slower > 0.0:
+            moved = max(moved + noise.position_m * float(jitter[0]), position)
+            slower = max(slower + noise.speed_mps * float(jitter[1]), 0.0)
+        position, speed = moved, slower
+        t_ns += period_ns
+
+
+def advance(
+    scenario: Scenario, time_s: float, duration_s: float, position_m: float, speed_mps: float
+) -> tuple[float, float]:
+    """Position and speed after `duration_s` of undisturbed motion from `time_s`: midpoint rule, exact at a stop."""
+    substeps = math.ceil(duration_s / SUBSTEP_S - 1e-9)
+    h = duration_s / substeps
+    for i in range(substeps):
+        if speed_mps <= 0.0:
+            return position_m, 0.0
+        start = time_s + i * h
+        slowing = _deceleration(scenario, start, position_m, speed_mps)
+        half_speed = max(speed_mps - slowing * h / 2, 0.0)
+        slowing = _deceleration(scenario, start + h / 2, position_m + speed_mps * h / 2, half_speed)
+        running = h if slowing * h <= speed_mps else speed_mps / slowing
+        position_m += (speed_mps - slowing * running / 2) * running
+        speed_mps = speed_mps - slowing * h if running == h else 0.0
+    return position_m, speed_mps
+
+
+def _deceleration(scenario: Scenario, time_s: float, position_m: float, speed_mps: float) -> float:
+    """Deceleration, m/s^2: none before the brake, where traction balances the resistance and holds the speed."""
+    if time_s < scenario.brake.start_s:
+        return 0.0
+    mu = scenario.rail.mu(position_m, speed_mps)
+    brake = scenario.train.specific_brake(scenario.brake.gauge_pressure(time_s))
+    return float(scenario.train.deceleration(mu, brake, _resistance(scenario, position_m, speed_mps)))
+
+
+def _resistance(scenario: Scenario, position_m: float, speed_mps: float) -> Array:
+    """Resistance of train and track per weight, N/N (5)."""
+    running = scenario.train.specific_resistance(np.asarray(speed_mps))
+    return running + scenario.track.specific_resistance(np.asarray(position_m))
+
+
+def _truth(scenario: Scenario, t_ns: int, position_m: float, speed_mps: float) -> Truth:
+    mu = scenario.rail.mu(position_m, speed_mps)
+    pressure = scenario.brake.gauge_pressure(t_ns / 1e9)
+    if pressure <= 0.0:
+        return Truth(t_ns, position_m, speed_mps, mu, 0.0, pressure, COASTING)
+    if speed_mps <= 0.0:  # the rail is asked for nothing, so nothing of mu can be seen
+        return Truth(t_ns, position_m, speed_mps, mu, 0.0, pressure, BRAKE_LIMITED)
+    brake = scenario.train.specific_brake(pressure)
+    applied = float(scenario.train.used_adhesion(mu, brake, _resistance(scenario, position_m, speed_mps)))
+    regime = BRAKE_LIMITED if applied < mu else ADHESION_LIMITED
+    return Truth(t_ns, position_m, speed_mps, mu, applied, pressure, regime)

@@ -1,0 +1,227 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Scenarios as data: how fast the train runs, where the rail changes, when it brakes, and when the run ends."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+from types import MappingProxyType
+
+import numpy as np
+
+from adhesion_node.core.physics.adhesion import DRY, SNOW, WET, SpeedLaw
+from adhesion_node.core.physics.track import LEVEL, Grade, Track, Tunnel
+from adhesion_node.core.physics.train import CRH3, KMH, Train
+
+RUN_ON_S = 2.0
+"""A run goes on so long after its end speed is reached, so that the end is seen through noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rail:
+    """Adhesion along the track: `laws` holds (from_position_m, law), each valid up to the next one's position.
+
+    The first law also holds before its position. Raises ValueError when there is none or the positions do not
+    increase.
+    """
+
+    laws: tuple[tuple[float, SpeedLaw], ...]
+    _starts: tuple[float, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        starts = tuple(start for start, _ in self.laws)
+        if not starts or any(not later > earlier for earlier, later in pairwise(starts)):
+            raise ValueError(f"rail positions = {starts}: give at least one, in increasing order")
+        object.__setattr__(self, "_starts", starts)
+
+    def mu(self, position_m: float, speed_mps: float) -> float:
+        """Adhesion coefficient available at a place and speed."""
+        law = self.laws[max(bisect_right(self._starts, position_m) - 1, 0)][1]
+        return float(law(np.asarray(speed_mps)))
+
+
+@dataclass(frozen=True, slots=True)
+class Brake:
+    """The brake: from `start_s` the cylinder pressure rises within `build_up_s` to `pressure_pa`, gauge.
+
+    Raises ValueError naming the value that is not finite or negative (`start_s` may be infinite: no brake).
+    """
+
+    start_s: float
+    pressure_pa: float = CRH3.full_pressure_pa
+    build_up_s: float = 0.0
+    """0: full pressure at once, as in the paper's figures."""
+
+    def __post_init__(self) -> None:
+        for name, value in (("pressure_pa", self.pressure_pa), ("build_up_s", self.build_up_s)):
+            if not math.isfinite(value) or value < 0:
+                raise ValueError(f"brake {name} = {value!r}: give a finite number of at least 0")
+        if not self.start_s >= 0:
+            raise ValueError(f"brake start_s = {self.start_s!r}: give a time of at least 0, or inf for no brake")
+
+    def gauge_pressure(self, time_s: float) -> float:
+        """Cylinder pressure, Pa above the atmosphere, at a time of the run.
+
+        >>> [Brake(20.0, 400e3, build_up_s=2.0).gauge_pressure(t) for t in (19.9, 20.0, 21.0, 30.0)]
+        [0.0, 0.0, 200000.0, 400000.0]
+        """
+        since = time_s - self.start_s
+        if since < 0:
+            return 0.0
+        return self.pressure_pa * (min(since / self.build_up_s, 1.0) if self.build_up_s else 1.0)
+
+
+NO_BRAKE = Brake(math.inf)
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A run of a train that starts at position 0 and time 0.
+
+    It ends `RUN_ON_S` after the train is down to `end_speed_mps`, and at `end_s` at the latest. Raises ValueError
+    naming the value that is out of range.
+    """
+
+    name: str
+    speed_mps: float
+    rail: Rail
+    end_s: float
+    brake: Brake = NO_BRAKE
+    end_speed_mps: float | None = None
+    track: Track = LEVEL
+    train: Train = CRH3
+
+    def __post_init__(self) -> None:
+        for name, value in (("speed_mps", self.speed_mps), ("end_s", self.end_s)):
+            if not (math.isfinite(value) and value > 0):
+                raise ValueError(f"scenario {self.name}: {name} = {value!r}: give a finite number above 0")
+        if self.end_speed_mps is not None and not 0 <= self.end_speed_mps < self.speed_mps:
+            raise ValueError(
+                f"scenario {self.name}: end_speed_mps = {self.end_speed_mps!r}: give at least 0 and less than speed_mps"
+            )
+
+
+CRUISE_S = 20.0
+"""Every braking run cruises so long first."""
+
+# The brake starts in the first sample beyond the border of the rail, on whichever side the process noise (about 1 m
+# after 20 s) puts the train: the border lies half a 10 Hz sample before the place of the braking.
+_BEFORE_BRAKING_S = 0.05
+
+# 3.6 km hold the whole braking of tunnel_entry (3.5 km and the run-on). By (10) such a tunnel adds 0.000468 N/N or
+# 0.0046 m/s^2, 0.6 % of the braking: an estimator that believes in a level open line reads mu too high by 0.0005.
+_TUNNEL_M = 3600.0
+
+
+def braking_place(speed_mps: float) -> float:
+    """Position, m, of the rail's border just before the braking that follows `CRUISE_S` of cruising."""
+    return speed_mps * (CRUISE_S - _BEFORE_BRAKING_S)
+
+
+def _tunnel_entry() -> Scenario:
+    speed = 300 * KMH
+    portal = braking_place(speed)
+    return Scenario(
+        name="tunnel_entry",
+        speed_mps=speed,
+        rail=Rail(((0.0, DRY), (portal, WET))),
+        track=Track((Tunnel(portal, portal + _TUNNEL_M),)),
+        brake=Brake(CRUISE_S),
+        end_speed_mps=100 * KMH,
+        end_s=200.0,
+    )
+
+
+def _tunnel_exit() -> Scenario:
+    speed = 250 * KMH
+    portal = braking_place(speed)
+    return Scenario(
+        name="tunnel_exit",
+        speed_mps=speed,
+        rail=Rail(((0.0, DRY), (portal, WET))),
+        # Left before the braking, so that the tunnel costs traction only: 2 km, 0.00026 N/N.
+        track=Track((Tunnel(portal - 2000.0, portal),)),
+        brake=Brake(CRUISE_S),
+        end_speed_mps=50 * KMH,
+        end_s=200.0,
+    )
+
+
+def _cruise() -> Scenario:
+    return Scenario(name="cruise", speed_mps=300 * KMH, rail=Rail(((0.0, DRY),)), end_s=60.0)
+
+
+def _dry_braking() -> Scenario:
+    # A stop on dry rail: the brake is weaker than the adhesion all the way.
+    return Scenario(
+        name="dry_braking",
+        speed_mps=300 * KMH,
+        rail=Rail(((0.0, DRY),)),
+        brake=Brake(CRUISE_S),
+        end_speed_mps=0.0,
+        end_s=200.0,
+    )
+
+
+def _low_adhesion_patch() -> Scenario:
+    # Braking on wet rail; 500 m on, 1 km of it (leaves, oil) gives 0.45 of the wet adhesion.
+    speed = 250 * KMH
+    patch = braking_place(speed) + 500.0
+    return Scenario(
+        name="low_adhesion_patch",
+        speed_mps=speed,
+        rail=Rail(((0.0, WET), (patch, replace(WET, scale=0.45)), (patch + 1000.0, WET))),
+        brake=Brake(CRUISE_S),
+        end_speed_mps=50 * KMH,
+        end_s=200.0,
+    )
+
+
+def _open_line(
+    name: str, law: SpeedLaw, *, track: Track = LEVEL, train: Train = CRH3, end_s: float = 200.0
+) -> Scenario:
+    """From 300 to 100 km/h on one rail; what differs from `LEVEL` and `CRH3` is unknown to an estimator."""
+    return Scenario(
+        name=name,
+        speed_mps=300 * KMH,
+        rail=Rail(((0.0, law),)),
+        track=track,
+        train=train,
+        brake=Brake(CRUISE_S),
+        end_speed_mps=100 * KMH,
+        end_s=end_s,
+    )
+
+
+_OPEN_LINE = (
+    _open_line("constant_adhesion", SpeedLaw(0.07)),
+    _open_line("snow", SNOW),
+    _open_line("scaled_wet", replace(WET, scale=0.8)),
+    # Worn or glazed pads: 60 % of the force that the pressure promises, less than the wet rail takes at any speed.
+    _open_line("weak_brake", WET, train=replace(CRH3, pad_friction=0.6 * CRH3.pad_friction)),
+    _open_line("grade_unknown", WET, track=Track((Grade(0.0, 20e3, -100.0),))),
+    _open_line("overweight", WET, train=replace(CRH3, mass_kg=1.1 * CRH3.mass_kg)),
+    # A quarter of the wet adhesion: for more than three minutes nothing changes, and no change may be reported.
+    _open_line("long_braking", replace(WET, scale=0.25), end_s=400.0),
+)
+
+SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
+    {
+        s.name: s
+        for s in (_tunnel_entry(), _tunnel_exit(), _cruise(), _dry_braking(), _low_adhesion_patch(), *_OPEN_LINE)
+    }
+)
+"""The scenarios by name."""
+
+
+def find(name: str) -> Scenario:
+    """Return the scenario of that name; ValueError naming it and listing the known ones when there is none."""
+    try:
+        return SCENARIOS[name]
+    except KeyError:
+        raise ValueError(f"scenario = {name!r}: give one of {', '.join(SCENARIOS)}") from None

@@ -1,0 +1,199 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Recordings that were killed, cut, damaged, split, or made by others: what is left is read, what is not is said."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from mcap.opcode import Opcode
+from mcap.reader import make_reader
+from mcap.summary import Summary
+from recorded import S, write_steps
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+
+from adhesion_node.bag import BagReader, Record, sensors, typestore
+from adhesion_node.bag.writer import file_name
+from adhesion_node.wire.topics import POSITION
+
+WRITER_THAT_IS_KILLED = """
+import sys
+from adhesion_node.bag import BagWriter, sensors
+from adhesion_node.wire.topics import POSITION
+writer = BagWriter(sys.argv[1])
+step = 0
+while True:
+    writer.write("/position", POSITION.type, sensors.position(step * 10**7, step / 7, 0.25), step * 10**7)
+    step += 1
+    if step % 100 == 0:  # a second of a 100 Hz sensor
+        writer.flush()
+        print(step, flush=True)
+"""
+
+
+def test_a_killed_recording_loses_at_most_what_was_not_flushed(tmp_path: Path) -> None:
+    path = tmp_path / "bag"
+    with subprocess.Popen(
+        [sys.executable, "-c", WRITER_THAT_IS_KILLED, str(path)], stdout=subprocess.PIPE, env=child_environment()
+    ) as process:
+        assert process.stdout is not None
+        flushed = [int(process.stdout.readline()) for _ in range(20)][-1]
+        process.send_signal(signal.SIGKILL)
+        flushed = max([flushed, *(int(line) for line in process.stdout if line.endswith(b"\n"))])
+    assert process.returncode == -signal.SIGKILL
+    assert not (path / "metadata.yaml").exists()
+    with BagReader(path) as reader:
+        assert not reader.complete
+        assert "breaks off" in reader.damage[0]
+        steps = [record.log_ns // 10**7 for record in reader.messages()]
+    assert steps == list(range(len(steps)))
+    assert len(steps) >= flushed
+
+
+def child_environment() -> dict[str, str]:
+    """The environment without what rclpy's wheels leave in it for their own process."""
+    private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
+    return {name: value for name, value in os.environ.items() if name not in private}
+
+
+def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path) -> None:
+    written = write_steps(tmp_path / "bag", 1500)
+    whole = (tmp_path / "bag" / file_name(0)).read_bytes()
+    cut = tmp_path / "cut.mcap"
+    lengths: list[int] = []
+    summary = index_of(tmp_path / "bag" / file_name(0))
+    for size in np.linspace(summary.chunk_indexes[1].chunk_start_offset, len(whole) - 1, 60).astype(int).tolist():
+        cut.write_bytes(whole[:size])
+        with BagReader(cut) as reader:
+            read = list(reader.messages())
+            assert not reader.complete
+        assert read == written[: len(read)]
+        lengths.append(len(read))
+    assert lengths == sorted(lengths)
+    assert lengths[-1] == len(written), "only the end of the file is missing"
+    assert len(set(lengths)) == len(summary.chunk_indexes) >= 5, "the cuts fall into every chunk but the first"
+    cut.write_bytes(whole[: summary.chunk_indexes[0].chunk_start_offset + 300])
+    with pytest.raises(ValueError, match="holds no readable message"):
+        BagReader(cut)
+
+
+def index_of(file: Path) -> Summary:
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    return summary
+
+
+def test_a_damaged_chunk_is_left_out_and_reported(tmp_path: Path) -> None:
+    written = write_steps(tmp_path / "bag", 1500)
+    file = tmp_path / "bag" / file_name(0)
+    data = bytearray(file.read_bytes())
+    data[index_of(file).chunk_indexes[2].chunk_start_offset + 200] ^= 0xFF
+    file.write_bytes(data)
+    with BagReader(tmp_path / "bag") as reader:
+        read = list(reader.messages())
+        assert not reader.complete
+        assert "is damaged at byte" in reader.damage[0]
+    assert 0 < len(read) < len(written)
+    kept = iter(written)
+    assert all(record in kept for record in read), "what is left is in order and unchanged"
+    assert read[-1] == written[-1]
+
+
+def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
+    """One wrong bit makes the one kind of record the other."""
+    written = write_steps(tmp_path / "bag", 20)
+    file = tmp_path / "bag" / file_name(0)
+    data = bytearray(file.read_bytes())
+    chunk = index_of(file).chunk_indexes[0]
+    place = chunk.chunk_start_offset + chunk.chunk_length
+    assert data[place] == Opcode.MESSAGE_INDEX
+    data[place] = Opcode.MESSAGE
+    file.write_bytes(data)
+    with BagReader(tmp_path / "bag") as reader:
+        assert list(reader.messages()) == written
+        assert not reader.complete
+        assert "is damaged at byte" in reader.damage[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("x.mcap", b"", r"x\.mcap: is empty: name another recording"),
+        ("x.mcap", b"garbage " * 100, r"x\.mcap: is not an MCAP file"),
+        ("x.mcap", b"\x89MCAP0\r\n", r"x\.mcap: holds no readable message \(.*breaks off"),
+        ("x.mcap", b"\x89MCAP0\r\n" + b"\xff" * 300, r"x\.mcap: holds no readable message"),
+        ("x.db3", b"garbage " * 100, r"x\.db3: unreadable \(.*\): name another recording"),
+        ("x.bag", b"#ROSBAG V2.0", r"x\.bag: is no recording of ROS 2: convert it with rosbags-convert"),
+        ("x.txt", b"text", r"x\.txt: is no recording of ROS 2: name a rosbag2 directory or an \.mcap file"),
+    ],
+)
+def test_what_is_no_recording_is_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(ValueError, match=message):
+        BagReader(tmp_path / name)
+
+
+def test_directories_without_a_recording_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match=r"missing: does not exist: name a rosbag2 directory"):
+        BagReader(tmp_path / "missing")
+    with pytest.raises(ValueError, match=r"holds no \.mcap or \.db3 file"):
+        BagReader(tmp_path)
+
+
+def test_broken_metadata_does_not_matter(tmp_path: Path) -> None:
+    written = write_steps(tmp_path / "bag", 3)
+    (tmp_path / "bag" / "metadata.yaml").write_text("{ this is : [ no yaml")
+    with BagReader(tmp_path / "bag") as reader:
+        assert list(reader.messages()) == written
+
+
+def test_a_missing_file_of_a_split_recording_is_reported(tmp_path: Path) -> None:
+    written = write_steps(tmp_path / "bag", 3)
+    metadata = tmp_path / "bag" / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace(f"- {file_name(0)}\n", f"- {file_name(0)}\n  - bag_1.mcap\n"))
+    with BagReader(tmp_path / "bag") as reader:
+        assert list(reader.messages()) == written
+        assert not reader.complete
+        assert reader.damage[0].endswith("bag_1.mcap is missing")
+
+
+def test_split_recordings_are_merged(tmp_path: Path) -> None:
+    one, two = write_steps(tmp_path / "one", 300), write_steps(tmp_path / "two", 300, first=200)
+    both = tmp_path / "both"
+    both.mkdir()
+    (tmp_path / "one" / file_name(0)).rename(both / "x_9.mcap")
+    (tmp_path / "two" / file_name(0)).rename(both / "x_10.mcap")
+    with BagReader(both) as reader:
+        assert list(reader.messages()) == sorted([*one, *two], key=lambda record: record.log_ns)
+
+
+@pytest.mark.parametrize("plugin", StoragePlugin)
+@pytest.mark.parametrize("compression", CompressionMode)
+def test_recordings_of_other_recorders(tmp_path: Path, plugin: StoragePlugin, compression: CompressionMode) -> None:
+    if plugin is StoragePlugin.SQLITE3 and compression is CompressionMode.STORAGE:
+        pytest.skip("sqlite3 has no compression of its own")
+    path = tmp_path / "foreign"
+    foreign = Writer(path, version=9, storage_plugin=plugin)
+    foreign.set_compression(compression, CompressionFormat.ZSTD)
+    topic = "/train1/odometry/position"
+    written = [
+        Record(topic, POSITION.type, sensors.position(step * S, float(step), 0.25), step * S) for step in range(50)
+    ]
+    with foreign:
+        connection = foreign.add_connection(topic, POSITION.type, typestore=typestore())
+        for record in written:
+            foreign.write(connection, record.log_ns, record.cdr)
+    with BagReader(path) as reader:
+        assert reader.complete
+        assert reader.topics == {topic: POSITION.type}
+        assert reader.counts == {topic: 50}
+        assert list(reader.messages()) == written
+        assert list(reader.messages(["position"])) == []

@@ -1,0 +1,48 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Which topics of a recording are whose: names, renamed ones, and what does not fit."""
+
+from __future__ import annotations
+
+import pytest
+
+from adhesion_node.bag import parse_remap, select
+from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, RECORDED, WHEEL_SPEED
+
+RECORDED_ELSEWHERE = {"/odo/pose": POSITION.type, "/brake_pressure": BRAKE_PRESSURE.type, "/x": MU.type}
+
+
+def test_selection_renames_and_takes_sensors_and_truth_alone() -> None:
+    own = {f"/{topic.name}": topic.type for topic in RECORDED} | {CLOCK.name: CLOCK.type}
+    sensors = ("position", "brake_pressure", "speed", "wheel_speed", "traction_force")
+    assert select(own) == {f"/{name}": name for name in (*sensors, "truth/state", "truth/mu")}
+    creep = {"/wheel_speed": WHEEL_SPEED.type}
+    assert select(creep) == {"/wheel_speed": "wheel_speed"}, "a recording for the creep curve needs no position"
+    remapped = select(RECORDED_ELSEWHERE, [parse_remap("odo/pose:=/position")])
+    assert remapped == {"/odo/pose": "position", "/brake_pressure": "brake_pressure"}
+    assert select(RECORDED_ELSEWHERE, [], ["brake_pressure", "/x"]) == {"/brake_pressure": "brake_pressure", "/x": "/x"}
+    displaced = select(own | {"/gnss": POSITION.type}, [("/gnss", "position")], ["position"])
+    assert displaced == {"/gnss": "position"}
+
+
+@pytest.mark.parametrize(
+    ("remaps", "names", "message"),
+    [
+        ([], None, r"topic position: not in the recording\. It holds: /brake_pressure \(.*--remap /odo/pose:=position"),
+        ([("/odo", "position")], None, r"remap from /odo: not in the recording\. It holds: .*--remap /odo/pose:="),
+        ([("/x", "position")], None, r"topic /x: type = std_msgs/msg/Float64: position needs geometry_msgs/msg/Pose"),
+        ([], ["speed"], r"topic speed: not in the recording\. .*--remap /recorded/name:=speed"),
+    ],
+)
+def test_a_selection_that_does_not_fit_says_so(
+    remaps: list[tuple[str, str]], names: list[str] | None, message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        select(RECORDED_ELSEWHERE, remaps, names)
+
+
+@pytest.mark.parametrize("text", ["", "a", "a:=", ":=b", "a:=b:=c", "/:=b"])
+def test_a_remap_without_two_names_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match=r"write FROM:=TO, for instance /odometry/position:=position"):
+        parse_remap(text)

@@ -1,0 +1,195 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`bench`: the comparisons run, agree with exact smoothers and have the shape that others rely on. Nothing is timed."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import Any
+from unittest import mock
+
+import numpy as np
+import pytest
+from oracles import Linear, make_window, rts
+
+from adhesion_node.bench import __main__ as bench
+from adhesion_node.bench import gaussian, particle, scene, step
+from adhesion_node.bench.timing import Contender, figures, interleave
+from adhesion_node.core.belief.gaussian import Gaussian
+
+
+@pytest.fixture
+def few_windows(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An estimator that has little to do: what it finds does not matter here."""
+    monkeypatch.setattr(step, "CONFIG", replace(step.CONFIG, step=45, iterations=1))
+
+
+def peer(name: str) -> Any:
+    """A module of `bench` that needs a peer, or a skip where the extra is not installed."""
+    pytest.importorskip(name)
+    return pytest.importorskip(f"adhesion_node.bench.{name}_smoother")
+
+
+def test_contenders_take_turns_after_a_warm_up() -> None:
+    calls: list[str] = []
+
+    def called(name: str) -> Contender[None]:
+        return Contender(name, lambda: calls.append(name), {"a": 7, "b": 7, "slow": 2}[name])
+
+    timed = interleave([called("a"), called("b"), called("slow")])
+    assert calls[:3] == ["a", "b", "slow"]
+    assert calls[3:] == ["a", "b", "slow", *["a", "b"] * 3, "a", "b", "slow", *["a", "b"] * 2]
+    assert {name: len(runs.seconds) for name, runs in timed.items()} == {"a": 7, "b": 7, "slow": 2}
+    assert all(seconds >= 0.0 for runs in timed.values() for seconds in runs.seconds)
+
+
+def test_results_stand_beside_their_times() -> None:
+    numbers: Iterator[int] = iter(range(10))
+    timed = interleave([Contender("count", lambda: next(numbers), 4)])
+    assert timed["count"].results == [1, 2, 3, 4]  # 0 was the warm-up
+
+
+def test_figures_are_in_ms() -> None:
+    found = figures([0.001] * 98 + [0.003, 0.009])
+    assert found == {"calls": 100, "median_ms": 1.0, "p99_ms": pytest.approx(3.06), "max_ms": 9.0}
+
+
+def test_a_window_is_drawn_from_the_model() -> None:
+    motion, prior, window = scene.braking_window(400, np.random.default_rng(1))
+    s, v, errors = *prior.mean, []
+    for k in range(400):
+        v, s = v - 0.1 * 9.8 * (scene.MU + float(motion.train.specific_resistance(np.asarray(v)))), s + 0.1 * v
+        errors.append(window.position_m[k] - s)
+    assert np.std(np.diff(errors)) == pytest.approx(math.sqrt(2.0) * scene.SIGMA_M, rel=0.15)
+    assert abs(errors[49]) < 5.0
+
+
+def test_a_journey_brakes_again_and_again_and_keeps_its_speed_in_bounds() -> None:
+    pairs = list(islice(journey := scene.journey(10.0, np.random.default_rng(2)), 4000))
+    assert next(journey)[0].t_ns == 400_000_000_000
+    braked = np.array([pressure.pressure_pa > 0.0 for pressure, _ in pairs])
+    position = np.array([sample.position_m for _, sample in pairs])
+    assert np.count_nonzero(np.diff(braked.astype(int)) == 1) >= 3
+    speed = (position[20:] - position[:-20]) / 2.0
+    assert speed.min() > scene.SLOWEST_MPS - 2.0
+    assert speed.max() < scene.FASTEST_MPS + 2.0
+    acceleration = np.diff(speed[::20]) / 2.0
+    assert acceleration[braked[20:-20][::20][: acceleration.size]].mean() < -0.6
+
+
+def test_rts_of_filterpy_is_the_exact_smoother() -> None:
+    model = Linear(c0=0.79, c1=0.05)
+    prior = Gaussian(np.array([100.0, 80.0]), np.array([[0.09, 0.01], [0.01, 0.04]]))
+    window = make_window(model, prior, 0.07, np.random.default_rng(3))
+    window = replace(window, dt_s=np.linspace(0.05, 0.2, window.steps))
+    exact = rts(model, prior, window, 0.06)
+    laws = peer("filterpy").rts_window(model.motion, prior, window, 0.06)
+    np.testing.assert_allclose(laws.mean, exact.mean, rtol=1e-9)
+    np.testing.assert_allclose(laws.covariance, exact.cov, rtol=1e-6)
+
+
+def test_smoothers_of_particles_are_exact_up_to_monte_carlo_error() -> None:
+    model, smoothers = Linear(c0=0.79, c1=0.05, q_s=0.05, q_v=0.1), peer("particles")
+    prior = Gaussian(np.array([100.0, 80.0]), np.array([[0.09, 0.01], [0.01, 0.04]]))
+    window = make_window(model, prior, 0.07, np.random.default_rng(3), steps=8)
+    exact = rts(model, prior, window, 0.07)
+    drawn = scene.Scene(model.motion, prior, window)
+    for smoother in (smoothers.mcmc, smoothers.exact):
+        means = np.array([smoother(drawn, 0.07, 100).mean(axis=1) for _ in range(20)])
+        assert means.shape == (20, 9, 2)
+        errors = means.std(axis=0, ddof=1) / math.sqrt(20)
+        assert np.all(np.abs(means.mean(axis=0) - exact.mean) < 6.0 * errors)
+
+
+def test_particle_comparison_has_a_row_per_smoother() -> None:
+    peer("particles")
+    rows = particle.compare(steps=5, count=20, rounds=3, seed=1)
+    assert [row["method"] for row in rows] == [particle.OURS, particle.MCMC, particle.EXACT]
+    assert [row["calls"] for row in rows] == [3, 3, 1]
+    assert rows[0]["ratio"] == 1.0
+    assert rows[0]["differs_mps"] == 0.0
+    for row in rows:
+        assert row["ratio"] == pytest.approx(row["median_ms"] / rows[0]["median_ms"])
+        assert row["mu"] == pytest.approx(scene.MU, abs=0.02)
+        assert row["differs_mps"] < 0.2
+
+
+def test_gaussian_comparison_ends_everywhere_in_the_same_adhesion() -> None:
+    peer("filterpy")
+    rows = {row["method"]: row for row in gaussian.compare(steps=30, rounds=2, seed=1)}
+    assert list(rows) == [gaussian.OURS, gaussian.PASS, gaussian.FIFTY, gaussian.CONVERGED]
+    assert [row["calls"] for row in rows.values()] == [2, 2, 2, 1]
+    assert rows[gaussian.OURS]["mu_differs"] == 0.0
+    assert rows[gaussian.PASS]["iterations"] == 1
+    converged = rows[gaussian.CONVERGED]
+    assert 50 < converged["iterations"] < gaussian.MOST_ITERATIONS
+    assert converged["mu_differs"] < 1e-5
+    assert converged["speed_differs_mps"] < 1e-3
+    assert converged["ratio"] == pytest.approx(converged["median_ms"] / rows[gaussian.OURS]["median_ms"])
+
+
+@pytest.mark.usefixtures("few_windows")
+def test_latency_is_that_of_steady_braking() -> None:
+    row = step.latency(10.0, rounds=1, seed=1)
+    assert 300 < row["calls"] < 600
+    assert row["headroom"] == pytest.approx(row["samples_per_cpu_second"] / 10.0)
+    assert row["cpu_p99_ms"] > 0.0
+    assert 0.0 < row["median_ms"] <= row["p99_ms"] <= row["max_ms"]
+
+
+@pytest.mark.usefixtures("few_windows")
+def test_memory_is_read_while_the_estimator_runs() -> None:
+    row = step.memory(1.0, 10.0, seed=1)
+    assert row["windows"] >= 8
+    assert row["growth_mb"] == pytest.approx(row["end_mb"] - row["filled_mb"])
+    assert row["end_mb"] > 10.0
+
+
+def test_resident_memory_grows_with_what_is_held() -> None:
+    before = step.resident_mb()
+    held = np.ones(4_000_000)
+    assert step.resident_mb() - before == pytest.approx(held.nbytes / 2**20, abs=8.0)
+
+
+@pytest.mark.usefixtures("few_windows")
+def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str]) -> None:
+    options = ["step", "memory", "--journeys", "1", "--minutes", "0.5"]
+    assert bench.main([*options, "--json", "-"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert set(result) == {"versions", "seed", "step", "memory"}
+    assert [row["rate_hz"] for row in result["step"]["rows"]] == [10.0, 100.0]
+    assert result["versions"]["numpy"] == np.__version__
+    assert bench.main(["memory", "--minutes", "0.2"]) == 0
+    shown = capsys.readouterr().out
+    assert f"numpy {np.__version__}" in shown
+    assert "growth_mb" in shown
+    assert "samples_per_cpu_second" not in shown
+
+
+@pytest.mark.parametrize(
+    ("args", "said"),
+    [
+        (["speed"], "choose of particle, gaussian, step, memory"),
+        (["--rounds", "0"], "rounds = 0"),
+        (["memory", "--minutes", "inf"], "minutes = inf"),
+        (["--seed", "-1"], "seed = -1"),
+    ],
+)
+def test_bad_options_are_one_line_and_code_2(args: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert bench.main(args) == 2
+    out, err = capsys.readouterr()
+    assert (out, len(err.splitlines())) == ("", 1)
+    assert said in err
+
+
+def test_a_missing_peer_is_said_with_the_remedy(capsys: pytest.CaptureFixture[str]) -> None:
+    with mock.patch.dict(sys.modules, {"particles": None}), mock.patch.object(bench, "find_spec", return_value=None):
+        assert bench.main(["particle"]) == 2
+    assert "particles" in (said := capsys.readouterr().err)
+    assert "[bench]" in said

@@ -1,0 +1,244 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""EM of one window, (18)-(34): gradient, exact maximum, likelihood and convergence against the exact smoother."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracles import ExactSmoother, Linear, log_likelihood, make_window, rts
+from scipy.optimize import minimize_scalar
+
+from adhesion_node.core.belief.gaussian import Gaussian, filter_window
+from adhesion_node.core.belief.rail import kept_of_start
+from adhesion_node.core.belief.window import Window
+from adhesion_node.core.methods.particle_em.em import (
+    Expectation,
+    Identified,
+    ParticleSmoother,
+    Search,
+    expectation,
+    gradient,
+    identify,
+    maximise,
+)
+from adhesion_node.core.methods.particle_em.particles import expected_log_likelihood, particle_filter, particle_smoother
+from adhesion_node.core.physics.motion import Motion
+from adhesion_node.core.physics.track import LEVEL, Grade, Track
+from adhesion_node.core.physics.train import CRH3
+
+PRIOR = Gaussian(np.array([100.0, 80.0]), np.array([[0.04, 0.005], [0.005, 0.01]]))
+SEEN = Linear(c0=0.79, c1=0.02, q_s=1e-4, q_v=2e-3)
+"""Loud and measured well: a window's positions hold a good share of what its states do, so EM moves."""
+
+
+def _window(mu: float = 0.06, seed: int = 10, brake: float = 0.0952) -> Window:
+    return make_window(SEEN, PRIOR, mu, np.random.default_rng(seed), steps=30, sigma_m=0.1, brake=brake)
+
+
+def _rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def _best_mu(window: Window, limit: float = 0.0952) -> float:
+    """Maximum-likelihood mu: the best of a dense grid, polished."""
+    grid = np.linspace(0.0, limit, 400)
+    best = grid[np.argmax([log_likelihood(SEEN, PRIOR, window, mu) for mu in grid])]
+    found = minimize_scalar(
+        lambda mu: -log_likelihood(SEEN, PRIOR, window, mu),
+        bounds=(max(best - 1e-3, 0.0), min(best + 1e-3, limit)),
+        method="bounded",
+        options={"xatol": 1e-10},
+    )
+    return float(found.x)
+
+
+@pytest.mark.parametrize("track", [LEVEL, Track((Grade(0.0, 104.0, 1.0),))], ids=["level", "grade"])
+@pytest.mark.parametrize("mu", [0.0, 0.03, 0.05, 0.08, 0.2])
+def test_gradient_29_to_32_is_the_slope_of_i2(mu: float, track: Track) -> None:
+    """At the start's mu and elsewhere, below, between and above the brakes of the steps."""
+    motion, h = Motion(CRH3, track, 0.05, 0.1), 1e-6
+    window = replace(_window(), brake=np.linspace(0.04, 0.0952, 30), dt_s=np.linspace(0.05, 0.2, 30))
+    particles = particle_filter(motion, PRIOR, window, 0.05, 15, _rng())
+    smoothed = particle_smoother(motion, particles, window, 0.05)
+    low, high = (expected_log_likelihood(motion, PRIOR, particles, smoothed, window, mu + d) for d in (-h, h))
+    slope = gradient(expectation(motion, particles, smoothed, window), mu)
+    assert slope == pytest.approx((high[1] - low[1]) / (2 * h), rel=1e-4, abs=1e-3)
+    assert (low[0], low[2]) == (high[0], high[2])  # I1 and I3 do not depend on mu
+    if mu == 0.2:
+        assert slope == 0.0
+
+
+def test_gradient_by_hand() -> None:
+    expected = Expectation(np.array([0.05, 0.09]), np.array([2e4, 1e4]), np.array([0.08, 0.10]), 0.0, 0.0)
+    assert gradient(expected, 0.06) == pytest.approx(2e4 * -0.01 + 1e4 * 0.03)
+    assert gradient(expected, 0.085) == pytest.approx(1e4 * 0.005)  # the first step is at its brake's limit
+    assert gradient(expected, 0.11) == 0.0
+
+
+def test_weight_is_the_information_of_a_step() -> None:
+    window = _window()
+    expected = ExactSmoother(SEEN)(SEEN.motion, PRIOR, window, 0.05, _rng())
+    # T = 0.1: (9.8 T)^2/(q_v T) + (9.8 T^2/2)^2/(q_s T) = 0.9604/2e-4 + 0.002401/1e-5 = 4802 + 240.1
+    assert expected.weight == pytest.approx(np.full(30, 5042.1))
+    particles = particle_filter(SEEN.motion, PRIOR, window, 0.05, 5, _rng())
+    smoothed = particle_smoother(SEEN.motion, particles, window, 0.05)
+    ours = expectation(SEEN.motion, particles, smoothed, window)
+    assert ours.weight == pytest.approx(expected.weight)
+    assert ours.limit == pytest.approx(window.brake)
+
+
+def _q(expected: Expectation, mu: np.ndarray) -> np.ndarray:
+    used = np.minimum(mu[:, None], expected.limit)
+    return np.asarray(-0.5 * np.sum(expected.weight * (used - expected.used) ** 2, axis=1))
+
+
+def _expectations() -> Iterator[tuple[Expectation, float]]:
+    rng = np.random.default_rng(11)
+    for case in range(60):
+        k = int(rng.integers(1, 8))
+        limit = rng.choice([0.03, 0.06, 0.0952], k) if case % 2 else rng.uniform(0.0, 0.1, k)
+        used = rng.normal(0.06, 0.05, k)
+        yield Expectation(used, rng.uniform(1.0, 1e4, k), limit, 0.0, 0.0), float(rng.choice([0.0, -0.05, 0.04]))
+
+
+def test_maximum_33_beats_a_dense_grid_and_scipy() -> None:
+    at_kink = 0
+    for expected, lowest in _expectations():
+        mu = maximise(expected, lowest)
+        grid = np.linspace(lowest, 0.15, 20_001)
+        values = _q(expected, grid)
+        best = minimize_scalar(
+            lambda m, e=expected: -_q(e, np.array([m]))[0],
+            bounds=(max(lowest, grid[np.argmax(values)] - 1e-4), grid[np.argmax(values)] + 1e-4),
+            method="bounded",
+        )
+        found = _q(expected, np.array([mu]))[0]
+        assert found >= max(values.max(), -best.fun) - 1e-9 * (1 + abs(found))
+        assert lowest <= mu <= max(lowest, expected.limit.max())
+        at_kink += bool(np.any(np.isclose(mu, expected.limit, atol=1e-12)))
+    assert at_kink > 5  # the cases do visit the kinks
+
+
+def test_maximum_of_one_parabola_is_its_mean() -> None:
+    expected = Expectation(np.array([0.05, 0.07]), np.array([1.0, 3.0]), np.full(2, 0.0952), 0.0, 0.0)
+    assert maximise(expected, 0.0) == pytest.approx(0.065)  # (0.05 + 3 x 0.07)/4
+    assert gradient(expected, maximise(expected, 0.0)) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_maximum_never_exceeds_what_the_brake_uses_and_respects_the_lowest() -> None:
+    more = Expectation(np.full(3, 0.2), np.ones(3), np.array([0.05, 0.0952, 0.07]), 0.0, 0.0)
+    assert maximise(more, 0.0) == 0.0952
+    forward = Expectation(np.full(3, -0.013), np.ones(3), np.full(3, 0.0952), 0.0, 0.0)
+    assert maximise(forward, 0.0) == 0.0
+    assert maximise(forward, -0.05) == pytest.approx(-0.013)
+
+
+def _exact_em(window: Window, start: float, iterations: int, tolerance: float = 0.0) -> Identified:
+    search = Search(start, iterations, tolerance)
+    return identify(ExactSmoother(SEEN), SEEN.motion, PRIOR, window, search, _rng())
+
+
+@pytest.mark.parametrize("start", [0.0, 0.05, 0.12])
+def test_exact_em_never_lowers_the_likelihood(start: float) -> None:
+    window, mu = replace(_window(), brake=np.linspace(0.03, 0.0952, 30)), start
+    likelihoods = [log_likelihood(SEEN, PRIOR, window, mu)]
+    for _ in range(40):
+        mu = maximise(ExactSmoother(SEEN)(SEEN.motion, PRIOR, window, mu, _rng()), 0.0)
+        likelihoods.append(log_likelihood(SEEN, PRIOR, window, mu))
+    assert np.all(np.diff(likelihoods) >= -1e-9)
+    if start < 0.0952:  # above the largest limit the likelihood is flat
+        assert likelihoods[-1] > likelihoods[0]
+
+
+@pytest.mark.parametrize("start", [0.0, 0.04, 0.09])
+def test_exact_em_converges_to_maximum_likelihood(start: float) -> None:
+    window = _window()
+    best = _best_mu(window)
+    assert 0.02 < best < 0.09  # inside, or the test would be about the bounds
+    found = _exact_em(window, start, 2000, 1e-10)
+    assert found.converged
+    assert found.mu == pytest.approx(best, abs=1e-6)
+    assert found.log_likelihood == pytest.approx(log_likelihood(SEEN, PRIOR, window, best), abs=1e-6)
+
+
+def test_em_at_a_weak_brake_says_at_least_that_much() -> None:
+    """Noise makes the window look braked by a little less, or by more than the brake can: the answer is the brake's."""
+    found = {seed: _exact_em(_window(0.3, seed, brake=0.03), 0.0, 100) for seed in range(3)}
+    assert {one.limit for one in found.values()} == {0.03}
+    for seed, one in found.items():
+        assert one.mu == pytest.approx(_best_mu(_window(0.3, seed, brake=0.03), 0.03), abs=1e-6)
+    assert any(one.mu == 0.03 and not one.converged for one in found.values())
+    assert any(one.mu < 0.03 and one.converged for one in found.values())
+
+
+def test_standing_at_an_end_of_the_range_is_not_convergence() -> None:
+    """A train that is pushed forward: mu stays at 0 without EM having arrived anywhere."""
+    found = _exact_em(_window(-0.02), 0.0, 7, 1e-7)
+    assert (found.mu, found.converged, found.iterations) == (0.0, False, 7)
+
+
+@pytest.mark.parametrize("iterations", [1, 5, 40])
+def test_convergence_rate_is_the_missing_information(iterations: int) -> None:
+    window = _window()
+    best = _best_mu(window)
+    found = _exact_em(window, 0.03, iterations)
+    observed = filter_window(SEEN.motion, PRIOR, window, found.mu).information
+    kept = kept_of_start(observed, found.weight, iterations)
+    assert (found.mu - best) / (0.03 - best) == pytest.approx(kept, abs=1e-5)
+    assert found.iterations == iterations
+
+
+def test_observed_information_is_that_of_the_exact_expectation() -> None:
+    window = _window()
+    found = _exact_em(window, 0.05, 1)
+    assert found.weight == pytest.approx(30 * 5042.1)
+    observed = filter_window(SEEN.motion, PRIOR, window, found.mu).information
+    assert 0.005 < observed / found.weight < 0.5  # neither all seen nor nothing: the rate tests mean something
+
+
+def test_particle_em_is_exact_em_up_to_monte_carlo_error() -> None:
+    """16 independent runs of 15 iterations: their mean within 4 standard errors of exact EM's."""
+    window = _window()
+    exact, search = _exact_em(window, 0.03, 15).mu, Search(0.03, 15, 0.0)
+    runs = [
+        identify(ParticleSmoother(150), SEEN.motion, PRIOR, window, search, np.random.default_rng(seed)).mu
+        for seed in range(16)
+    ]
+    error = float(np.std(runs, ddof=1)) / 4.0
+    assert abs(float(np.mean(runs)) - exact) < 4.0 * error
+    assert error < 0.05 * abs(exact - 0.03)  # it can fail
+
+
+def test_particle_e_step_gives_the_exact_statistics() -> None:
+    window, exact = _window(), ExactSmoother(SEEN)(SEEN.motion, PRIOR, _window(), 0.05, _rng())
+    runs = [ParticleSmoother(150)(SEEN.motion, PRIOR, window, 0.05, np.random.default_rng(seed)) for seed in range(16)]
+    used = np.array([run.used for run in runs])
+    errors = np.std(used, axis=0, ddof=1) / 4.0
+    assert np.all(np.abs(used.mean(axis=0) - exact.used) < 5.0 * errors)  # 30 steps: 5 instead of 4
+    ratios = np.exp([run.log_likelihood - exact.log_likelihood for run in runs])
+    assert abs(np.mean(ratios) - 1.0) < 4.0 * np.std(ratios, ddof=1) / 4.0
+    assert all(1.0 <= run.ess <= 150.0 for run in runs)
+
+
+def test_stops_at_the_tolerance_34_and_not_before() -> None:
+    window = _window()
+    loose, tight = _exact_em(window, 0.03, 500, 1e-5), _exact_em(window, 0.03, 500, 1e-9)
+    assert loose.converged
+    assert tight.converged
+    assert 1 < loose.iterations < tight.iterations < 500
+    one_less = _exact_em(window, 0.03, loose.iterations - 1, 1e-5)
+    assert not one_less.converged
+    assert abs(loose.mu - one_less.mu) <= 1e-5
+
+
+def test_likelihood_of_identify_is_the_filters() -> None:
+    window = _window()
+    found = _exact_em(window, 0.06, 1)
+    assert found.log_likelihood == rts(SEEN, PRIOR, window, 0.06).log_likelihood
+    assert math.isinf(found.ess)

@@ -1,0 +1,123 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The state-space model, (2)(3)(5)(11): steps by hand, finite differences, scipy's densities; the window's data."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from adhesion_node.core.belief.window import Sample, window_of
+from adhesion_node.core.physics.motion import Motion, measurement_log_density
+from adhesion_node.core.physics.track import LEVEL, Grade, Track, Tunnel
+from adhesion_node.core.physics.train import CRH3
+
+Q_S, Q_V = 0.02**2 / 0.1, (0.02 / 3.6) ** 2 / 0.1
+MOTION = Motion(CRH3, LEVEL, Q_S, Q_V)
+V300 = np.array(300 / 3.6)
+
+
+def test_step_2_3_while_adhesion_limits() -> None:
+    # 300 km/h, mu 0.0726: a = 9.8 (0.0726 + 0.01306) = 0.839468; v' = 83.333333 - 0.0839468 = 83.2493865;
+    # s' = 10 + 0.1 (83.3333333 + 83.2493865)/2 = 18.3291360
+    s, v = MOTION.advance(np.array(10.0), V300, 0.1, 0.0952, 0.0726)
+    assert float(v) == pytest.approx(83.24938653, abs=1e-7)
+    assert float(s) == pytest.approx(18.32913599, abs=1e-7)
+
+
+def test_step_2_3_while_the_brake_limits() -> None:
+    # a = 9.8 (0.0952 + 0.01306) = 1.060948 whatever the rail would give; s' = 0.5 (83.3333333 + 82.8028593)/2 = 41.534
+    for mu in (0.0952, 0.15, math.inf):
+        s, v = MOTION.advance(np.array(0.0), V300, 0.5, 0.0952, mu)
+        assert float(v) == pytest.approx(82.80285933, abs=1e-7)
+        assert float(s) == pytest.approx(41.53404817, abs=1e-7)
+
+
+def test_equation_5_adds_the_track_to_the_train() -> None:
+    motion = Motion(CRH3, Track((Grade(0.0, 1000.0, 5.0), Tunnel(500.0, 1000.0))), Q_S, Q_V)
+    # 0.01306 alone; + 0.005; + 0.005 + 0.00013e-3 x 500
+    assert motion.resistance(np.array([-1.0, 1.0, 600.0]), V300) == pytest.approx([0.01306, 0.01806, 0.018125])
+    _, v = motion.advance(np.array(600.0), V300, 0.1, 0.0952, 0.0726)
+    assert float(v) == pytest.approx(83.3333333333 - 0.98 * (0.0726 + 0.018125), abs=1e-9)
+
+
+def test_arrays_of_any_shape_and_a_step_length_each() -> None:
+    rng = np.random.default_rng(0)
+    s, v = rng.uniform(0, 100, (4, 7)), rng.uniform(20, 80, (4, 7))
+    dt, brake = rng.uniform(0.05, 0.2, (4, 1)), rng.uniform(0.03, 0.1, (4, 1))
+    moved, slower = MOTION.advance(s, v, dt, brake, 0.06)
+    for i in range(4):
+        for j in range(7):
+            one = MOTION.advance(np.array(s[i, j]), np.array(v[i, j]), float(dt[i, 0]), float(brake[i, 0]), 0.06)
+            assert (moved[i, j], slower[i, j]) == pytest.approx((float(one[0]), float(one[1])), rel=1e-14)
+
+
+def test_brake_limit_is_what_the_motion_can_tell() -> None:
+    assert float(MOTION.brake_limit(0.0, 80.0, 0.0952)) == 0.0952
+    heavy = Motion(replace(CRH3, rotating_mass_fraction=0.1), LEVEL, Q_S, Q_V)
+    # (0.0952 - 0.1 x 0.01306)/1.1
+    assert float(heavy.brake_limit(0.0, V300, 0.0952)) == pytest.approx(0.085358182, abs=1e-9)
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.2])
+@pytest.mark.parametrize("rho", [0.0, 0.1])
+@pytest.mark.parametrize("speed", [10.0, 50.0, 85.0])
+def test_jacobian_by_finite_differences(speed: float, rho: float, mu: float) -> None:
+    motion = Motion(replace(CRH3, rotating_mass_fraction=rho), LEVEL, Q_S, Q_V)
+    dt, h = 0.3, 1e-3
+    columns = []
+    for ds, dv in ((h, 0.0), (0.0, h)):
+        up = motion.advance(np.array(ds), np.array(speed + dv), dt, 0.09, mu)
+        down = motion.advance(np.array(-ds), np.array(speed - dv), dt, 0.09, mu)
+        columns.append((np.array(up) - np.array(down)) / (2 * h))
+    brake_limits = mu > float(motion.brake_limit(0.0, speed, 0.09))
+    assert brake_limits == (mu == 0.2)
+    assert motion.jacobian(speed, dt, brake_limits) == pytest.approx(np.array(columns).T, abs=1e-9)
+
+
+def test_noise_grows_with_the_step() -> None:
+    assert MOTION.noise(0.1) == pytest.approx((4e-4, (0.02 / 3.6) ** 2))
+    assert MOTION.noise(0.4) == pytest.approx((1.6e-3, 4 * (0.02 / 3.6) ** 2))
+
+
+def test_transition_density_11_against_scipy() -> None:
+    rng = np.random.default_rng(3)
+    dt = 0.2
+    law = stats.multivariate_normal([0.0, 0.0], np.diag([Q_S * dt, Q_V * dt]))
+    errors = rng.standard_normal((5, 3, 2)) * [0.05, 0.02]
+    ours = MOTION.transition_log_density(errors[..., 0], errors[..., 1], dt)
+    assert ours == pytest.approx(law.logpdf(errors), rel=1e-12)
+
+
+def test_measurement_density_11_against_scipy() -> None:
+    rng = np.random.default_rng(4)
+    positions, variance = rng.standard_normal(6), np.array([0.25, 0.25, 1.0, 4.0, 0.01, 1e-4])
+    ours = measurement_log_density(positions, 0.3, variance)
+    assert ours == pytest.approx(stats.norm(positions, np.sqrt(variance)).logpdf(0.3), rel=1e-12)
+    # at the measured place: -ln(0.5 sqrt(2 pi)) = 0.693147 - 0.918939 = -0.225791
+    assert float(measurement_log_density(np.array(0.3), 0.3, 0.25)) == pytest.approx(-0.2257914, abs=1e-7)
+
+
+def test_a_window_keeps_times_brakes_and_measurements_together() -> None:
+    samples = [
+        Sample(1_000_000_000, 0.01, 0.0, 0.25, 0.0, math.inf),
+        Sample(1_100_000_000, 0.02, 8.0, 0.36, 80.0, 0.09),
+        Sample(1_350_000_000, 0.03, 28.0, 0.49, 0.0, math.inf),
+    ]
+    window = window_of(samples)
+    assert window.steps == 2
+    assert window.dt_s == pytest.approx([0.1, 0.25])
+    assert window.brake.tolist() == [0.01, 0.02]  # of the step's start
+    assert window.observations[0] == [(0, 8.0, 0.36), (1, 80.0, 0.09)]
+    assert window.observations[1] == [(0, 28.0, 0.49)]
+
+
+def test_a_window_keeps_nanoseconds_of_an_epoch() -> None:
+    start = 1_700_000_000_000_000_001
+    window = window_of([Sample(start + k * 100_000_001, 0.1, 0.0, 1.0, 0.0, math.inf) for k in range(3)])
+    assert window.dt_s == pytest.approx([0.100000001, 0.100000001], abs=1e-15)

@@ -1,0 +1,109 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Resistance of grades, curves and tunnels, (7)-(10), and the profile that adds them up."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from adhesion_node.core.physics.track import LEVEL, MANY, Curve, Grade, Section, Track, Tunnel, parse_track
+
+
+def test_equation_8_grade() -> None:
+    assert Grade(0.0, 4000.0, 12.0).resistance(200.0) == pytest.approx(0.003)  # 12 m in 4 km
+    assert Grade(1000.0, 2000.0, -20.0).resistance(200.0) == pytest.approx(-0.02)
+
+
+def test_equation_9_curve_longer_than_the_train() -> None:
+    assert Curve(0.0, 201.0, 3000.0, 4.0).resistance(200.0) == pytest.approx(0.0002)  # 0.6/3000
+
+
+@pytest.mark.parametrize("length_m", [100.0, 200.0])
+def test_equation_9_curve_no_longer_than_the_train(length_m: float) -> None:
+    # 0.0105 x 2 degrees / 200 m
+    assert Curve(0.0, length_m, 3000.0, 2.0).resistance(200.0) == pytest.approx(0.000105)
+
+
+def test_equation_10_tunnel() -> None:
+    # 0.00013e-3 x 3600 m = 0.000468 N/N: 0.0046 m/s2, not the 4.6 m/s2 of the misprint
+    assert Tunnel(500.0, 4100.0).resistance(200.0) == pytest.approx(0.000468)
+
+
+def test_equation_7_adds_overlapping_sections() -> None:
+    grade, curve, tunnel = Grade(0.0, 1000.0, 5.0), Curve(500.0, 1500.0, 4800.0, 12.0), Tunnel(800.0, 1200.0)
+    track = Track((tunnel, grade, curve))
+    # 5/1000 = 0.005; 0.6/4800 = 0.000125; 0.00013e-3 x 400 = 0.000052
+    positions = np.array([-1.0, 0.0, 499.9, 500.0, 800.0, 999.9, 1000.0, 1199.9, 1200.0, 1499.9, 1500.0, 1e6])
+    expected = [0, 0.005, 0.005, 0.005125, 0.005177, 0.005177, 0.000177, 0.000177, 0.000125, 0.000125, 0, 0]
+    assert track.specific_resistance(positions) == pytest.approx(np.array(expected), abs=1e-15)
+    assert track.specific_resistance(positions.reshape(3, 4)).shape == (3, 4)
+
+
+def test_equal_sections_count_twice_and_shared_ends_once() -> None:
+    twice = Track((Grade(0.0, 100.0, 1.0), Grade(0.0, 100.0, 1.0)))
+    assert float(twice.specific_resistance(np.array(50.0))) == pytest.approx(0.02)
+    chain = Track((Grade(0.0, 100.0, 1.0), Grade(100.0, 200.0, 2.0)))
+    assert chain.specific_resistance(np.array([99.9, 100.0])) == pytest.approx([0.01, 0.02])
+
+
+def test_profile_equals_the_sum_over_sections_at_random_places() -> None:
+    rng = np.random.default_rng(1)
+    sections: list[Section] = []
+    for start, length, kind in zip(rng.uniform(0, 5e3, 30), rng.uniform(10, 2e3, 30), range(30), strict=True):
+        end = float(start + length)
+        choice: tuple[Section, ...] = (Grade(start, end, 3.0), Curve(start, end, 900.0, 5.0), Tunnel(start, end))
+        sections.append(choice[kind % 3])
+    track, places = Track(tuple(sections)), rng.uniform(-100, 8e3, 500)
+    plain = [sum(s.resistance(200.0) for s in sections if s.start_m <= x < s.end_m) for x in places]
+    assert track.specific_resistance(places) == pytest.approx(np.array(plain), abs=1e-14)
+    for x in (-50.0, 1234.0, 7900.0):
+        ahead = np.linspace(x, 9e3, 200_001)
+        assert track.least_resistance(x) == pytest.approx(float(track.specific_resistance(ahead).min()), abs=1e-14)
+
+
+@pytest.mark.parametrize("middle_m", [400.0, 800.0, 1200.0])
+def test_many_places_at_once_are_each_in_their_section(middle_m: float) -> None:
+    track = Track((Grade(0.0, 1000.0, 5.0), Tunnel(800.0, 1200.0)))
+    places = np.random.default_rng(2).normal(middle_m, 20.0, (3, MANY))
+    one_by_one = [float(track.specific_resistance(np.array(place))) for place in places.flat]
+    assert track.specific_resistance(places).tolist() == np.reshape(one_by_one, places.shape).tolist()
+
+
+def test_level_line_and_least_resistance() -> None:
+    assert LEVEL.specific_resistance(np.array([0.0, 1.0])).tolist() == [0.0, 0.0]
+    hill = Track((Grade(0.0, 1000.0, -10.0), Grade(1000.0, 2000.0, 10.0)))
+    assert hill.least_resistance(-5.0) == pytest.approx(-0.01)
+    assert hill.least_resistance(999.0) == pytest.approx(-0.01)
+    assert hill.least_resistance(1000.0) == 0.0  # the level line behind the climb
+    assert LEVEL.least_resistance(0.0) == 0.0
+
+
+def test_parses_a_text() -> None:
+    track = parse_track(" grade 0 2000 -10; curve 500 1500 4800 12 ;tunnel 1000 3000;", 400.0)
+    expected = (Grade(0.0, 2000.0, -10.0), Curve(500.0, 1500.0, 4800.0, 12.0), Tunnel(1000.0, 3000.0))
+    assert track == Track(expected, 400.0)
+    assert parse_track("", 200.0).sections == ()
+
+
+@pytest.mark.parametrize("text", ["hill 0 1 2", "grade 0 1", "grade 0 1 2 3", "tunnel a b", "curve 1 2 3"])
+def test_refuses_a_text_it_cannot_read(text: str) -> None:
+    with pytest.raises(ValueError, match=f"track section '{text}': write 'grade START END RISE'"):
+        parse_track(f"tunnel 0 100; {text}", 200.0)
+
+
+@pytest.mark.parametrize(
+    ("section", "message"),
+    [
+        (Tunnel(5.0, 5.0), r"Tunnel\(start_m=5\.0, end_m=5\.0\): give finite numbers and an end_m beyond"),
+        (Grade(0.0, math.inf, 1.0), "give finite numbers"),
+        (Grade(0.0, 100.0, math.nan), "give finite numbers"),
+        (Curve(0.0, 100.0, 0.0, 1.0), "radius_m must be above 0"),
+    ],
+)
+def test_refuses_an_impossible_section(section: Section, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Track((section,))

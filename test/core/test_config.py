@@ -1,0 +1,81 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The configuration: nominal values of model.md, ranges, messages, brake and noise."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import FrozenInstanceError, fields
+from typing import Any
+
+import pytest
+
+from adhesion_node.core import Config
+from adhesion_node.core.physics.adhesion import SNOW, WET
+
+
+def test_nominal_has_the_papers_noise() -> None:
+    config = Config()
+    assert (config.window, config.particles, config.iterations) == (50, 20, 50)
+    assert config.position_noise_m == 0.02
+    assert config.speed_noise_mps == pytest.approx(0.02 / 3.6)
+    # per second: 0.02^2/0.1 and (0.02/3.6)^2/0.1 = 3.0864e-4
+    assert config.motion.noise(1.0) == pytest.approx((4e-3, 3.08642e-4), rel=1e-5)
+
+
+def test_is_frozen() -> None:
+    name = "window"  # a name in a variable, for the type checker knows that it is frozen
+    with pytest.raises(FrozenInstanceError):
+        setattr(Config(), name, 3)
+
+
+def test_every_setting_describes_itself_and_refuses_what_is_beyond_its_range() -> None:
+    described = [f for f in fields(Config) if f.metadata]
+    assert len(described) > 20
+    for item in described:
+        assert item.metadata["description"]
+        for end in ("low", "high"):
+            edge = item.metadata[end]
+            if math.isfinite(edge):
+                beyond: Any = edge + (1 if end == "high" else -1) * (1 if isinstance(item.default, int) else 1e-3)
+                beyond *= 1 + 1e-9 if isinstance(beyond, float) and beyond > 0 and end == "high" else 1
+                with pytest.raises(ValueError, match=rf"^{item.name} = .*: give a value from .* to"):
+                    Config(**{item.name: beyond})
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"window": 2}, "window = 2: give a value from 3 to 10000"),
+        ({"window": 10, "step": 10}, "step = 10: choose less than the window, 10"),
+        ({"window": 10, "step": 10.0}, r"step = 10\.0: give a value of type int"),
+        ({"particles": True}, "particles = True: give a value of type int"),
+        ({"confidence": 1.0}, r"confidence = 1\.0: give a value from 0\.5 to 0\.9999"),
+        ({"start_mu": math.nan}, "start_mu = nan"),
+        ({"low_adhesion": "mud"}, "low_adhesion = 'mud': choose one of dry, snow, wet"),
+        ({"speed_while_braking": 1}, "speed_while_braking = 1: give a value of type bool"),
+    ],
+)
+def test_refuses_by_name_value_and_remedy(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        Config(**changes)
+
+
+def test_brake_follows_the_measured_pressure() -> None:
+    config = Config()
+    assert config.brake(410e3) == pytest.approx(0.0952, abs=5e-5)
+    assert config.brake(102.5e3) == pytest.approx(config.brake(410e3) / 4)
+    assert config.brake(9.9e3) == config.brake(0.0) == config.brake(-500.0) == 0.0
+    assert config.brake(10e3) > 0.0
+    assert Config(brake_threshold_pa=0.0).brake(0.0) == 0.0
+
+
+def test_brake_without_a_measurement_is_the_assumed_one() -> None:
+    assert Config().brake(None) == Config().brake(410e3)
+    assert Config(assumed_pressure_pa=0.0).brake(None) == 0.0
+
+
+def test_low_law_by_name() -> None:
+    assert Config().low_law == SNOW
+    assert Config(low_adhesion="wet").low_law == WET

@@ -1,0 +1,249 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The live page behind its address: what is served and sent, to whom, and a clean end."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from http.client import HTTPResponse
+from pathlib import Path
+from typing import Any
+from urllib.request import urlopen
+
+import pytest
+from conftest import SpinUntil
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+
+from adhesion_node.core.physics.braking import curve
+from adhesion_node.core.physics.train import CRH3
+from adhesion_node.live.__main__ import main
+from adhesion_node.live.node import Live
+from adhesion_node.nodes.ros import messages as convert
+from adhesion_node.nodes.ros import qos
+from adhesion_node.wire import topics
+
+pytest.importorskip("aiohttp", reason="the extra `live` is not installed")
+
+S = 10**9
+TIMEOUT_S = 20.0
+FOREIGN = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH"}
+"""Marks of this process that a new one must not inherit."""
+
+
+@contextmanager
+def stream(url: str) -> Iterator[HTTPResponse]:
+    with urlopen(f"{url}events", timeout=TIMEOUT_S) as response:
+        yield response
+
+
+def event(response: HTTPResponse) -> dict[str, Any]:
+    """Read the next event."""
+    line = response.readline().decode()
+    assert line.startswith("data: ")
+    assert response.readline() == b"\n"
+    parts: dict[str, Any] = json.loads(line.removeprefix("data: "))
+    return parts
+
+
+@pytest.fixture
+def live(context: Context, executor: SingleThreadedExecutor) -> Iterator[Live]:
+    node = Live("127.0.0.1", 0, context=context)
+    executor.add_node(node)
+    yield node
+    node.close()
+
+
+def publish_run(executor: SingleThreadedExecutor, context: Context) -> Node:
+    """Publish what a line says of one estimate."""
+    node = Node("line", context=context)
+    executor.add_node(node)
+    regime = DiagnosticStatus(message="it is identified", values=[KeyValue(key="regime", value="ADHESION_LIMITED")])
+    level = DiagnosticStatus(message="brake", values=[KeyValue(key="level", value="WARNING")])
+    for topic, message, profile in (
+        (topics.MU, convert.mu_message(0.08), qos.RESULT),
+        (topics.MU_LOWER, convert.mu_message(0.075), qos.RESULT),
+        (topics.STATE, convert.state_message(5 * S, 1200.0, 1.0, 50.0, 1.0), qos.RESULT),
+        (topics.BRAKING_CURVE, convert.curve_message(5 * S, curve(CRH3, 50.0, 0.075), 1200.0), qos.LATCHED),
+        (topics.DIAGNOSTICS, DiagnosticArray(header=convert.header(5 * S), status=[regime]), qos.RESULT),
+        (topics.ATP_STATUS, DiagnosticArray(header=convert.header(5 * S), status=[level]), qos.RESULT),
+    ):
+        publisher = qos.advertise(node, topic, profile)
+        deadline = time.monotonic() + TIMEOUT_S
+        while not publisher.get_subscription_count():
+            assert time.monotonic() < deadline, topic
+            executor.spin_once(timeout_sec=0.01)
+        publisher.publish(message)
+        executor.spin_once(timeout_sec=0.1)
+    return node
+
+
+def test_what_the_nodes_say_reaches_the_browser(
+    live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
+) -> None:
+    with stream(live.server.url) as response:
+        first = event(response)
+        assert first["train"] is first["adhesion"] is first["supervision"] is None
+        publish_run(executor, context)
+        spin_until(executor, lambda: live.view.parts(0.0)["supervision"] and live.view.parts(0.0)["adhesion"])
+        seen: dict[str, Any] = {}
+        while not (seen.get("supervision") and seen.get("adhesion") and seen.get("curves")):
+            seen |= event(response)
+    assert (seen["train"]["speed"], seen["train"]["position"]) == (180.0, 1200.0)
+    assert seen["adhesion"] == {"mu": 0.08, "mu_lower": 0.075}
+    assert (seen["supervision"]["level"], seen["estimator"]["regime"]) == ("WARNING", "ADHESION_LIMITED")
+    assert (seen["curves"]["safe"]["x"][0], seen["curves"]["safe"]["y"][0]) == (1200.0, 180.0)
+
+
+def test_a_message_that_cannot_be_shown_is_said_and_shown_nowhere(
+    live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
+) -> None:
+    node = Node("stranger", context=context)
+    executor.add_node(node)
+    publisher = qos.advertise(node, topics.STATE, qos.RESULT)
+    spin_until(executor, publisher.get_subscription_count)
+    publisher.publish(convert.state_message(5 * S, float("nan"), 1.0, 50.0, 1.0))
+    spin_until(executor, lambda: live.view.parts(0.0)["inputs"][3]["state"] == "refused")
+    assert "position x = nan" in live.view.parts(0.0)["inputs"][3]["why"]
+    assert live.view.parts(0.0)["train"] is None
+
+
+def test_only_what_changed_is_sent_again(live: Live) -> None:
+    with stream(live.server.url) as response:
+        assert set(event(response)) == set(live.view.parts(0.0))
+        live.view.place(77.0)
+        assert event(response) == {"place_m": 77.0}
+
+
+def test_a_viewer_that_goes_is_forgotten(live: Live) -> None:
+    with stream(live.server.url) as response:
+        event(response)
+        assert live.server.viewers == 1
+    deadline = time.monotonic() + TIMEOUT_S
+    place = 0.0
+    while live.server.viewers:
+        assert time.monotonic() < deadline
+        live.view.place(place := place + 1.0)  # it shows when something is to be sent
+
+
+def test_the_page_is_whole_and_only_this_machine_gets_it(live: Live) -> None:
+    assert live.server.url.startswith("http://127.0.0.1:")
+    with urlopen(live.server.url, timeout=TIMEOUT_S) as response:
+        html = response.read().decode()
+    assert "connect-src 'self'" in html
+    assert "$" not in html.split("<script>")[0], "a placeholder is left"
+    assert 'src="' not in html
+
+
+def test_a_closed_page_gives_its_address_back(context: Context) -> None:
+    first = Live("127.0.0.1", 0, context=context)
+    port = int(first.server.url.rsplit(":", 1)[1].strip("/"))
+    first.close()
+    first.destroy_node()
+    second = Live("127.0.0.1", port, context=context)
+    second.close()
+    second.destroy_node()
+
+
+def test_a_taken_address_is_one_line_and_code_2(capfd: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = taken.getsockname()[1]
+        assert main(["--port", str(port)]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert f"127.0.0.1:{port}: " in line
+
+
+def test_without_aiohttp_it_says_what_to_install(
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delitem(sys.modules, "adhesion_node.live.server", raising=False)
+    monkeypatch.setitem(sys.modules, "aiohttp", None)
+    assert main(["--port", "0"]) == 2
+    assert capfd.readouterr().err.strip() == "aiohttp is missing: pip install '.[live]'"
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def start(code: str, **options: Any) -> subprocess.Popen[str]:
+    environment = {name: value for name, value in os.environ.items() if name not in FOREIGN}
+    return subprocess.Popen([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE, text=True, **options)
+
+
+def wait_for(url: str, process: subprocess.Popen[str]) -> HTTPResponse:
+    """Open the stream as soon as the program serves it."""
+    deadline = time.monotonic() + TIMEOUT_S
+    while True:
+        assert process.poll() is None, "the program ended at its start"
+        assert time.monotonic() < deadline, "nothing is served"
+        try:
+            response: HTTPResponse = urlopen(f"{url}events", timeout=TIMEOUT_S)
+            return response
+        except OSError:
+            continue
+
+
+def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
+    port = free_port()
+    process = start(f"from adhesion_node.live.__main__ import main; raise SystemExit(main(['--port', '{port}']))")
+    try:
+        with wait_for(f"http://127.0.0.1:{port}/", process) as response:
+            event(response)
+            process.send_signal(signal.SIGINT)
+            assert process.wait(TIMEOUT_S) == 0
+        assert process.stderr is not None
+        assert "Traceback" not in process.stderr.read()
+    finally:
+        process.kill()
+        process.communicate()
+
+
+DEMO = """
+from dataclasses import replace
+from adhesion_node import demo
+from adhesion_node.core.track import LEVEL
+from sim_node import scenario
+from sim_node.scenario import SCENARIOS, Brake
+cut = replace(SCENARIOS["tunnel_entry"], brake=Brake(1.0), track=LEVEL, end_s=3.0)
+scenario.SCENARIOS = demo.SCENARIOS = {**SCENARIOS, "tunnel_entry": cut}
+raise SystemExit(demo.main(["--live", "--port", "PORT"]))
+"""
+
+
+def test_the_live_demo_waits_for_a_viewer_runs_at_real_time_and_ends_by_ctrl_c(tmp_path: Path) -> None:
+    port = free_port()
+    process = start(DEMO.replace("PORT", str(port)), cwd=tmp_path, stdout=subprocess.DEVNULL)
+    try:
+        with wait_for(f"http://127.0.0.1:{port}/", process) as response:
+            seen: dict[str, Any] = {}
+            begun = None
+            while not seen.get("ended"):
+                seen |= event(response)
+                begun = begun or (seen["train"] and time.monotonic())
+            assert begun is not None
+            assert time.monotonic() - begun > 0.9 * seen["train"]["t"], "faster than real time"
+        assert 1.9 < seen["train"]["t"] <= 3.0  # from the first estimate to the end at 3 s
+        assert [said["state"] for said in seen["inputs"] if said["topic"] != "speed"] == ["good"] * 5
+        process.send_signal(signal.SIGINT)
+        assert process.wait(TIMEOUT_S) == 0
+    finally:
+        process.kill()
+        _, error = process.communicate()
+    assert "Traceback" not in error
+    assert (tmp_path / "adhesion_demo" / "bag" / "metadata.yaml").is_file()

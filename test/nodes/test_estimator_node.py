@@ -1,0 +1,235 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The estimator as a node: live equals offline to the bit, and what it says to good and bad messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import SpinUntil
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from adhesion_node.core.intake.inbox import PositionSample, PressureSample
+from adhesion_node.core.physics import braking
+from adhesion_node.core.physics.adhesion import WET, AdhesionLaw
+from adhesion_node.core.physics.train import CRH3, GRAVITY
+from adhesion_node.nodes.estimator import PARAMETERS, Estimator
+from adhesion_node.nodes.ros import messages as convert
+from adhesion_node.nodes.ros import qos
+from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import ATMOSPHERE_PA
+from adhesion_node.wire.settings import setup_of
+from sim_node.nodes import messages
+from sim_node.train import scenario
+from sim_node.train.plant import Truth
+from sim_node.train.run import run
+from sim_node.train.sensors import Reading
+
+FAST = {"iterations": 3, "particles": 10}
+"""EM that is quick rather than good: these tests compare runs, not accuracy."""
+
+CURVES = (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)
+
+Sample = tuple[Truth, Reading]
+
+
+@dataclass
+class Line:
+    """An estimator, a driver that publishes sensors and listens to everything."""
+
+    executor: SingleThreadedExecutor
+    spin_until: SpinUntil
+    estimator: Estimator
+    driver: Node
+    heard: dict[topics.Topic, list[Any]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.outputs = {topic: qos.advertise(self.driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.SENSORS}
+        for topic in (*topics.RESULTS, topics.DIAGNOSTICS):
+            self.heard[topic] = []
+            qos.subscribe(self.driver, topic, self.heard[topic].append, qos.RESULT)
+        self.executor.add_node(self.estimator)
+        self.executor.add_node(self.driver)
+        self.spin_until(self.executor, self._matched)
+
+    def _matched(self) -> bool:
+        listening = all(output.get_subscription_count() for output in self.outputs.values())
+        return listening and all(self.estimator.count_subscribers(topic.name) for topic in self.heard)
+
+    def send(self, topic: topics.Topic, message: Any) -> None:
+        before = self.estimator.heard[topic]
+        self.outputs[topic].publish(message)
+        self.spin_until(self.executor, lambda: self.estimator.heard[topic] > before)
+
+    def send_sample(self, reading: Reading) -> None:
+        self.send(topics.BRAKE_PRESSURE, messages.brake_pressure(reading.t_ns, reading.pressure_pa, 0.0))
+        if reading.position_m is not None:
+            self.send(topics.POSITION, messages.position(reading.t_ns, reading.position_m, 0.5))
+
+    def hear_all(self) -> None:
+        sent = self.estimator.published
+        self.spin_until(self.executor, lambda: all(len(heard) == sent[topic] for topic, heard in self.heard.items()))
+
+    def values(self) -> dict[str, str]:
+        status = self.heard[topics.DIAGNOSTICS][-1].status[0]
+        return {pair.key: pair.value for pair in status.values}
+
+
+@pytest.fixture
+def line(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Line:
+    overrides = [Parameter(name, value=value) for name, value in FAST.items()]
+    return Line(
+        executor,
+        spin_until,
+        Estimator(context=context, parameter_overrides=overrides),
+        Node("driver", context=context),
+    )
+
+
+def samples(name: str, begin_s: float, end_s: float) -> Iterator[Sample]:
+    found = scenario.find(name)
+    return (sample for sample in run(found, 0.1, 1) if begin_s * 1e9 <= sample[0].t_ns < end_s * 1e9)
+
+
+def offline_digest(readings: list[Reading]) -> str:
+    pipeline = Pipeline(setup_of(FAST).config, 1)
+    for reading in readings:
+        pipeline.push(PressureSample(reading.t_ns, reading.pressure_pa - ATMOSPHERE_PA))
+        if reading.position_m is not None:
+            pipeline.push(PositionSample(reading.t_ns, reading.position_m, 0.25))
+    pipeline.finish()
+    return pipeline.digest
+
+
+def test_live_equals_offline_to_the_bit(line: Line) -> None:
+    readings = [reading for _, reading in samples("tunnel_entry", 15.0, 31.0)]
+    for reading in readings:
+        line.send_sample(reading)
+    line.estimator.close()
+    assert line.estimator.digest == offline_digest(readings)
+    line.hear_all()
+    assert line.values()["digest"] == line.estimator.digest
+
+
+def test_other_measurements_give_another_digest() -> None:
+    readings = [reading for _, reading in samples("tunnel_entry", 18.0, 24.0)]
+    moved = [readings[0]._replace(position_m=(readings[0].position_m or 0.0) + 1e-9), *readings[1:]]
+    assert offline_digest(readings) != offline_digest(moved)
+
+
+def test_every_result_says_the_same_of_one_instant(line: Line) -> None:
+    for _, reading in samples("tunnel_entry", 15.0, 28.0):
+        line.send_sample(reading)
+    line.hear_all()
+    estimate = line.estimator.latest
+    assert estimate is not None
+    assert estimate.window > 0
+    last = {topic: heard[-1] for topic, heard in line.heard.items()}
+    assert last[topics.MU].data == estimate.mu
+    assert last[topics.MU_LOWER].data == estimate.mu_lower < estimate.mu
+    assert last[topics.DECELERATION].accel.accel.linear.x == pytest.approx(-GRAVITY * estimate.mu)
+    assert last[topics.DECELERATION].accel.covariance[0] == pytest.approx((GRAVITY * estimate.mu_std) ** 2)
+    assert last[topics.STATE].pose.pose.position.x == estimate.position_m
+    assert last[topics.STATE].twist.twist.linear.x == estimate.speed_mps
+    expectation: list[tuple[topics.Topic, float | AdhesionLaw]] = [
+        (topics.BRAKING_CURVE, estimate.mu_lower),
+        (topics.BRAKING_CURVE_NOMINAL, lambda v: estimate.mu * WET(v) / WET(np.array(estimate.speed_mps))),
+    ]
+    for topic, mu in expectation:
+        message = last[topic]
+        t_ns, read = convert.curve(message)
+        expected = braking.curve(CRH3, estimate.speed_mps, mu)
+        assert t_ns == estimate.t_ns
+        assert message.points[0].positions[0] == pytest.approx(estimate.position_m)
+        assert read.distance_m == pytest.approx(expected.distance_m, rel=1e-9, abs=1e-6)
+        assert read.speed_mps == pytest.approx(expected.speed_mps)
+    assert (
+        last[topics.BRAKING_CURVE].points[-1].positions[0] > last[topics.BRAKING_CURVE_NOMINAL].points[-1].positions[0]
+    )
+
+
+def test_bad_messages_are_dropped_counted_and_change_nothing(line: Line) -> None:
+    readings = [reading for _, reading in samples("tunnel_entry", 15.0, 24.0)]
+    for index, reading in enumerate(readings):
+        line.send_sample(reading)
+        if index == 40:
+            for message in bad_positions(reading.t_ns + 1):
+                line.send(topics.POSITION, message)
+            gauge = messages.brake_pressure(reading.t_ns + 1, 410.0, 0.0)
+            line.send(topics.BRAKE_PRESSURE, gauge)
+    line.estimator.close()
+    line.hear_all()
+    values = line.values()
+    assert {key: value for key, value in values.items() if key.startswith("dropped.")} == {
+        "dropped.WRONG_FRAME": "2",
+        "dropped.NOT_FINITE": "2",
+        "dropped.BAD_VARIANCE": "2",
+        "dropped.IMPLAUSIBLE_POSITION": "1",
+        "dropped.IMPLAUSIBLE_PRESSURE": "1",
+    }
+    assert line.estimator.digest == offline_digest(readings)
+
+
+def bad_positions(t_ns: int) -> Iterator[Any]:
+    for frame in ("map", ""):
+        message = messages.position(t_ns, 10.0, 0.5)
+        message.header.frame_id = frame
+        yield message
+    for position in (float("nan"), float("inf"), 1e9):
+        yield messages.position(t_ns, position, 0.5)
+    for variance in (0.0, -1.0):
+        message = messages.position(t_ns, 10.0, 0.5)
+        message.pose.covariance[0] = variance
+        yield message
+
+
+def test_the_first_refusal_is_said_with_its_remedy(line: Line) -> None:
+    message = messages.position(10**9, 10.0, 0.5)
+    message.header.frame_id = "map"
+    line.send(topics.POSITION, message)
+    line.hear_all()
+    heard: list[DiagnosticArray] = line.heard[topics.DIAGNOSTICS]
+    (status,) = heard[-1].status
+    assert status.level == DiagnosticStatus.WARN
+    assert "header.frame_id = 'map': set header.frame_id to 'track'" in status.message
+
+
+def test_a_missing_brake_pressure_is_said(line: Line) -> None:
+    for _, reading in samples("cruise", 0.0, 2.0):
+        if reading.position_m is not None:
+            line.send(topics.POSITION, messages.position(reading.t_ns, reading.position_m, 0.5))
+    line.hear_all()
+    (status,) = line.heard[topics.DIAGNOSTICS][-1].status
+    assert status.level == DiagnosticStatus.WARN
+    assert status.message.startswith("no brake pressure: a full brake is assumed")
+
+
+def test_a_combination_out_of_range_is_refused_at_start(context: Context) -> None:
+    overrides = [Parameter("window", value=5), Parameter("step", value=10)]
+    with pytest.raises(ValueError, match="step = 10: choose less than the window, 5"):
+        Estimator(context=context, parameter_overrides=overrides, namespace="/refused")
+
+
+def test_parameters_reach_the_configuration(context: Context) -> None:
+    overrides = [
+        Parameter("train.mass_kg", value=400_000),  # an integer on purpose
+        Parameter("track", value="grade 0 2000 10"),
+        Parameter("low_adhesion", value="wet"),
+    ]
+    node = Estimator(context=context, parameter_overrides=overrides)
+    config = node.config
+    assert config.train.mass_kg == 400e3
+    assert config.track.sections[0].resistance(200.0) == 0.005
+    assert config.low_adhesion == "wet"
+    assert len({spec.name for spec in PARAMETERS}) == len(PARAMETERS)
+    node.destroy_node()

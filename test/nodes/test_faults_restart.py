@@ -1,0 +1,92 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Processes that are killed: a sensor is missed, an estimator inherits nothing and works again within one window."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from functools import partial
+
+import pytest
+from conftest import SpinUntil
+from diagnostic_msgs.msg import DiagnosticStatus
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from start_stop import start
+from test_faults_estimator import flat, offline_digest, ticks
+from test_offline import FAST
+from test_two_processes import PATIENCE_S, QUICK, Operator, Program
+
+from adhesion_node.nodes.estimator import Estimator
+from adhesion_node.nodes.ros import qos
+from adhesion_node.wire import topics
+from sim_node.nodes import messages
+from sim_node.train.messages import Tick
+
+
+@pytest.fixture
+def started() -> Iterator[list[Program]]:
+    """Programs that end with the test at the latest."""
+    programs: list[Program] = []
+    yield programs
+    for program in programs:
+        program.kill()
+        program.communicate()
+
+
+def test_a_sensor_whose_process_is_killed_is_stale(
+    started: list[Program], context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """A killed process says no goodbye: DDS itself would miss it after 20 s."""
+    operator, estimator = Operator(context), Estimator(context=context)
+    executor.add_node(operator)
+    executor.add_node(estimator)
+    simulator = start("simulator", "--ros-args", "-p", "rate_hz:=50", "-p", "scenario:=cruise", "-p", "wait_for:=1")
+    started.append(simulator)
+    spin_until(executor, lambda: estimator.heard[topics.POSITION] > 50, PATIENCE_S)
+    spin_until(executor, lambda: operator.levels[-1] != DiagnosticStatus.STALE)
+    simulator.send_signal(signal.SIGKILL)
+    spin_until(executor, lambda: operator.levels[-1] == DiagnosticStatus.STALE)
+
+
+def measured(operator: Operator, count: int) -> bool:
+    return int(operator.heard[-1]["measurements"]) > count
+
+
+def test_a_killed_estimator_is_replaced_by_one_that_inherits_nothing(
+    started: list[Program], context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    operator, driver = Operator(context), Node("driver", context=context)
+    executor.add_node(operator)
+    executor.add_node(driver)
+    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.SENSORS}
+
+    def run_one(run: list[Tick]) -> Program:
+        operator.heard.clear()
+        program = start("estimator", "--ros-args", *QUICK)
+        started.append(program)
+        spin_until(executor, lambda: all(o.get_subscription_count() == 1 for o in outputs.values()), PATIENCE_S)
+        spin_until(executor, lambda: operator.count_publishers(topics.DIAGNOSTICS.name) == 1, PATIENCE_S)
+        spin_until(executor, lambda: operator.heard, PATIENCE_S)  # it says that it waits: both sides know each other
+        for index, sent in enumerate(flat(run)):
+            outputs[sent.topic].publish(messages.message_of(sent))
+            if index % 60 == 59:  # its queue holds 100
+                spin_until(executor, partial(measured, operator, index // 3 - 12), PATIENCE_S)
+        return program
+
+    first = run_one(ticks("none", 15.0, 22.0))
+    first.send_signal(signal.SIGKILL)
+    first.wait()
+    spin_until(executor, lambda: operator.count_publishers(topics.DIAGNOSTICS.name) == 0, PATIENCE_S)
+
+    later = ticks("none", 22.0, 30.0)
+    second = run_one(later)
+    spin_until(executor, lambda: operator.heard[-1]["windows"] not in ("0", ""), PATIENCE_S)
+    assert int(operator.heard[-1]["measurements"]) <= 80
+    second.send_signal(signal.SIGINT)
+    spin_until(executor, lambda: second.poll() is not None, PATIENCE_S)
+    assert second.returncode == 0
+    assert offline_digest(later, **FAST) in (second.stderr.read() if second.stderr else "")

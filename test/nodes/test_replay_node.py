@@ -1,0 +1,306 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Replay to topics: every byte arrives, /clock rises, pace, remapping, what is missing, the program itself."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from conftest import SpinUntil
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
+from recorded import write_steps
+from rosbags.rosbag2 import StoragePlugin, Writer
+
+from adhesion_node.bag import BagReader, BagWriter, Record, select, sensors, serialize, typestore
+from adhesion_node.nodes import player, replay
+from adhesion_node.nodes.player import Replay
+from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, message_class, subscribe
+from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU, Topic
+
+S = 10**9
+UNLIMITED = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
+
+
+class Listener(Node):
+    """Keeps the raw bytes of each topic in the order of arrival, and the times of /clock."""
+
+    def __init__(self, context: Context, *topics: Topic, profile: QoSProfile = SENSOR_SUBSCRIPTION) -> None:
+        super().__init__("listener", context=context)
+        self.heard: list[tuple[str, bytes]] = []
+        self.clock: list[int] = []
+        for topic in topics:
+            self._listen(topic, profile)
+        subscribe(self, CLOCK, self._on_clock, profile)
+
+    def _listen(self, topic: Topic, profile: QoSProfile) -> None:
+        def keep(cdr: bytes) -> None:
+            self.heard.append((topic.name, cdr))
+
+        self.create_subscription(message_class(topic), topic.name, keep, profile, raw=True)
+
+    def _on_clock(self, message: Any) -> None:
+        self.clock.append(message.clock.sec * S + message.clock.nanosec)
+
+    def of(self, topic: Topic) -> list[bytes]:
+        return [cdr for name, cdr in self.heard if name == topic.name]
+
+
+def of(written: list[Record], topic: str) -> list[bytes]:
+    return [record.cdr for record in written if record.topic == topic]
+
+
+@pytest.mark.parametrize("rate", [0.0, 20.0])
+def test_every_byte_arrives_and_the_clock_rises(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, rate: float
+) -> None:
+    """At 20 times real time a machine that was busy for half a second catches up by more than a queue of 100 holds."""
+    written = write_steps(tmp_path / "bag", 400)
+    listener = Listener(context, POSITION, BRAKE_PRESSURE, profile=UNLIMITED)
+    executor.add_node(listener)
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), rate, context=context)
+        executor.add_node(node)
+        spin_until(executor, lambda: len(listener.heard) == len(written) and len(listener.clock) == 400, 30.0)
+        spin_until(executor, lambda: node.finished)
+    assert node.failure is None
+    assert listener.of(POSITION) == of(written, "/position")
+    assert listener.of(BRAKE_PRESSURE) == of(written, "/brake_pressure")
+    assert listener.clock == [step * S // 10 for step in range(400)]
+    assert node.published == {"/position": 400, "/brake_pressure": 400}
+
+
+def test_the_rate_is_kept(tmp_path: Path, context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ticks of 10 ms: a step every 25 ms of a clock that the test turns."""
+    now_ms = turned_by_hand(monkeypatch)
+    write_steps(tmp_path / "bag", 21)  # 2 s
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 4.0, subscribers=0, context=context)
+        node.tick()
+        published = []
+        for now_ms[0] in range(5001, 5511, 10):
+            node.tick()
+            published.append(node.published["/position"])
+        node.destroy_node()
+    assert published == [1 + (10 * tick + 1) // 25 for tick in range(50)] + [21]
+    assert node.finished
+
+
+def turned_by_hand(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """Return the time of the player's clock, ms, in a list to be changed."""
+    now_ms = [5000]
+    monkeypatch.setattr(player, "time", SimpleNamespace(monotonic=lambda: now_ms[0] / 1000))
+    return now_ms
+
+
+def test_a_machine_that_is_held_up_is_given_more_time_for_its_discovery(
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Three ticks a second: not even the longest wait for a subscriber ends the wait for the others."""
+    now_ms = turned_by_hand(monkeypatch)
+    write_steps(tmp_path / "bag", 2)
+    executor.add_node(Listener(context, POSITION))
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 0.0, context=context)
+        spin_until(executor, lambda: node.count_subscribers("/position") == 1)
+        begun = []
+        for now_ms[0] in range(5000, 5000 + 300 * (player.SETTLE_TICKS + 3), 300):
+            node.tick()
+            begun.append(node.published["/position"] > 0)
+        node.destroy_node()
+    assert begun.index(True) == player.SETTLE_TICKS + 1
+
+
+def test_recorded_results_are_not_replayed_and_truth_is(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for step in range(3):
+            writer.write("/truth/mu", MU.type, serialize(typestore().types[MU.type](data=0.1), MU.type), step)
+            writer.write("/adhesion/mu", MU.type, serialize(typestore().types[MU.type](data=0.2), MU.type), step)
+            writer.write("/position", POSITION.type, sensors.position(step, 1.0, 1.0), step)
+    listener = Listener(context, POSITION, TRUTH_MU, MU)
+    executor.add_node(listener)
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 0.0, context=context)
+        executor.add_node(node)
+        spin_until(executor, lambda: node.finished and len(listener.heard) >= 6)
+    assert (len(listener.of(POSITION)), len(listener.of(TRUTH_MU)), len(listener.of(MU))) == (3, 3, 0)
+
+
+def test_names_follow_the_remapping_and_the_namespace(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    path = tmp_path / "elsewhere"
+    cdrs = [sensors.position(step, float(step), 1.0) for step in range(5)]
+    with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as foreign:
+        connection = foreign.add_connection("/odometry/position", POSITION.type, typestore=typestore())
+        for step, cdr in enumerate(cdrs):
+            foreign.write(connection, step, cdr)
+    listener = Listener(context, Topic("/train2/position", POSITION.type))
+    executor.add_node(listener)
+    with BagReader(path) as reader:
+        selection = select(reader.topics, [("odometry/position", "position")])
+        node = Replay(reader, selection, 0.0, context=context, namespace="/train2")
+        executor.add_node(node)
+        spin_until(executor, lambda: node.finished and len(listener.heard) == 5)
+    assert [cdr for _, cdr in listener.heard] == cdrs
+
+
+def test_it_waits_for_a_subscriber_and_then_misses_nothing(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    written = write_steps(tmp_path / "bag", 5)
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 0.0, context=context)
+        executor.add_node(node)
+        for _ in range(50):
+            executor.spin_once(timeout_sec=0.01)
+        assert not node.published
+        listener = Listener(context, POSITION, BRAKE_PRESSURE)
+        executor.add_node(listener)
+        spin_until(executor, lambda: len(listener.heard) == len(written))
+
+
+def test_waiting_for_subscribers_is_bounded(
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.setattr(player, "SUBSCRIBERS_S", 0.3)
+    write_steps(tmp_path / "bag", 5)
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 0.0, context=context)
+        executor.add_node(node)
+        spin_until(executor, lambda: node.finished)
+    assert node.published["/position"] == 5
+    assert "/position: fewer than 1 subscribers after 0.3 s: replaying all the same" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])
+def test_a_bad_rate_is_refused(tmp_path: Path, context: Context, rate: float) -> None:
+    write_steps(tmp_path / "bag", 1)
+    with (
+        BagReader(tmp_path / "bag") as reader,
+        pytest.raises(ValueError, match=r"rate = .*: give a finite factor, or 0"),
+    ):
+        Replay(reader, {"/position": "position"}, rate, context=context)
+
+
+REPLAY = [sys.executable, "-c", "import sys; from adhesion_node.nodes.replay import main; sys.exit(main())"]
+
+
+@contextmanager
+def replay_process(*arguments: str) -> Iterator[subprocess.Popen[str]]:
+    """Run the program; it does not outlive a test that fails."""
+    private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
+    environment = {name: value for name, value in os.environ.items() if name not in private}
+    with subprocess.Popen(
+        [*REPLAY, *arguments], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_at_full_speed_a_slow_subscriber_in_another_process_slows_it_down(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """More messages than the queue of the publisher holds and a subscriber that stands still for a while."""
+    steps = 1500
+    written = write_steps(tmp_path / "bag", steps)
+    listener = Listener(context, POSITION, profile=UNLIMITED)
+    executor.add_node(listener)
+    with replay_process(str(tmp_path / "bag"), "--rate", "0", "--topics", "position", "--json", "-") as process:
+        spin_until(executor, lambda: len(listener.heard) > 10, 20.0)
+        time.sleep(0.5)  # not to synchronise: meanwhile the replay publishes several queues full
+        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == steps, 60.0)
+        out, err = process.communicate()
+    assert process.returncode == 0, err
+    assert json.loads(out) == {"messages": {"/position": steps}, "complete": True}
+    assert listener.of(POSITION) == of(written, "/position")
+
+
+def test_a_best_effort_subscriber_at_full_speed_is_named(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    write_steps(tmp_path / "bag", 5)
+    listener = Listener(context, POSITION)
+    executor.add_node(listener)
+    with replay_process(str(tmp_path / "bag"), "--rate", "0") as process:
+        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == 5, 20.0)
+        out, err = process.communicate()
+    assert process.returncode == 0
+    assert out.split() == ["5", "/brake_pressure", "5", "/position"]
+    assert "listener subscribes /position best effort and may lose messages: start it with -p qos_overrides./pos" in err
+
+
+def test_a_bag_without_position_says_what_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.write("/gnss", POSITION.type, sensors.position(0, 0.0, 1.0), 0)
+    assert replay.main([str(tmp_path / "bag")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == (
+        f"replay: bag = {tmp_path / 'bag'}: topic position: not in the recording. "
+        f"It holds: /gnss ({POSITION.type}). Name the right one, for instance --remap /gnss:=position"
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--remap", "position"], "remap = 'position': write FROM:=TO"),
+        (["--remap", "/nothing:=position"], "remap from /nothing: not in the recording. It holds: "),
+        (["--remap", "/brake_pressure:=position"], "topic /brake_pressure: type = sensor_msgs/msg/FluidPressure: "),
+        (["--topics", "wheel_speed"], "topic wheel_speed: not in the recording"),
+        (["--rate", "-1"], "rate = -1.0: give a finite factor, or 0"),
+        (["--set", "a=1"], "--set, --params, --seed and --estimator are for --offline"),
+    ],
+)
+def test_what_does_not_fit_is_one_line_and_code_2(
+    tmp_path: Path, options: list[str], message: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    write_steps(tmp_path / "bag", 2)
+    assert replay.main([str(tmp_path / "bag"), *options]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert message in line
+
+
+def test_an_unreadable_bag_is_one_line_and_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x.mcap").write_bytes(b"garbage")
+    assert replay.main([str(tmp_path / "x.mcap")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "x.mcap: is not an MCAP file: name another recording" in line
+
+
+def test_offline_needs_no_ros() -> None:
+    code = """
+import sys
+from adhesion_node.nodes import replay
+replay.main(["--offline", "nowhere.mcap"])
+assert "rclpy" not in sys.modules
+"""
+    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert "Traceback" not in shown.stderr
+    assert "nowhere.mcap: does not exist" in shown.stderr

@@ -1,0 +1,288 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Whatever the sensors send, the pipeline stands: arbitrary streams of good and bad samples and messages.
+
+Hypothesis draws what follows what: pieces of a real braking, garbage, duplicates, late ones, jumps of the clock.
+"""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from oracles import ride
+
+from adhesion_node.core import Config, Measurement, Outcome, step
+from adhesion_node.core.intake import inbox as align
+from adhesion_node.core.intake.inbox import PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core.methods.particle_em.em import Search
+from adhesion_node.core.methods.particle_em.method import Evaluation, evaluate
+from adhesion_node.core.methods.protocol import BrakingWindow
+from adhesion_node.core.methods.rail_condition.method import SHORT_S
+from adhesion_node.core.physics.braking import BrakingCurve
+from adhesion_node.core.prediction import Prediction
+from adhesion_node.run import pipeline as pipeline_module
+from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.wire import codecs as reading
+from adhesion_node.wire.codecs import MAX_ABSOLUTE_PA, Reason, Rejected
+from adhesion_node.wire.topics import FRAME, POSITION
+
+S = 10**9
+GOOD = ride([(3.0, 0.0), (9.0, 410e3), (1.0, 0.0), (3.0, 200e3)])
+START_NS = 1000 * S
+
+LOOSE = [0.0, -0.0, 1.0, 0.25, 1e-12, 1e8, 1e-13, 5e-324, 1e7, -1e7, 1e9, 1e154, 1e308, -1e308]
+NUMBERS = st.sampled_from([*LOOSE, math.nan, math.inf, -math.inf]) | st.floats()
+PRESSURES_PA = st.sampled_from([math.nan, math.inf, 0.0, 1e-300, MAX_ABSOLUTE_PA]) | st.floats(0.0, MAX_ABSOLUTE_PA)
+OFFSETS_NS = st.sampled_from([0, 1, -1, S // 20, -S // 20, S, -S, 5 * S, -5 * S, 59 * S, 100 * S, -100 * S, 3600 * S])
+"""Of a stray sample against the good ones around it."""
+JUMPS_NS = st.sampled_from([0, 1, -S, S, 3 * S, -30 * S, 30 * S, -100 * S, 100 * S, 3600 * S, 10**18])
+
+CONFIGS = st.builds(
+    Config,
+    iterations=st.just(3),
+    particles=st.just(8),
+    window=st.sampled_from([20, 10]),
+    step=st.sampled_from([1, 5, 9]),
+    max_lag_s=st.sampled_from([0.0, 0.5]),
+    max_outliers=st.sampled_from([1, 10]),
+    pressure_wait_s=st.sampled_from([0.0, 0.2, 60.0]),
+    start_mu=st.sampled_from([0.0, 0.05, 0.12, 1.0]),
+    speed_while_braking=st.booleans(),
+)
+
+
+def strays() -> st.SearchStrategy[tuple[Any, ...]]:
+    """A sample at an offset from the good ones."""
+    return st.one_of(
+        st.tuples(st.just(PositionSample), OFFSETS_NS, NUMBERS, NUMBERS),
+        st.tuples(st.just(PressureSample), OFFSETS_NS, PRESSURES_PA),
+        st.tuples(st.just(SpeedSample), OFFSETS_NS, NUMBERS),
+    )
+
+
+PIECES = st.one_of(
+    st.tuples(st.just("good"), st.integers(1, 60)),
+    st.tuples(st.just("backwards"), st.integers(2, 10)),
+    st.tuples(st.just("without pressure"), st.integers(1, 30)),
+    st.tuples(st.just("speed"), st.integers(1, 20)),
+    st.tuples(st.just("again"), st.integers(1, 5)),
+    st.tuples(st.just("elsewhere"), st.integers(1, 15)),
+    st.tuples(st.just("jump"), JUMPS_NS),
+    st.tuples(st.just("stray"), strays()),
+)
+
+
+def samples_of(pieces: Iterable[tuple[str, Any]]) -> Iterator[Sample]:
+    """Yield the samples of a stream: the good run goes on from piece to piece, and around."""
+    place, origin_ns = 0, START_NS
+    for kind, value in pieces:
+        if kind == "jump":
+            origin_ns += value
+            continue
+        if kind == "stray":
+            sample, offset_ns, *numbers = value
+            yield sample(origin_ns + GOOD[place % len(GOOD)].t_ns + offset_ns, *numbers)
+            continue
+        piece = [shifted(number, origin_ns) for number in range(place, place + value)]
+        place += 0 if kind == "again" else value
+        for good in reversed(piece) if kind == "backwards" else piece:
+            if kind not in ("without pressure", "again"):
+                yield PressureSample(good.t_ns, good.brake_pressure_pa or 0.0)
+            if kind == "speed":
+                yield SpeedSample(good.t_ns, 70.0)
+            yield PositionSample(good.t_ns, good.position_m + 5000.0 * (kind == "elsewhere"), good.variance_m2)
+
+
+def shifted(number: int, origin_ns: int) -> Measurement:
+    """Return a measurement of the good run, which begins anew at its end."""
+    rounds, index = divmod(number, len(GOOD))
+    return GOOD[index]._replace(t_ns=origin_ns + rounds * (GOOD[-1].t_ns + S // 10) + GOOD[index].t_ns)
+
+
+def _lasted_s(window: BrakingWindow, step: int) -> float:
+    """How long it was at most when it was last evaluated."""
+    return (window.samples[-step].t_ns - window.samples[0].t_ns) * 1e-9
+
+
+class Watched:
+    """A pipeline whose promises are checked at each sample."""
+
+    def __init__(self, config: Config) -> None:
+        self.pipeline = Pipeline(config, 1)
+        self.positions = 0
+        self.refused_positions = 0
+        self._last_ns: int | None = None
+        self._resets = 0
+
+    def push(self, sample: Sample) -> None:
+        self.positions += isinstance(sample, PositionSample)
+        self._check(self.pipeline.push(sample))
+        self.refused_positions += isinstance(sample, PositionSample) and self.pipeline.refusal is not None
+        pipeline, config = self.pipeline, self.pipeline.config
+        window = pipeline.state.window
+        if window is not None and len(window.samples) >= config.window + config.step:
+            assert _lasted_s(window, config.step) < SHORT_S
+
+    def refuse(self, topic: str, refusal: Rejected) -> None:
+        assert Reason[refusal.reason].value in str(refusal)
+        self.positions += topic == POSITION.name
+        self.refused_positions += topic == POSITION.name
+        self.pipeline.refuse(topic, refusal.reason)
+
+    def finish(self) -> None:
+        self._check(self.pipeline.finish())
+        counts = self.pipeline.state.counts
+        judged = (Outcome.ACCEPTED, Outcome.LATE, Outcome.DUPLICATE, Outcome.INVALID, Outcome.OUTLIER)
+        taken = sum(counts[outcome] for outcome in judged)
+        assert taken + self.refused_positions == self.positions == self.pipeline.measurements
+
+    def _check(self, predictions: list[Prediction]) -> None:
+        resets = self.pipeline.state.counts[Outcome.RESET]
+        stamps = [prediction.estimate.t_ns for prediction in predictions]
+        if resets == self._resets and self._last_ns is not None:
+            stamps = [self._last_ns, *stamps]
+        if resets == self._resets:
+            assert all(one < other for one, other in pairwise(stamps)), stamps
+        for prediction in predictions:
+            check_numbers(prediction)
+        if stamps:
+            self._last_ns = stamps[-1]
+        if resets != self._resets:  # before or behind it: the stamps begin anew
+            self._last_ns, self._resets = None, resets
+
+
+def check_numbers(prediction: Prediction) -> None:
+    estimate = prediction.estimate
+    numbers = [value for value in estimate if isinstance(value, (int, float))]
+    assert all(map(math.isfinite, numbers)), estimate
+    assert 0.0 <= estimate.mu_lower <= estimate.mu, estimate
+    assert min(estimate.mu_std, estimate.position_std_m, estimate.speed_std_mps) >= 0.0, estimate
+    for curve in (prediction.safe, prediction.nominal):
+        check_curve(curve)
+
+
+def check_curve(curve: BrakingCurve | None) -> None:
+    if curve is None:
+        return
+    columns = (curve.distance_m, curve.speed_mps, curve.deceleration_mps2, curve.time_s)
+    assert all(np.isfinite(column).all() for column in columns)
+    assert (np.diff(curve.distance_m) >= 0.0).all()
+    assert (np.diff(curve.time_s) >= 0.0).all()
+
+
+@given(config=CONFIGS, pieces=st.lists(PIECES, max_size=12))
+def test_any_stream_of_samples(config: Config, pieces: list[tuple[str, Any]]) -> None:
+    watched = Watched(config)
+    for sample in samples_of(pieces):
+        watched.push(sample)
+    watched.finish()
+
+
+def fields(name: str, value: Any) -> Any:
+    """Return an object with a nested attribute, given by its path."""
+    for part in reversed(name.split(".")):
+        value = SimpleNamespace(**{part: value})
+    return value
+
+
+HEADERS = st.builds(
+    lambda sec, nanosec, frame: SimpleNamespace(stamp=SimpleNamespace(sec=sec, nanosec=nanosec), frame_id=frame),
+    st.sampled_from([0, 1, 2, 3, 63, -(2**31), 2**31 - 1]) | st.integers(-(2**31), 2**31 - 1),
+    st.sampled_from([0, 1, 5 * 10**8, 2**32 - 1]),
+    st.sampled_from([FRAME, FRAME, FRAME, "", "map"]),
+)
+POSITIONS = st.builds(
+    lambda x, variance: SimpleNamespace(pose=fields("position.x", x), covariance=[variance, *[0.0] * 35]),
+    NUMBERS,
+    NUMBERS | st.just(0.25),
+)
+MESSAGES = st.one_of(
+    st.tuples(st.just("position"), st.builds(lambda h, pose: SimpleNamespace(header=h, pose=pose), HEADERS, POSITIONS)),
+    st.tuples(
+        st.just("brake_pressure"),
+        st.builds(lambda h, p: SimpleNamespace(header=h, fluid_pressure=p), HEADERS, NUMBERS | st.just(511325.0)),
+    ),
+    st.tuples(
+        st.just("speed"),
+        st.builds(lambda h, v: SimpleNamespace(header=h, twist=fields("twist.linear.x", v)), HEADERS, NUMBERS),
+    ),
+    st.tuples(
+        st.just("traction_force"),
+        st.builds(lambda h, f: SimpleNamespace(header=h, wrench=fields("force.x", f)), HEADERS, NUMBERS),
+    ),
+    st.tuples(
+        st.just("wheel_speed"),
+        st.builds(
+            lambda h, names, velocities: SimpleNamespace(header=h, name=names, velocity=velocities),
+            HEADERS,
+            st.lists(st.text(max_size=3), max_size=3),
+            st.lists(NUMBERS, max_size=3),
+        ),
+    ),
+)
+
+
+@given(config=CONFIGS, messages=st.lists(MESSAGES, max_size=25))
+def test_any_messages_are_read_or_refused_with_a_remedy(config: Config, messages: list[tuple[str, Any]]) -> None:
+    watched = Watched(config)
+    for topic, message in messages:
+        try:
+            sample = getattr(reading, topic)(message)
+        except Rejected as refusal:
+            watched.refuse(topic, refusal)
+            continue
+        values = sample[1] if topic == "wheel_speed" else sample[1:]
+        assert values
+        assert all(map(math.isfinite, values))
+        if isinstance(sample, (PositionSample, PressureSample, SpeedSample)):
+            watched.push(sample)
+    watched.finish()
+
+
+FLOODS: dict[str, Callable[[int], int]] = {
+    "fresh": lambda number: number * S // 1_000,  # of these 200 a second are used
+    "one stamp": lambda _: 0,
+    "two clocks": lambda number: number % 2 * 30 * S + number * S // 10_000,
+    "back and forth": lambda number: number % 100 * S // 1000,
+}
+"""Stamps of 1000 or 10 000 messages a second."""
+
+
+@pytest.mark.parametrize("stamps", FLOODS)
+@pytest.mark.parametrize("pressures", [True, False])
+def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No more windows than the accepted measurements allow, no more in memory than the inbox may hold."""
+    evaluations = Counter[str]()
+
+    def counted(config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:
+        evaluations["done"] += 1
+        return evaluate(config, window, search, rng)
+
+    monkeypatch.setattr(pipeline_module, "step", partial(step, evaluate=counted))
+    monkeypatch.setattr(align, "MOST", 500)
+    pipeline = Pipeline(Config(method="particle_em", iterations=1, particles=2, window=30, step=20), 1)
+    rng = np.random.default_rng(1)
+    sizes = []
+    for number in range(6_000):
+        after_ns = FLOODS[stamps](number)
+        if pressures:
+            pipeline.push(PressureSample(START_NS + after_ns, 410e3))
+        place = 70.0 * after_ns * 1e-9 + 0.5 * rng.standard_normal()
+        pipeline.push(PositionSample(START_NS + after_ns, place, 0.25))
+        if number % 2_000 == 1_999:
+            sizes.append(len(pickle.dumps((pipeline.state.pending, pipeline.state.window, vars(pipeline._aligner)))))
+    steps = pipeline.accepted / pipeline.config.step
+    assert evaluations["done"] <= steps + pipeline.state.counts[Outcome.RESET] + 1
+    assert sizes[-1] < 1.5 * sizes[0], sizes

@@ -1,0 +1,205 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The picture and the table of a recorded run: drawn whole, with and without the truth, and right numbers in it."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from matplotlib.image import imread
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64
+from test_convert import as_rosbags
+
+from adhesion_node.bag import BagReader, BagWriter, sensors
+from adhesion_node.bag.types import serialize
+from adhesion_node.core.physics.braking import BrakingCurve
+from adhesion_node.core.physics.train import Train
+from adhesion_node.nodes.ros import messages as convert
+from adhesion_node.report import picture
+from adhesion_node.report.findings import distances
+from adhesion_node.report.run import Run, distance_to_target, read_run
+from adhesion_node.report.table import ROWS, table
+from adhesion_node.wire.topics import (
+    BRAKE_PRESSURE,
+    BRAKING_CURVE,
+    BRAKING_CURVE_NOMINAL,
+    DIAGNOSTICS,
+    MU,
+    MU_LOWER,
+    STATE,
+    TRUTH_MU,
+    TRUTH_STATE,
+    Topic,
+)
+
+S = 10**9
+START_NS = 1_700_000_000 * S
+
+FREE = Train(resistance_c0=0.0, resistance_c1=0.0, resistance_c2=0.0)
+"""Rolls without resistance, so that distances have a closed form."""
+
+TRUTH = (TRUTH_MU, TRUTH_STATE)
+
+
+def rows(second: int) -> list[tuple[Topic, bytes]]:
+    """Return a second of a run: 20 s from 80 m/s at 2 m/s^2, true adhesion 0.1, 0.09 identified, at least 0.08."""
+    t_ns = START_NS + second * S
+    speed, place = 80.0 - 2.0 * second, 80.0 * second - second**2
+    regime = "COASTING" if second < 5 else "ADHESION_LIMITED"
+    status = DiagnosticStatus(values=[KeyValue(key="regime", value=regime)])
+    plain: tuple[tuple[Topic, Any], ...] = (
+        (TRUTH_STATE, convert.state_message(t_ns, place, 0.0, speed, 0.0)),
+        (TRUTH_MU, Float64(data=0.1)),
+        (MU, Float64(data=0.09)),
+        (MU_LOWER, Float64(data=0.08)),
+        (STATE, convert.state_message(t_ns, place, 1.0, speed, 1.0)),
+        (DIAGNOSTICS, DiagnosticArray(header=convert.header(t_ns), status=[status])),
+    )
+    pressure = BRAKE_PRESSURE, sensors.brake_pressure(t_ns, 101_325.0 + 410e3)
+    return [pressure, *((topic, serialize_message(message)) for topic, message in plain)]
+
+
+def record(path: Path, *left_out: Topic, seconds: int = 20) -> Path:
+    with BagWriter(path) as writer:
+        for second in range(seconds):
+            for topic, cdr in rows(second):
+                if topic not in left_out:
+                    writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
+    return path
+
+
+def read(path: Path) -> Run:
+    with BagReader(path) as reader:
+        return read_run(reader)
+
+
+def png_size(path: Path) -> tuple[int, ...]:
+    content = path.read_bytes()
+    assert content.startswith(b"\x89PNG\r\n\x1a\n")
+    assert content.rstrip().endswith(b"IEND\xaeB`\x82")
+    return struct.unpack(">II", content[16:24])
+
+
+def pixels_of(path: Path, color: str) -> int:
+    """Count the pixels of a colour "#rrggbb"."""
+    wanted = [int(color[at : at + 2], 16) / 255 for at in (1, 3, 5)]
+    return int(np.all(np.abs(imread(path)[..., :3] - wanted) < 0.02, axis=-1).sum())
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Run:
+    return read(record(tmp_path / "bag"))
+
+
+def test_the_series_are_those_of_the_recording(recorded: Run) -> None:
+    times = [START_NS + second * S for second in range(20)]
+    for series, value in ((recorded.true_mu, 0.1), (recorded.mu, 0.09), (recorded.mu_lower, 0.08)):
+        assert series.t_ns.tolist() == times
+        assert set(series.values.tolist()) == {value}
+    for speeds in (recorded.speed, recorded.true_speed):
+        assert speeds.values.tolist() == [80.0 - 2.0 * second for second in range(20)]
+    assert recorded.true_position.values.tolist() == [80.0 * second - second**2 for second in range(20)]
+    assert set(recorded.pressure.values.tolist()) == {511_325.0}  # absolute
+    assert recorded.regime.values.tolist() == ["COASTING"] * 5 + ["ADHESION_LIMITED"] * 15
+
+
+@pytest.mark.parametrize("left_out", [(), TRUTH, (BRAKE_PRESSURE,), (DIAGNOSTICS,), (*TRUTH, DIAGNOSTICS)])
+def test_a_picture_is_drawn_of_what_there_is(left_out: tuple[Topic, ...], tmp_path: Path) -> None:
+    path = tmp_path / "run.png"
+    picture.draw(read(record(tmp_path / "bag", *left_out)), path, "a run", 100.0)
+    assert png_size(path) == (1210, 1320)
+    assert pixels_of(path, picture.ORANGE) > 1000, "the identified curves are missing"
+    assert pixels_of(path, picture.BLUE) > 300, "the lower bounds are missing"
+    shaded = pixels_of(path, picture.SHADES["ADHESION_LIMITED"])
+    assert (shaded > 50_000) is (DIAGNOSTICS not in left_out)
+
+
+def test_the_truth_is_drawn_where_there_is_one(tmp_path: Path) -> None:
+    black = []
+    for name, left_out in (("with", ()), ("without", TRUTH)):
+        path = tmp_path / f"{name}.png"
+        picture.draw(read(record(tmp_path / name, *left_out)), path, "a run", 100.0)
+        black.append(pixels_of(path, picture.BLACK))
+    assert black[0] > black[1] + 500
+
+
+def test_a_single_estimate_is_drawn(tmp_path: Path) -> None:
+    picture.draw(read(record(tmp_path / "bag", seconds=1)), tmp_path / "run.png", "short", 0.0)
+    assert png_size(tmp_path / "run.png") == (1210, 1320)
+
+
+@pytest.mark.parametrize("left_out", [(MU,), (STATE,), (MU, MU_LOWER, STATE)])
+def test_without_estimates_it_says_what_to_do(left_out: tuple[Topic, ...], tmp_path: Path) -> None:
+    path = record(tmp_path / "bag", *left_out)
+    with pytest.raises(ValueError, match=r"bag = .*: holds no adhesion/\w+: record while the estimator runs"):
+        read(path)
+
+
+def curve(second: int, length_m: float) -> bytes:
+    """Return a braking curve of that second, by hand: as it runs to 60, 40 and 0 m/s, it passes 50 at 2 lengths."""
+    speeds = np.array([80.0 - 2.0 * second, 60.0, 40.0, 0.0])
+    by_hand = BrakingCurve(length_m * np.array([0.0, 1.0, 3.0, 9.0]), speeds, np.ones(4), np.arange(4.0))
+    message = convert.curve_message(START_NS + second * S, by_hand, 70.0)
+    return serialize(as_rosbags(message, BRAKING_CURVE.type), BRAKING_CURVE.type)
+
+
+def test_distances_are_those_of_the_recorded_curves_and_of_the_present_mu_where_there_is_none(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            curves = [(BRAKING_CURVE_NOMINAL, curve(second, 100.0 + second)), (BRAKING_CURVE, curve(second, 200.0))]
+            for topic, cdr in [*rows(second), *(curves if second in (3, 4) else [])]:
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
+    run = read(tmp_path / "bag")
+    planned = distances(run, 50.0, FREE)
+    ways = np.maximum((80.0 - 2.0 * np.arange(20)) ** 2 - 50.0**2, 0.0) / (2 * 9.8)
+    identified, longest = ways / 0.09, ways / 0.08
+    identified[[3, 4]], longest[[3, 4]] = (206.0, 208.0), 400.0
+    assert planned.fixed == pytest.approx(ways / 0.0726)
+    assert planned.identified == pytest.approx(identified)
+    assert planned.longest == pytest.approx(longest)
+    faster = distances(run, 80.0, FREE)
+    assert not np.any([faster.identified, faster.longest]), "no way to a speed that the train is below"
+    shown = {line.split()[0]: line.split()[5:7] for line in table(run, 180.0, FREE).splitlines()[2:]}
+    assert shown["259"] == ["208", "400"]
+
+
+def test_distances_are_the_closed_form(recorded: Run) -> None:
+    lengths = distance_to_target(recorded, 0.0726, 50.0, FREE)
+    speeds = 80.0 - 2.0 * np.arange(20)
+    assert lengths == pytest.approx(np.maximum(speeds**2 - 50.0**2, 0.0) / (2 * 0.0726 * 9.8))
+    growing = np.linspace(0.05, 0.09, 20)
+    assert distance_to_target(recorded, growing, 0.0, FREE) == pytest.approx(speeds**2 / (2 * growing * 9.8))
+
+
+def test_the_table_holds_the_runs_numbers(recorded: Run) -> None:
+    lines = table(recorded, 180.0, FREE).splitlines()
+    assert "braking distance to 180 km/h" in lines[0]
+    assert "fixed 0.0726" in lines[1]
+    body = [[float(cell) for cell in line.split()] for line in lines[2:]]
+    assert len(body) == ROWS
+    assert [row[0] for row in body] == sorted((row[0] for row in body), reverse=True)
+    for kmh, *mus, left, identified, at_least, fixed in body:
+        second = round((80.0 - kmh / 3.6) / 2.0)
+        speed = 80.0 - 2.0 * second
+        assert mus == [0.1, 0.09, 0.08]
+        assert left == round((speed**2 - 50.0**2) / 4.0)  # v^2/(2 a) at 2 m/s^2, from the truth
+        for distance, mu in ((identified, 0.09), (at_least, 0.08), (fixed, 0.0726)):
+            assert distance == pytest.approx((speed**2 - 50.0**2) / (2 * mu * 9.8), abs=0.51)
+
+
+def test_the_table_leaves_the_truth_out_where_there_is_none(tmp_path: Path) -> None:
+    run_ = read(record(tmp_path / "bag", *TRUTH))
+    body = [[float(cell) for cell in line.split()] for line in table(run_, 180.0, FREE).splitlines()[2:]]
+    assert {len(row) for row in body} == {6}
+    assert {tuple(row[1:3]) for row in body} == {(0.09, 0.08)}
+
+
+def test_a_run_that_never_slows_down_has_no_rows(tmp_path: Path) -> None:
+    assert len(table(read(record(tmp_path / "bag", seconds=1)), 100.0).splitlines()) == 2

@@ -1,0 +1,196 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The report: findings with closed forms, the page whole and without network, estimated where only sensors are."""
+
+from __future__ import annotations
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64
+from test_offline import samples, write_run
+from test_picture import FREE, START_NS, TRUTH, S, read, record, rows
+
+from adhesion_node.bag import BagWriter
+from adhesion_node.core import Config
+from adhesion_node.nodes import replay
+from adhesion_node.report.__main__ import main
+from adhesion_node.report.curves import changes
+from adhesion_node.report.findings import distances, findings, first_identified
+from adhesion_node.report.run import Band, bands
+from adhesion_node.report.series import Series
+from adhesion_node.wire.topics import DIAGNOSTICS, TRUTH_MU
+
+QUICK = ("--set", "iterations=3")
+
+
+class Parser(HTMLParser):
+    """Collects texts, the embedded data, and every attribute that could fetch something."""
+
+    def __init__(self, html: str) -> None:
+        super().__init__()
+        self.texts: list[str] = []
+        self.fetched: list[str] = []
+        self._inside = ""
+        self.data: dict[str, Any] = {}
+        self.feed(html)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._inside = tag if tag in ("script", "style") else self._inside
+        if tag == "script" and ("id", "data") in attrs:
+            self._inside = "data"
+        self.fetched += [f"{tag} {name}" for name, _ in attrs if name in ("src", "href", "srcset", "action")]
+        self.fetched += [tag] if tag in ("link", "iframe", "object", "base") else []
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = "" if tag in ("script", "style") else self._inside
+
+    def handle_data(self, data: str) -> None:
+        if self._inside == "data":
+            self.data = json.loads(data)
+        elif not self._inside and data.strip():
+            self.texts.append(data.strip())
+
+
+def make(tmp_path: Path, *arguments: str) -> tuple[dict[str, Any], Parser]:
+    """Run the command; return its JSON and the page."""
+    result = tmp_path / "result.json"
+    assert main([*arguments, "--output", str(tmp_path / "report"), "--json", str(result)]) == 0
+    return json.loads(result.read_text()), Parser((tmp_path / "report" / "report.html").read_text(encoding="utf-8"))
+
+
+def test_a_recording_with_results_is_shown_as_recorded(tmp_path: Path) -> None:
+    result, page = make(tmp_path, str(record(tmp_path / "mine")))
+    (run,) = page.data["runs"]
+    assert (run["name"], run["source"], result["runs"][0]["source"]) == ("mine", "as recorded", "as recorded")
+    assert run["mu"]["t"] == list(range(20))
+    assert (set(run["mu"]["v"]), set(run["mu_lower"]["v"]), set(run["true_mu"]["v"])) == ({0.09}, {0.08}, {0.1})
+    assert run["speed"]["v"] == pytest.approx([3.6 * (80.0 - 2.0 * second) for second in range(20)], abs=0.006)
+    assert run["brake"]["v"] == pytest.approx([500.2] * 20, abs=0.05)  # 0.9332 m/s^2 x 536 t
+    assert run["identified_force"]["v"] == pytest.approx([0.09 * 536 * 9.8] * 20, abs=0.05)
+    assert len(run["moments"]) == 20
+    for name in ("mine.png", "mine.pdf"):
+        assert (tmp_path / "report" / name).stat().st_size > 10_000
+    assert (tmp_path / "report" / "mine.pdf").read_bytes().startswith(b"%PDF")
+
+
+def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: Path) -> None:
+    write_run(tmp_path / "bag", samples(16.0, 24.0))
+    _, page = make(tmp_path, str(tmp_path / "bag"), *QUICK)
+    assert replay.main([str(tmp_path / "bag"), "--offline", *QUICK, "--json", str(tmp_path / "replay.json")]) == 0
+    replayed = json.loads((tmp_path / "replay.json").read_text())
+    (run,) = page.data["runs"]
+    assert run["source"] == "estimated from the recorded sensors"
+    assert replayed["digest"] in page.texts
+    assert run["mu"]["v"][-1] == pytest.approx(replayed["mu_final"], abs=1e-5)
+    assert run["mu_lower"]["v"][-1] == pytest.approx(replayed["mu_lower_final"], abs=1e-5)
+    assert run["bands"][-1]["kind"] == replayed["regime_final"].lower()
+    assert "iterations = 3" in page.texts
+    last = run["moments"][-1]
+    assert last["safe"]["x"][0] == last["nominal"]["x"][0] == pytest.approx(last["fixed"]["x"][0], abs=0.1)
+    assert last["safe"]["y"][-1] == 0.0
+
+
+def test_results_are_estimated_anew_on_demand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bag = record(tmp_path / "mine")  # without positions: as recorded it can be shown
+    assert main([str(bag), "--output", str(tmp_path / "report"), "--estimate"]) == 2
+    assert "topic position: not in the recording" in capsys.readouterr().err
+
+
+def test_the_page_fetches_nothing(tmp_path: Path) -> None:
+    _, page = make(tmp_path, str(record(tmp_path / "mine")))
+    assert page.fetched == []
+    html = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert set(re.findall(r"https?://[^\s\"']+", html)) == {"http://www.w3.org/2000/svg"}
+    assert "default-src 'none'" in html
+    assert not re.search(r"@import|url\((?!#)", html)
+
+
+def test_recordings_stand_side_by_side_under_their_own_names(tmp_path: Path) -> None:
+    first, second = record(tmp_path / "one" / "bag"), record(tmp_path / "two" / "bag", *TRUTH)
+    result, page = make(tmp_path, str(first), str(second), "--target", "180")
+    assert [run["name"] for run in page.data["runs"]] == [run["name"] for run in result["runs"]] == ["bag", "bag (2)"]
+    assert [len(run["true_mu"]["t"]) for run in page.data["runs"]] == [20, 0]
+    assert page.data["target_kmh"] == 180.0
+    assert all(Path(path).is_file() for run in result["runs"] for path in run["pictures"])
+
+
+def test_a_recorded_number_that_is_none_leaves_a_gap(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            for topic, cdr in rows(second):
+                broken = topic is TRUTH_MU and second == 7
+                cdr_ = serialize_message(Float64(data=float("nan"))) if broken else cdr
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr_, START_NS + second * S)
+    _, page = make(tmp_path, str(tmp_path / "bag"))
+    values = page.data["runs"][0]["true_mu"]["v"]
+    assert [second for second, value in enumerate(values) if value is None] == [7]
+
+
+def test_a_name_cannot_break_the_page(tmp_path: Path) -> None:
+    _, page = make(tmp_path, str(record(tmp_path / "<b>&amp;<script>")))
+    assert page.data["runs"][0]["name"] == "<b>&amp;<script>"
+    assert "<b>&amp;<script>" in page.texts
+
+
+def test_savings_are_the_closed_form(tmp_path: Path) -> None:
+    planned = distances(read(record(tmp_path / "bag")), 50.0, FREE)
+    squares = np.maximum((80.0 - 2.0 * np.arange(20)) ** 2 - 50.0**2, 0.0)
+    assert planned.saved == pytest.approx(squares / (2 * 9.8) * (1 / 0.0726 - 1 / 0.09))
+    assert planned.saved_at_least == pytest.approx(squares / (2 * 9.8) * (1 / 0.0726 - 1 / 0.08))
+
+
+def test_findings_are_those_of_the_first_identified_estimate(tmp_path: Path) -> None:
+    """Adhesion limits from 5 s on, when 80 m/s have become 70 m/s: 36 km/h of braking, the first beyond 30."""
+    run = read(record(tmp_path / "bag"))
+    assert first_identified(run) == 5
+    found = findings(run, Config(train=FREE), 180.0)
+    assert found["identified_at_kmh"] == pytest.approx(70.0 * 3.6)
+    assert (found["mu"], found["mu_lower"]) == (0.09, 0.08)
+    way = (70.0**2 - 50.0**2) / (2 * 9.8)
+    assert found["fixed_m"] == pytest.approx(way / 0.0726)
+    assert found["saved_m"] == pytest.approx(way * (1 / 0.0726 - 1 / 0.09))
+    assert found["saved_at_least_m"] == pytest.approx(way * (1 / 0.0726 - 1 / 0.08))
+
+
+def test_what_was_not_recorded_is_not_found(tmp_path: Path) -> None:
+    found = findings(read(record(tmp_path / "bag", DIAGNOSTICS)), Config(), 0.0)
+    assert found["identified_at_kmh"] is found["saved_m"] is found["mu"] is None
+    assert found["mean_relative_error_percent"] is None  # the brake limits at a true adhesion of 0.1
+
+
+def test_a_regime_holds_since_the_estimate_before(tmp_path: Path) -> None:
+    run = read(record(tmp_path / "bag"))
+    assert bands(run) == [Band(0.0, 4.0, "COASTING"), Band(4.0, 19.0, "ADHESION_LIMITED")]
+
+
+def test_changes_of_a_text() -> None:
+    series = Series(np.arange(6), np.array(["", "A", "A", "B", "", "B"]))
+    assert changes(series) == [(1, "A"), (3, "B"), (5, "B")]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nowhere"], "does not exist"),
+        (["mine", "--target", "-1"], "target = -1.0: give"),
+        (["mine", "--set", "windov=3"], "windov"),
+    ],
+)
+def test_bad_input_is_one_line_and_leaves_nothing(
+    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    record(tmp_path / "mine")
+    assert main([*arguments, "--output", "report"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("report: ")
+    assert said in line
+    assert not (tmp_path / "report").exists()

@@ -1,0 +1,109 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Series out of a recording: which time counts, what is missing, interpolation between."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.serialization import serialize_message
+from std_msgs.msg import Float64
+
+from adhesion_node.bag import BagReader, BagWriter, sensors
+from adhesion_node.nodes.ros import messages as convert
+from adhesion_node.report.series import Series, read_series, read_status
+from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE, Topic
+
+S = 10**9
+
+
+def write(path: Path, *rows: tuple[Topic, Any, int]) -> Path:
+    """Write messages with their log times."""
+    with BagWriter(path) as writer:
+        for topic, message, log_ns in rows:
+            writer.write(f"/{topic.name.lstrip('/')}", topic.type, serialize_message(message), log_ns)
+    return path
+
+
+def state(t_ns: int, speed_mps: float) -> Any:
+    return convert.state_message(t_ns, 0.0, 1.0, speed_mps, 1.0)
+
+
+def speed_of(message: Any) -> float:
+    return float(message.twist.twist.linear.x)
+
+
+def test_the_stamp_counts_before_the_log_time(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", (STATE, state(S, 80.0), 5 * S), (STATE, state(2 * S + 1, 79.0), 6 * S))
+    with BagReader(path) as reader:
+        series = read_series(reader, STATE, speed_of)
+    assert series.t_ns.dtype == np.int64
+    assert series.t_ns.tolist() == [S, 2 * S + 1]
+    assert series.values.tolist() == [80.0, 79.0]
+
+
+def test_without_a_header_the_log_time_counts(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", (MU, Float64(data=0.08), 5 * S), (MU, Float64(data=0.09), 7 * S))
+    with BagReader(path) as reader:
+        series = read_series(reader, MU, lambda message: message.data)
+    assert (series.t_ns.tolist(), series.values.tolist()) == ([5 * S, 7 * S], [0.08, 0.09])
+
+
+def test_times_increase_even_where_messages_came_late(tmp_path: Path) -> None:
+    path = tmp_path / "bag"
+    with BagWriter(path) as writer:
+        for t_ns, log_ns in ((S, S), (3 * S, 2 * S), (2 * S, 3 * S), (4 * S, 4 * S)):
+            writer.write("/position", POSITION.type, sensors.position(t_ns, t_ns / S, 1.0), log_ns)
+    with BagReader(path) as reader:
+        series = read_series(reader, POSITION, lambda message: message.pose.pose.position.x)
+    assert (series.t_ns.tolist(), series.values.tolist()) == ([S, 2 * S, 3 * S, 4 * S], [1.0, 2.0, 3.0, 4.0])
+
+
+def test_only_the_topic_that_was_asked_for(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", (MU, Float64(data=0.08), S), (MU_LOWER, Float64(data=0.05), S))
+    with BagReader(path) as reader:
+        assert read_series(reader, MU_LOWER, lambda message: message.data).values.tolist() == [0.05]
+
+
+def test_a_topic_that_is_not_there_is_empty(tmp_path: Path) -> None:
+    path = write(tmp_path / "bag", (MU, Float64(data=0.08), S))
+    with BagReader(path) as reader:
+        series = read_series(reader, STATE, speed_of)
+    assert (series.t_ns.size, series.values.size) == (0, 0)
+    assert series.t_ns.dtype == np.int64
+
+
+def test_values_between_are_interpolated_and_held_beyond() -> None:
+    series = Series(np.array([10, 20, 40]), np.array([1.0, 2.0, 0.0]))
+    assert series.at(np.array([0, 10, 15, 30, 40, 99])) == pytest.approx([1.0, 1.0, 1.5, 1.0, 0.0, 0.0])
+
+
+def test_nanoseconds_of_today_are_exact_enough() -> None:
+    now_ns = 1_700_000_000 * S
+    series = Series(np.array([now_ns, now_ns + S]), np.array([0.0, 1.0]))
+    assert series.at(np.array([now_ns + S // 4])) == pytest.approx([0.25], abs=1e-6)
+
+
+def test_a_status_is_read_by_its_key(tmp_path: Path) -> None:
+    def array(t_ns: int, *pairs: tuple[str, str]) -> Any:
+        others = DiagnosticStatus(name="other", values=[KeyValue(key="rate", value="10")])
+        ours = DiagnosticStatus(name="ours", values=[KeyValue(key=key, value=value) for key, value in pairs])
+        return DiagnosticArray(header=convert.header(t_ns), status=[others, ours])
+
+    path = write(
+        tmp_path / "bag",
+        (DIAGNOSTICS, array(S, ("mu", "0.08"), ("regime", "COASTING")), 2 * S),
+        (DIAGNOSTICS, array(3 * S, ("mu", "0.09")), 4 * S),
+        (DIAGNOSTICS, array(5 * S, ("regime", "BRAKE_LIMITED")), 6 * S),
+        (ATP_STATUS, array(7 * S, ("regime", "of another topic")), 7 * S),
+    )
+    with BagReader(path) as reader:
+        regimes = read_status(reader, DIAGNOSTICS, "regime")
+        assert read_status(reader, DIAGNOSTICS, "rate").values.tolist() == ["10", "10", "10"]
+    assert regimes.values.tolist() == ["COASTING", "", "BRAKE_LIMITED"]
+    assert regimes.t_ns.tolist() == [S, 3 * S, 5 * S]

@@ -1,0 +1,335 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The simulator node: what it publishes, in which order, at which pace, and how it ends."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections import defaultdict
+from typing import Any
+
+import pytest
+from conftest import SpinUntil
+from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.publisher import Publisher
+
+from adhesion_node.nodes.ros.qos import message_class
+from adhesion_node.wire.topics import CLOCK, SENSORS, TRUTH
+from sim_node.nodes.pace import MAX_BURST, due
+from sim_node.nodes.simulator import Simulator
+from sim_node.train.run import run
+from sim_node.train.scenario import find
+from sim_node.train.sensors import SensorSettings
+
+ROS_OWN = ("/rosout", "/parameter_events")
+Sent = list[tuple[str, Any]]
+
+
+def _simulator(context: Context, *, paced: bool = False, **parameters: Any) -> Simulator:
+    overrides = [Parameter(name, value=value) for name, value in parameters.items()]
+    return Simulator(paced=paced, context=context, parameter_overrides=overrides)
+
+
+@pytest.fixture
+def sent(monkeypatch: pytest.MonkeyPatch) -> Sent:
+    """Everything published on our topics, as (absolute topic name, message), in the order of publishing."""
+    record: Sent = []
+    publish = Publisher.publish
+
+    def recording(self: Publisher, message: Any) -> None:
+        if self.topic_name not in ROS_OWN:
+            record.append((self.topic_name, message))
+        publish(self, message)
+
+    monkeypatch.setattr(Publisher, "publish", recording)
+    return record
+
+
+def _destroy(node: Node) -> None:
+    node.destroy_node()
+
+
+def _drive(simulator: Simulator) -> int:
+    """Tick to the end, destroy the node, return the number of samples."""
+    samples = 0
+    while simulator.tick():
+        samples += 1
+    _destroy(simulator)
+    return samples
+
+
+def _by_topic(sent: Sent) -> dict[str, list[Any]]:
+    lists: dict[str, list[Any]] = defaultdict(list)
+    for topic, message in sent:
+        lists[topic].append(message)
+    return lists
+
+
+def _nanoseconds(stamp: Any) -> int:
+    return int(stamp.sec * 10**9 + stamp.nanosec)
+
+
+def test_a_sample_is_published_in_the_agreed_order(context: Context, sent: Sent) -> None:
+    simulator = _simulator(context, speed_std_mps=0.1, wheel_speed_std_radps=0.1)
+    for _ in range(3):
+        assert simulator.tick()
+    order = ["/clock", "/truth/state", "/truth/mu", "/brake_pressure", "/speed", "/wheel_speed", "/position"]
+    assert [topic for topic, _ in sent] == order * 3
+    _destroy(simulator)
+
+
+def test_all_sensors_of_a_sample_share_their_stamp(context: Context, sent: Sent) -> None:
+    _drive(
+        _simulator(
+            context, rate_hz=4.0, start_time_s=12.5, scenario="cruise", speed_std_mps=0.1, wheel_speed_std_radps=0.1
+        )
+    )
+    lists = _by_topic(sent)
+    expected = [12_500_000_000 + k * 250_000_000 for k in range(241)]
+    assert [_nanoseconds(m.clock) for m in lists["/clock"]] == expected
+    for topic in ("/position", "/speed", "/wheel_speed", "/brake_pressure", "/truth/state"):
+        assert [_nanoseconds(m.header.stamp) for m in lists[topic]] == expected
+        assert {m.header.frame_id for m in lists[topic]} == {"track"}
+
+
+def test_messages_carry_the_run_and_its_variances(context: Context, sent: Sent) -> None:
+    parameters: dict[str, Any] = {"position_std_m": 0.3, "pressure_std_pa": 500.0, "speed_std_mps": 0.2}
+    parameters["wheel_speed_std_radps"] = 0.1
+    _drive(_simulator(context, scenario="tunnel_exit", seed=4, rate_hz=2.0, **parameters))
+    lists = _by_topic(sent)
+    expected = list(run(find("tunnel_exit"), 0.5, 4, SensorSettings(**parameters)))
+    assert [m.pose.pose.position.x for m in lists["/position"]] == [r.position_m for _, r in expected]
+    assert {m.pose.covariance[0] for m in lists["/position"]} == {0.3**2}
+    assert {m.pose.pose.orientation.w for m in lists["/position"]} == {1.0}
+    assert [m.fluid_pressure for m in lists["/brake_pressure"]] == [r.pressure_pa for _, r in expected]
+    assert {m.variance for m in lists["/brake_pressure"]} == {500.0**2}
+    assert [m.twist.twist.linear.x for m in lists["/speed"]] == [r.speed_mps for _, r in expected]
+    assert {m.twist.covariance[0] for m in lists["/speed"]} == {0.2**2}
+    assert [tuple(m.velocity) for m in lists["/wheel_speed"]] == [r.wheel_radps for _, r in expected]
+    assert {tuple(m.name) for m in lists["/wheel_speed"]} == {("axle_1", "axle_2", "axle_3", "axle_4")}
+    assert [m.data for m in lists["/truth/mu"]] == [t.mu for t, _ in expected]
+    assert [m.pose.pose.position.x for m in lists["/truth/state"]] == [t.position_m for t, _ in expected]
+    assert [m.twist.twist.linear.x for m in lists["/truth/state"]] == [t.speed_mps for t, _ in expected]
+    assert {m.child_frame_id for m in lists["/truth/state"]} == {"train"}
+
+
+def test_pressure_is_absolute(context: Context, sent: Sent) -> None:
+    _drive(_simulator(context, rate_hz=1.0))
+    pressures = [m.fluid_pressure for m in _by_topic(sent)["/brake_pressure"]]
+    assert pressures[:20] == [101325.0] * 20
+    assert set(pressures[20:]) == {511325.0}
+
+
+def test_adhesion_drops_as_published_when_the_brake_comes_on(context: Context, sent: Sent) -> None:
+    _drive(_simulator(context, scenario="tunnel_entry"))
+    mu = [m.data for m in _by_topic(sent)["/truth/mu"]]
+    assert mu[199:201] == pytest.approx([0.1432, 0.0726], abs=1.5e-4)
+
+
+def test_same_seed_same_messages_another_seed_others(context: Context, sent: Sent) -> None:
+    runs = []
+    for seed in (5, 5, 6):
+        sent.clear()
+        _drive(_simulator(context, seed=seed, rate_hz=1.0, outlier_fraction=0.1, student_dof=3.0, speed_std_mps=0.1))
+        runs.append(list(sent))
+    assert runs[0] == runs[1]
+    assert runs[0] != runs[2]
+
+
+def test_a_sensor_parameter_leaves_the_truth_alone(context: Context, sent: Sent) -> None:
+    truths = []
+    changes: tuple[dict[str, Any], ...] = ({}, {"outlier_fraction": 0.2, "position_std_m": 2.0, "speed_std_mps": 0.3})
+    for parameters in changes:
+        sent.clear()
+        _drive(_simulator(context, rate_hz=1.0, **parameters))
+        lists = _by_topic(sent)
+        truths.append((lists["/truth/state"], lists["/truth/mu"]))
+    assert truths[0] == truths[1]
+
+
+def test_a_dropout_misses_the_position_only(context: Context, sent: Sent) -> None:
+    samples = _drive(_simulator(context, rate_hz=2.0, dropout_fraction=0.5))
+    lists = _by_topic(sent)
+    assert len(lists["/brake_pressure"]) == len(lists["/clock"]) == samples
+    assert 0.3 * samples < len(lists["/position"]) < 0.7 * samples
+
+
+def test_without_odometer_there_is_no_speed_topic(context: Context) -> None:
+    names = [{p.topic_name for p in _simulator(context, speed_std_mps=std).publishers} for std in (0.0, 0.1)]
+    assert "/speed" not in names[0]
+    assert names[1] - names[0] == {"/speed"}
+
+
+def test_topics_are_relative_but_the_clock_is_shared(context: Context) -> None:
+    simulator = Simulator(paced=False, context=context, namespace="/train7")
+    names = {p.topic_name for p in simulator.publishers}
+    assert {"/clock", "/train7/position", "/train7/truth/mu"} <= names
+    _destroy(simulator)
+
+
+class _Listener(Node):
+    """Subscribes reliably to everything the simulator publishes."""
+
+    def __init__(self, context: Context) -> None:
+        super().__init__("listener", context=context)
+        self.heard: dict[str, list[Any]] = defaultdict(list)
+        for topic in (CLOCK, *TRUTH, *SENSORS):
+            self.create_subscription(message_class(topic), topic.name, self.heard[topic.name].append, 100)
+
+
+RUN_OF_61: dict[str, Any] = {"scenario": "cruise", "rate_hz": 1.0, "real_time_factor": 0.0, "speed_std_mps": 0.1}
+
+
+def test_a_whole_run_arrives_and_ends_the_program(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """Timer and DDS, from the first sample to the last."""
+    simulator = _simulator(context, paced=True, wait_for=1, **RUN_OF_61)
+    listener = _Listener(context)
+    executor.add_node(listener)
+    spin_until(executor, lambda: all(p.get_subscription_count() for p in _outputs(simulator)))
+    executor.add_node(simulator)
+    spin_until(executor, lambda: simulator.finished and all(len(got) == 61 for got in listener.heard.values()))
+    assert len(listener.heard) == 6
+    expected = [(1000 + k) * 10**9 for k in range(61)]
+    assert [_nanoseconds(m.header.stamp) for m in listener.heard["position"]] == expected
+    assert [_nanoseconds(m.clock) for m in listener.heard["/clock"]] == expected
+
+
+def _outputs(simulator: Simulator) -> list[Publisher]:
+    return [p for p in simulator.publishers if p.topic_name not in ROS_OWN]
+
+
+def test_nothing_is_published_before_the_subscribers_are_there(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, sent: Sent
+) -> None:
+    simulator = _simulator(context, paced=True, wait_for=1, **RUN_OF_61)
+    executor.add_node(simulator)
+    calls = _count_calls(simulator)
+    spin_until(executor, lambda: len(calls) >= 5)
+    assert sent == []
+    executor.add_node(_Listener(context))
+    spin_until(executor, lambda: simulator.finished)
+    assert len(_by_topic(sent)["/position"]) == 61
+
+
+def _count_calls(node: Node) -> list[None]:
+    """A list that grows with every round of the executor in which a timer beside the simulator's has fired."""
+    calls: list[None] = []
+    node.create_timer(0.005, lambda: calls.append(None))
+    return calls
+
+
+def test_the_node_lives_on_when_told_to(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, sent: Sent
+) -> None:
+    simulator = _simulator(context, paced=True, exit_at_end=False, **RUN_OF_61)
+    executor.add_node(simulator)
+    spin_until(executor, lambda: all(timer.is_canceled() for timer in simulator.timers))
+    assert len(_by_topic(sent)["/position"]) == 61
+    assert not simulator.finished
+
+
+def test_a_run_without_a_timer_finishes_too(context: Context) -> None:
+    simulator = _simulator(context, **RUN_OF_61)
+    assert sum(1 for _ in iter(simulator.tick, False)) == 61
+    assert simulator.finished
+    assert list(simulator.timers) == []
+    _destroy(simulator)
+
+
+def test_the_real_time_factor_sets_the_pace(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """60 s at a factor of 100 last 0.6 s; half a sample, 5 ms, is the rounding."""
+    simulator = _simulator(context, paced=True, **{**RUN_OF_61, "real_time_factor": 100.0})
+    executor.add_node(simulator)
+    begun = time.monotonic()
+    spin_until(executor, lambda: simulator.finished)
+    assert time.monotonic() - begun > 0.59
+
+
+def test_use_sim_time_does_not_stop_the_clock_that_the_node_itself_drives(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    simulator = _simulator(context, paced=True, use_sim_time=True, **RUN_OF_61)
+    executor.add_node(simulator)
+    spin_until(executor, lambda: simulator.finished)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.03, 0.35, 5.0])
+def test_a_late_timer_catches_up_in_bounded_bursts(late_s: float) -> None:
+    """After a pause the calls publish at most MAX_BURST each until the run is on time again, and none is lost."""
+    published = 0
+    for call in range(200):
+        elapsed_s = call * 0.1 + (late_s if call >= 20 else 0.0)
+        count = due(round(elapsed_s * 1e9), 1.0, 0.1, published)
+        assert 0 <= count <= MAX_BURST
+        published += count
+    assert published == pytest.approx(200 + late_s / 0.1, abs=0.51)
+
+
+@pytest.mark.parametrize("jitter_s", [-0.04, 0.04])
+def test_a_jittering_timer_still_publishes_one_sample_per_call(jitter_s: float) -> None:
+    counts = [due(round((k * 0.1 + jitter_s * (k % 2)) * 1e9), 1.0, 0.1, k) for k in range(50)]
+    assert counts == [1] * 50
+
+
+@pytest.mark.parametrize(
+    ("parameters", "message"),
+    [
+        (
+            {"scenario": "tunel"},
+            "scenario = 'tunel': give one of tunnel_entry, tunnel_exit, cruise, dry_braking, low_ad",
+        ),
+        ({"rate_hz": 0.0}, r"rate_hz = 0\.0: give a finite number between 0\.1 and 1000 Hz"),
+        ({"real_time_factor": -1.0}, r"real_time_factor = -1\.0: give"),
+        ({"position_std_m": 0.0}, r"position_std_m = 0\.0: give"),
+        ({"outlier_fraction": 1.5}, r"outlier_fraction = 1\.5: give"),
+        ({"student_dof": 0.5}, r"student_dof = 0\.5: give 0 \(Gaussian\) or at least 1"),
+        ({"seed": -1}, "seed = -1: give"),
+    ],
+)
+def test_bad_parameters_are_refused_with_name_value_and_remedy(
+    context: Context, parameters: dict[str, Any], message: str
+) -> None:
+    with pytest.raises(ValueError, match=message):
+        _simulator(context, **parameters)
+
+
+def _program(*arguments: str) -> subprocess.CompletedProcess[str]:
+    # The wheels' bootstrap leaves these two behind; a child would take itself for set up already.
+    leaked = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
+    environment = {name: value for name, value in os.environ.items() if name not in leaked}
+    code = "from sim_node.nodes.simulator import main; raise SystemExit(main())"
+    command = [sys.executable, "-c", code, "--ros-args"]
+    return subprocess.run(
+        [*command, *arguments], env=environment, capture_output=True, text=True, timeout=60, check=False
+    )
+
+
+def test_the_program_tells_an_unknown_scenario_in_one_line() -> None:
+    ended = _program("-p", "scenario:=tunel")
+    assert ended.returncode == 2
+    assert ended.stdout == ""
+    assert ended.stderr.count("\n") == 1
+    assert "scenario = 'tunel': give one of tunnel_entry" in ended.stderr
+
+
+def test_the_program_reports_start_regimes_and_end_and_exits() -> None:
+    """An integer rate is taken for a number; nothing else is logged than one line per event."""
+    ended = _program("-p", "scenario:=tunnel_exit", "-p", "rate_hz:=10", "-p", "real_time_factor:=0")
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stdout == ""
+    said = [line.split("]: ", 1)[1] for line in ended.stderr.splitlines() if "parameters: " not in line]
+    assert said[0] == "scenario tunnel_exit: started at 1000.0 s"
+    assert [line.split()[2] for line in said[1:-1]] == ["COASTING", "ADHESION_LIMITED", "BRAKE_LIMITED"]
+    assert said[2] == "20.0 s: ADHESION_LIMITED at 250 km/h, mu 0.0770"
+    assert said[-1].startswith("scenario tunnel_exit: ended after ")

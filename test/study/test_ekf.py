@@ -1,0 +1,113 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The baseline EKF: its derivative, its equality with a textbook filter, the kink, and what it drops."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from oracles import Linear, ride
+
+from adhesion_node.core import Config, Estimate, Measurement, Regime
+from adhesion_node.core.physics.train import Train
+from adhesion_node.study.baselines.ekf import NAIVE, TUNED, EkfConfig, EkfState, Tuning, ekf_init, ekf_step, jacobian
+
+BRAKE = 0.0952
+
+
+def _run(config: EkfConfig, measurements: list[Measurement]) -> tuple[EkfState, list[Estimate]]:
+    state, estimates = ekf_init(config, 1), []
+    for measurement in measurements:
+        state, estimate = ekf_step(config, state, measurement)
+        estimates += [] if estimate is None else [estimate]
+    return state, estimates
+
+
+@pytest.mark.parametrize("mu", [0.07, 0.12])
+def test_jacobian_is_the_derivative_of_the_step(mu: float) -> None:
+    config, mean, small = Config(), np.array([100.0, 70.0, mu]), 1e-5
+
+    def step(x: np.ndarray) -> np.ndarray:
+        return np.array([*config.motion.advance(x[0], x[1], 0.1, BRAKE, x[2]), x[2]])
+
+    columns = [(step(mean + d) - step(mean - d)) / (2 * small) for d in small * np.eye(3)]
+    np.testing.assert_allclose(jacobian(config, mean, 0.1, BRAKE), np.array(columns).T, atol=1e-7)
+
+
+def test_equals_the_textbook_filter_where_the_train_is_linear() -> None:
+    model = Linear(c0=0.8, c1=0.006)
+    train = Train(resistance_c0=0.8, resistance_c1=0.006, resistance_c2=0.0)
+    config = EkfConfig(Config(train=train, start_mu=0.06), Tuning(0.02, 1e-3))
+    measurements = ride([(1.0, 0.0), (10.0, 410e3)], mu=0.07, seed=3)
+    state, _ = _run(config, measurements)
+
+    start, _ = _run(config, measurements[:11])  # the last of the cruising
+    mean, covariance = start.mean, start.covariance
+    a = np.eye(3)
+    a[:2, :2] = model.matrix(0.1)
+    a[:2, 2] = model.push(0.1, 1.0) - model.push(0.1, 0.0)
+    noise = np.diag([*np.diag(model.noise(0.1)), 1e-6])
+    for measurement in measurements[11:]:
+        mean = a @ mean + np.append(model.push(0.1, 0.0), 0.0)
+        covariance = a @ covariance @ a.T + noise
+        gain = covariance[:, 0] / (covariance[0, 0] + 0.25)
+        mean = mean + gain * (measurement.position_m - mean[0])
+        covariance = covariance - np.outer(gain, covariance[0])
+        assert 0.0 < mean[2] < BRAKE  # else the core's kink is at work and the comparison void
+    np.testing.assert_allclose(state.mean, mean, rtol=1e-9)
+    np.testing.assert_allclose(state.covariance, covariance, rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])
+def test_finds_a_constant_adhesion_from_every_start(start_mu: float) -> None:
+    measurements = ride([(20.0, 0.0), (40.0, 410e3)], mu=0.0726, speed_mps=83.0, seed=1)
+    _, estimates = _run(EkfConfig(Config(start_mu=start_mu)), measurements)
+    assert {e.regime for e in estimates if e.t_ns < 19e9} == {Regime.COASTING}
+    late = [e for e in estimates if e.t_ns > 40e9]
+    assert np.mean([abs(e.mu - 0.0726) for e in late]) < 0.003
+    assert np.mean([e.regime is Regime.ADHESION_LIMITED for e in late]) > 0.9
+    assert all(0.0 <= e.mu_lower <= e.mu for e in estimates)
+    assert late[-1].speed_mps == pytest.approx(83.0 - 9.8 * 0.0726 * 40.0, rel=0.1)
+
+
+def test_the_brakes_limit_is_all_that_a_good_rail_shows() -> None:
+    measurements = ride([(20.0, 0.0), (30.0, 410e3)], mu=0.15, speed_mps=83.0, seed=1)
+    _, estimates = _run(EkfConfig(), measurements)
+    late = [e for e in estimates if e.t_ns > 35e9]
+    assert all(e.mu <= BRAKE + 1e-4 for e in late)
+    assert np.mean([e.regime is Regime.BRAKE_LIMITED for e in late]) > 0.8
+
+
+def test_a_fast_walk_is_noisier() -> None:
+    measurements = ride([(20.0, 0.0), (40.0, 410e3)], mu=0.0726, speed_mps=83.0, seed=2)
+    errors = []
+    for tuning in (TUNED, NAIVE):
+        _, estimates = _run(EkfConfig(tuning=tuning), measurements)
+        errors.append(np.mean([abs(e.mu - 0.0726) for e in estimates if e.t_ns > 30e9]))
+    assert errors[1] > 3 * errors[0]
+
+
+def test_drops_what_is_invalid_or_not_newer() -> None:
+    measurements = ride([(3.0, 0.0)], seed=1)
+    last = measurements[-1]
+    state, _ = _run(EkfConfig(), measurements)
+    for bad in (last, replace_position(last, float("nan")), last._replace(t_ns=0)):
+        assert ekf_step(EkfConfig(), state, bad) == (state, None)
+
+
+def replace_position(measurement: Measurement, position_m: float) -> Measurement:
+    return measurement._replace(t_ns=measurement.t_ns + 10**8, position_m=position_m)
+
+
+def test_an_estimate_every_l_measurements() -> None:
+    config = EkfConfig(replace(Config(), step=7))
+    _, estimates = _run(config, ride([(5.0, 0.0), (5.0, 410e3)], seed=1))
+    assert [e.t_ns for e in estimates] == [round(0.1e9 * (7 * i + 6)) for i in range(14)]
+
+
+def test_tuning_names_the_value_that_is_out_of_range() -> None:
+    with pytest.raises(ValueError, match=r"ekf\.mu_noise = -1"):
+        Tuning(mu_noise=-1.0)

@@ -1,0 +1,130 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Braking distances by the identified adhesion, and the sensitivity table: hand-made runs with known answers."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from adhesion_node.core.physics import braking
+from adhesion_node.core.physics.adhesion import WET
+from adhesion_node.core.physics.train import CRH3, KMH
+from adhesion_node.study.__main__ import main
+from adhesion_node.study.trial.running import Running
+from adhesion_node.study.trial.runs import ROW
+from adhesion_node.study.xie import distances, identified, sensitivity, tables
+from adhesion_node.study.xie.methods import STARTS
+from adhesion_node.study.xie.montecarlo import Chunk, Result
+
+
+def a_run(from_kmh: float, to_kmh: float, scale: float) -> np.ndarray:
+    """A run whose estimates are the wet law times `scale`, and nonsense during the first 30 km/h."""
+    speeds = np.linspace(from_kmh, to_kmh, 200) * KMH
+    mu = np.where(speeds > (from_kmh - 30.0) * KMH, 0.001, scale * WET(speeds))
+    rows = zip(speeds, WET(speeds), mu, strict=True)
+    return np.array([(i, speed, true, mu, 0.01, 0.0, True, True) for i, (speed, true, mu) in enumerate(rows)], ROW)
+
+
+def result(scenario: str, runs: Sequence[np.ndarray], method: str = "particle_em") -> Result:
+    chunk = Chunk(scenario, method, 0.5, 1000, len(runs) // len(STARTS))
+    return Result(chunk, list(runs), 0.0, np.zeros(1))
+
+
+def test_the_true_law_gives_its_own_distance_save_for_the_first_30_kmh() -> None:
+    distance, time = identified.distance_and_time(a_run(250.0, 50.0, 1.0), 250.0, 50.0)
+    # By hand: down to 220 km/h with the adhesion of 220 km/h, from there with the law.
+    first = braking.curve(CRH3, 250 * KMH, float(WET(np.array(220 * KMH))), 220 * KMH)
+    rest = braking.curve(CRH3, 220 * KMH, WET, 50 * KMH)
+    assert distance == pytest.approx(first.distance_m[-1] + rest.distance_m[-1], rel=1e-3)
+    assert time == pytest.approx(first.time_s[-1] + rest.time_s[-1], rel=1e-3)
+
+
+def test_a_run_without_converged_estimates_is_refused() -> None:
+    with pytest.raises(ValueError, match="without an estimate after the first 30 km/h"):
+        identified.distance_and_time(a_run(250.0, 225.0, 1.0), 250.0, 50.0)
+
+
+def test_rows_tell_mean_band_and_saving() -> None:
+    results = [
+        result(name, [a_run(*speeds, scale) for scale in (0.9, 0.95, 1.0, 1.05, 1.1)])
+        for name, speeds in identified.BRAKINGS.items()
+    ]
+    entry, leaving = identified.rows(results)
+    assert (entry["from_kmh"], entry["runs"], leaving["to_kmh"]) == (300.0, 1, 50.0)
+    for row in (entry, leaving):
+        assert row["distance_m_p5"] < row["distance_m"] < row["distance_m_p95"]
+        assert row["distance_m"] == pytest.approx(row["distance_m_true_law"], rel=0.02)
+        fixed = braking.curve(CRH3, row["from_kmh"] * KMH, 0.0726, row["to_kmh"] * KMH)
+        assert row["time_s_saved_percent"] == pytest.approx(100 - 100 * row["time_s"] / fixed.time_s[-1])
+
+
+def test_both_methods_stand_beside_each_other_on_the_chunks_of_the_tables(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[Chunk] = []
+
+    def computed(wanted: Sequence[Chunk], _where: Running) -> list[Result]:
+        """Where the paper's method reads mu 10 % too low, and the default one is right."""
+        asked.extend(wanted)
+        found = []
+        for chunk in wanted:
+            run = a_run(*identified.BRAKINGS[chunk.scenario], 0.9 if chunk.method == "particle_em" else 1.0)
+            found.append(result(chunk.scenario, [run] * len(STARTS), chunk.method))
+        return found
+
+    monkeypatch.setattr(distances, "results", computed)
+    assert main(["distances", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
+    table = [row for row in json.loads((tmp_path / "table.json").read_text()) if row["case"] == "identified"]
+    assert [(row["from_kmh"], row["method"]) for row in table] == [
+        (start, method) for start in (300.0, 250.0) for method in ("particle_em", "rail_condition")
+    ]
+    for paper, default in (table[:2], table[2:]):
+        assert paper["distance_m"] > 1.05 * default["distance_m"]
+        assert default["distance_m"] == pytest.approx(default["distance_m_true_law"], rel=0.02)
+        assert paper["distance_m_true_law"] == default["distance_m_true_law"]
+    lines = capsys.readouterr().out.splitlines()[-4:]
+    assert [line.split()[3] for line in lines] == ["particle_em", "rail_condition"] * 2
+    assert [float(line.split()[4]) for line in lines] == pytest.approx([row["distance_m"] for row in table], abs=0.05)
+
+    by_distances = set(map(repr, asked))
+    asked.clear()
+    monkeypatch.setattr(tables, "results", computed)
+    monkeypatch.setattr(tables, "rows", lambda _cell: ())
+    assert main(["tables", "--runs", "1"]) == 0
+    assert by_distances <= set(map(repr, asked))
+
+
+def test_one_setting_at_a_time_leaves_the_nominal_ones() -> None:
+    nominal = Chunk("tunnel_entry", "particle_em", 0.5, 1000, 3)
+    for setting, value, chunk in sensitivity.variations(3):
+        varied = chunk if setting in Chunk._fields else chunk.config
+        assert getattr(varied, setting) == value
+        config = replace(chunk.config, window=50, step=10, particles=20)
+        assert chunk._replace(method="particle_em", sigma_m=0.5, config=config, seed_shift=0) == nominal
+        changed = (chunk.sigma_m != 0.5, chunk.config != nominal.config, chunk.seed_shift != 0)
+        assert changed.count(True) <= 1
+
+
+def test_the_sensitivity_table_says_where_the_papers_figure_is_met(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def computed(wanted: Sequence[Chunk], _where: Running) -> list[Result]:
+        """Errors of 1, 1.5, 10 ... %: rising with the noise."""
+        scales = {0.05: 1.01, 0.1: 1.015}
+        runs = [[a_run(300.0, 100.0, scales.get(chunk.sigma_m, 1.1))[40:]] * len(STARTS) for chunk in wanted]
+        return [Result(chunk, some, 0.0, np.zeros(1)) for chunk, some in zip(wanted, runs, strict=True)]
+
+    monkeypatch.setattr(sensitivity, "results", computed)
+    assert main(["sensitivity", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
+    assert "the paper's 1.87 % is met up to sigma = 0.1 m" in capsys.readouterr().out
+    first = json.loads((tmp_path / "table.json").read_text())[0]
+    assert (first["setting"], first["value"], first["method"]) == ("sigma_m", 0.05, "particle_em")
+    assert first["mean_relative_error_percent"] == pytest.approx(1.0)
+    assert main(["sensitivity", "--runs", "0"]) == 2

@@ -1,0 +1,107 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The study of intervention distances: its cases, its limits, and what it says without a braking curve."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+from matplotlib.image import imread
+
+from adhesion_node.core.physics import braking
+from adhesion_node.core.physics.adhesion import WET
+from adhesion_node.core.physics.train import CRH3, KMH
+from adhesion_node.core.prediction import Prediction
+from adhesion_node.study.__main__ import main
+from adhesion_node.study.intervention import study as intervention
+
+
+def prediction(speed_kmh: float, mu: float, mu_lower: float) -> Prediction:
+    estimate: Any = SimpleNamespace(speed_mps=speed_kmh * KMH, mu=mu, mu_lower=mu_lower)
+    safe, nominal = (braking.curve(CRH3, speed_kmh * KMH, value) if value else None for value in (mu_lower, mu))
+    return Prediction(estimate, safe, nominal)
+
+
+SAID = [prediction(290, 0.060, 0.0), prediction(252, 0.070, 0.060), prediction(249, 0.075, 0.070)]
+
+
+def by_case(speed_kmh: int, said: list[Prediction] = SAID, kwet: float = 0.8) -> dict[str, dict[str, Any]]:
+    found = intervention.rows("tunnel_entry", said, kwet)
+    return {row["case"]: row for row in found if row["speed_kmh"] == speed_kmh}
+
+
+def needed(speed_kmh: float, mu: Any) -> float:
+    """EBI, m, by hand: 1.5 s of build-up at up to 0.4 m/s^2, 0.5 m/s too slow, 5 m too far back, 107.5 km/h there."""
+    speed = speed_kmh * KMH + 0.5
+    length = float(braking.curve(CRH3, speed + 0.6, mu, 107.5 * KMH).distance_m[-1])
+    return length + (speed + 0.3) * 1.5 + 5.0
+
+
+def test_each_case_brakes_by_its_own_adhesion() -> None:
+    found = by_case(250)
+    adhesion = {"true wet law": WET, "mu": 0.070, "mu_lower": 0.060, "fixed 0.0726": 0.0726}
+    # 0.8 of the full brake's 0.9332 m/s^2, and 0.7 m/s^2, over g.
+    adhesion |= {"K_wet 0.8": 0.8 * 0.9332 / 9.8, "slippery 0.7": 0.7 / 9.8}
+    assert list(found) == list(adhesion)
+    for case, mu in adhesion.items():
+        # Beyond its first point a curve is continued at its weakest deceleration: some metres on the safe side.
+        assert -0.5 < found[case]["ebi_m"] - needed(250, mu) < 15.0, case
+
+
+def test_the_estimate_is_the_last_one_whose_curve_begins_above_the_speed() -> None:
+    assert by_case(250)["mu"]["mu"] == 0.070
+    assert by_case(200)["mu"]["mu"] == 0.075
+
+
+def test_without_a_curve_or_an_estimate_the_distances_are_unknown() -> None:
+    assert by_case(280)["mu_lower"]["ebi_m"] is None
+    assert by_case(280, said=[])["mu"] == {
+        "scenario": "tunnel_entry",
+        "speed_kmh": 280,
+        "target_kmh": 100.0,
+        "case": "mu",
+        "mu": None,
+        **dict.fromkeys(("ebi_m", "sbi_m", "warning_m", "permitted_m", "indication_m")),
+    }
+
+
+def test_the_command_prints_the_table_and_writes_json(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(intervention, "predictions", lambda bag, seed: SAID)
+    options = ["--json", str(tmp_path / "table.json"), "--figure", str(tmp_path / "limits.png")]
+    assert main(["intervention", *options]) == 0
+    table = json.loads((tmp_path / "table.json").read_text())
+    assert len(table) == 2 * 4 * 6
+    for row in table:
+        if row["ebi_m"] is not None:
+            assert row["ebi_m"] < row["sbi_m"] < row["warning_m"] < row["permitted_m"] < row["indication_m"]
+    assert imread(tmp_path / "limits.png").shape[:2] == (528, 990)
+    printed = capsys.readouterr().out.splitlines()
+    assert len(printed) == 2 * (2 + 4)
+    assert printed[2].split()[3] == "no"  # curve
+    # 280 km/h: T_bs = 2 s, T_warning = 2 s, T_driver = 4 s, T_indication = 9 s
+    assert printed[2].split()[-4:] == ["156", "311", "467", "1167"]
+
+
+def test_without_a_curve_there_is_no_figure(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(intervention, "predictions", lambda bag, seed: SAID[:1])
+    assert main(["intervention", "--figure", str(tmp_path / "limits.png")]) == 2
+    assert "there is no braking curve at 200 km/h" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [(["--kwet", "0"], "kwet = 0.0: give a factor above 0"), (["--bags", "nowhere"], "nowhere")],
+)
+def test_bad_input_is_one_line_and_code_2(options: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["intervention", *options]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert message in line

@@ -1,0 +1,243 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tasks of the studies: cache, workers, a Dask cluster, and ends of every kind."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import pytest
+
+from adhesion_node.core import Config
+from adhesion_node.study.__main__ import main
+from adhesion_node.study.he.runs import VARYING_ETA
+from adhesion_node.study.he.tasks import Experiment
+from adhesion_node.study.trial import engines, running, tasks
+from adhesion_node.study.trial.running import Running, run_all
+from adhesion_node.study.trial.tasks import Arrays, Task, file_name, load, save
+from adhesion_node.study.xie.montecarlo import Chunk
+
+if TYPE_CHECKING:
+    from distributed import LocalCluster
+
+TIMEOUT_S = 60.0
+
+
+CHUNK = Chunk("tunnel_exit", "particle_em", 0.5, 1000, 1, Config(window=20, particles=5, iterations=2))
+"""A chunk of the paper's method in little time."""
+
+TIMES = ("seconds", "window_ms")
+
+
+class Square(NamedTuple):
+    """Squares a number and leaves a trace of having done so."""
+
+    number: float
+    folder: str = ""
+    kind: str = "square"
+    sources: tuple[str, ...] = ()
+    weight: float = 1.0
+
+    @property
+    def name(self) -> str:
+        return self.kind
+
+    def compute(self) -> Arrays:
+        if self.folder:
+            with Path(self.folder, f"{self.number:g}").open("a") as trace:
+                trace.write("computed\n")
+        return {"square": np.array([self.number**2])}
+
+
+class Killed(NamedTuple):
+    """Is killed as the kernel kills what takes too much memory."""
+
+    name: str = "killed"
+    sources: tuple[str, ...] = ()
+    weight: float = 1.0
+
+    def compute(self) -> Arrays:
+        os.kill(os.getpid(), signal.SIGKILL)
+        return {}
+
+
+@pytest.fixture(scope="module")
+def dask() -> Iterator[LocalCluster]:
+    """A cluster of two workers, which hear of the tasks through TCP."""
+    distributed = pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=False, protocol="tcp://", dashboard_address=None
+    ) as local:
+        yield local
+
+
+def squares(wanted: Sequence[Task], where: Running) -> list[float]:
+    return [float(found["square"][0]) for found in run_all(wanted, where)]
+
+
+def test_a_result_comes_back_from_the_cache_whole(tmp_path: Path) -> None:
+    result = {"rows": np.array([(1, 2.5)], dtype=[("a", int), ("b", float)]), "seconds": np.array(0.1)}
+    save(Square(1.0), result, tmp_path)
+    again = load(Square(1.0), tmp_path)
+    assert {name: (values.dtype, values.tolist()) for name, values in again.items()} == {
+        name: (values.dtype, values.tolist()) for name, values in result.items()
+    }
+    assert [file.name for file in tmp_path.iterdir()] == [file_name(Square(1.0))]
+
+
+def test_a_file_is_that_of_the_fields_and_the_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tasks, "PACKAGES", tmp_path)
+    names = {file_name(task) for task in (CHUNK, Square(1.0), Square(2.0), Square(1.0, kind="other"), Killed())}
+    for code in ("a = 1", "a = 2"):
+        (tmp_path / "numbers.py").write_text(code)
+        tasks._code.cache_clear()
+        names.add(file_name(Square(1.0, sources=("n*.py",))))
+    assert len(names) == 7
+
+
+def test_a_killed_study_goes_on_where_it_stopped(tmp_path: Path) -> None:
+    cache, traces = tmp_path / "cache", tmp_path / "traces"
+    traces.mkdir()
+    assert squares([Square(2.0, str(traces))], Running(cache)) == [4.0]
+    (cache / "unfinished.npz.1").write_bytes(b"half a re")
+    wanted = [Square(number, str(traces)) for number in (3.0, 2.0, 3.0)]
+    assert squares(wanted, Running(cache)) == [9.0, 4.0, 9.0]
+    assert {file.name: file.read_text() for file in traces.iterdir()} == {"2": "computed\n", "3": "computed\n"}
+
+
+def test_a_cluster_takes_the_place_of_the_workers(tmp_path: Path, dask: LocalCluster) -> None:
+    wanted = [Square(float(number)) for number in range(20)]
+    assert squares(wanted, Running(tmp_path, workers=0, scheduler=dask.scheduler_address)) == [
+        number**2 for number in range(20)
+    ]
+
+
+def test_a_cluster_gives_the_numbers_of_the_processes(tmp_path: Path, dask: LocalCluster) -> None:
+    wanted: list[Task] = [CHUNK, CHUNK._replace(method="ekf_tuned"), CHUNK._replace(first_seed=1001)]
+    wanted += [Experiment(2, 1), Experiment(2, 1, VARYING_ETA, 50, "swings")]
+    ours = list(run_all(wanted, Running(tmp_path / "processes", workers=2)))
+    theirs = list(run_all(wanted, Running(tmp_path / "cluster", scheduler=dask.scheduler_address)))
+    for one, other in zip(ours, theirs, strict=True):
+        assert one.keys() == other.keys()
+        assert all(one[name].tobytes() == other[name].tobytes() for name in one if name not in TIMES)
+    files = [sorted(file.name for file in folder.iterdir()) for folder in tmp_path.iterdir()]
+    assert files == [sorted(map(file_name, wanted))] * 2
+
+
+def test_a_worker_with_other_code_is_refused(tmp_path: Path, dask: LocalCluster) -> None:
+    with (
+        pytest.raises(OSError, match=r"install this package.*has another version") as caught,
+        engines.cluster(dask.scheduler_address) as executor,
+    ):
+        executor.submit(running._compute, Square(1.0), "square-of-another-version.npz").result(TIMEOUT_S)
+    assert caught.value.filename == dask.scheduler_address
+
+
+@pytest.mark.parametrize("study", ["tables", "sensitivity", "tune-ekf", "creep"])
+def test_a_scheduler_that_does_not_answer_is_one_line_and_code_1(
+    study: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+    monkeypatch.setattr(engines, "CONNECT_S", 0.2)
+    with socket.socket() as unused:  # bound but not listening: nobody answers
+        unused.bind(("127.0.0.1", 0))
+        address = f"tcp://127.0.0.1:{unused.getsockname()[1]}"
+        assert main([study, "--runs", "2", "--cache", str(tmp_path), "--scheduler", address]) == 1
+    assert capsys.readouterr().err == f"study: {address}: no Dask scheduler answered within 0.2 s\n"
+
+
+def test_what_is_no_address_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tables", "--runs", "1", "--cache", str(tmp_path), "--scheduler", "nonsense"]) == 2
+    assert capsys.readouterr().err.startswith("study: scheduler = nonsense: ")
+
+
+def test_without_dask_the_extra_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert main(["tables", "--runs", "1", "--cache", str(tmp_path), "--scheduler", "tcp://localhost:8786"]) == 2
+    assert capsys.readouterr().err.endswith("needs the extra cluster, pip install '.[cluster]'\n")
+
+
+def test_a_killed_worker_ends_the_study_with_a_reason(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="a worker was killed"):
+        squares([Killed()], Running(tmp_path))
+
+
+def test_bad_numbers_of_workers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["tune-ekf", "--runs", "1", "--cache", str(tmp_path), "--workers", "0"]) == 2
+    assert capsys.readouterr().err == "study: workers = 0: give at least 1\n"
+
+
+ENDLESS = """
+import socket, sys
+from pathlib import Path
+from typing import NamedTuple
+from adhesion_node.command.options import run_tool
+from adhesion_node.study.he.runs import VARYING_ETA
+from adhesion_node.study.he.tasks import Experiment
+from adhesion_node.study.xie.montecarlo import Chunk
+from adhesion_node.study.trial.running import Running, run_all
+import argparse
+
+class Endless(NamedTuple):
+    number: int
+    port: int
+    name, weight, sources = "endless", 1.0, ()
+
+    def compute(self):
+        held = socket.create_connection(("127.0.0.1", self.port))
+        while True:
+            sum(range(1000))
+
+def work(options):
+    return len(list(run_all([Endless(i, int(sys.argv[1])) for i in range(2)], Running(Path(sys.argv[2]), 2))))
+
+if __name__ == "__main__":
+    sys.exit(run_tool(argparse.ArgumentParser("endless"), work, []))
+"""
+"""A study whose tasks never end; each holds a connection as long as its process lives."""
+
+
+@pytest.fixture
+def endless(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], list[socket.socket]]]:
+    """The endless study at work, and its tasks' connections."""
+    script = tmp_path / "endless.py"
+    script.write_text(ENDLESS)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(TIMEOUT_S)
+        arguments = [sys.executable, str(script), str(server.getsockname()[1]), str(tmp_path / "cache")]
+        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+        study = subprocess.Popen(arguments, env=environment, stderr=subprocess.PIPE, text=True)
+        connections = []
+        try:
+            connections = [server.accept()[0] for _ in range(2)]
+            yield study, connections
+        finally:
+            study.kill()
+            study.communicate(timeout=TIMEOUT_S)
+            for connection in connections:
+                connection.close()
+
+
+@pytest.mark.parametrize(
+    ("sent", "code"), [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGTERM, -signal.SIGTERM), (signal.SIGINT, 1)]
+)
+def test_no_worker_outlives_its_study(
+    endless: tuple[subprocess.Popen[str], list[socket.socket]], sent: signal.Signals, code: int
+) -> None:
+    study, connections = endless
+    study.send_signal(sent)
+    for connection in connections:
+        connection.settimeout(TIMEOUT_S)
+        assert connection.recv(1) == b""  # closed by the end of the process
+    assert study.wait(TIMEOUT_S) == code

@@ -1,0 +1,176 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The demo on a scenario cut short: live equals offline, what it leaves behind, and its words."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+from matplotlib.image import imread
+from rclpy.executors import SingleThreadedExecutor
+from test_recording_survives import assert_complete, file_size_limit
+
+from adhesion_node.bag import BagReader, part
+from adhesion_node.bag.writer import file_name
+from adhesion_node.core import Estimate
+from adhesion_node.core.physics.adhesion import DRY, WET
+from adhesion_node.core.physics.track import LEVEL
+from adhesion_node.nodes import replay
+from adhesion_node.tools import demo, line
+from adhesion_node.tools.line import executor_of_line
+from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH
+from sim_node.train import scenario
+from sim_node.train.scenario import SCENARIOS, Brake, Rail
+
+CRUISE_S, END_S = 4.0, 9.0
+SAMPLES = 91
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Brake on wet rail from 4 s, end at 9 s: tunnel_entry would take half a minute."""
+    full = SCENARIOS["tunnel_entry"]
+    rail = Rail(((0.0, DRY), (full.speed_mps * (CRUISE_S - 0.05), WET)))
+    cut = replace(full, rail=rail, brake=Brake(CRUISE_S), track=LEVEL, end_s=END_S)
+    for module in (scenario, demo):
+        monkeypatch.setattr(module, "SCENARIOS", {**SCENARIOS, "tunnel_entry": cut})
+
+
+@pytest.fixture
+def run_demo(tmp_path: Path) -> Callable[..., dict[str, Any]]:
+    """Return a function that runs the demo into `tmp_path/demo` and returns its result."""
+
+    def _run(*options: str) -> dict[str, Any]:
+        file = tmp_path / "result.json"
+        assert demo.main(["--output", str(tmp_path / "demo"), "--json", str(file), *options]) == 0
+        result: dict[str, Any] = json.loads(file.read_text())
+        return result
+
+    return _run
+
+
+def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
+    tmp_path: Path, run_demo: Callable[..., dict[str, Any]], capfd: pytest.CaptureFixture[str]
+) -> None:
+    result = run_demo("--seed", "3")
+    out, err = capfd.readouterr()
+    assert result["live_equals_offline"] is True
+    assert result["live_digest"] == result["digest"]
+    assert (result["measurements"], result["accepted"], result["dropped"]) == (SAMPLES, SAMPLES, {})
+    assert result["windows"] >= 4
+    assert result["regime_final"] == "ADHESION_LIMITED"
+    assert result["mu_final"] == pytest.approx(0.0726 + 0.002, abs=0.02)  # wet at 280 km/h
+    assert Path(result["bag"]) == tmp_path / "demo" / "bag"
+    _check_bag(Path(result["bag"]))
+    assert imread(result["picture"]).shape[:2] == (1320, 1210)
+    assert Path(result["picture"]).parent == tmp_path / "demo"
+    assert result["atp"].split(" > ")[0] in {"EMERGENCY_BRAKE", "NORMAL"}
+    assert "to the last bit" in out
+    assert "adhesion coefficient" in out
+    assert "regime" in err.splitlines()[0]
+    assert "Traceback" not in err
+
+    assert replay.main([result["bag"], "--offline", "--seed", "3", "--json", str(tmp_path / "again.json")]) == 0
+    assert json.loads((tmp_path / "again.json").read_text())["digest"] == result["live_digest"]
+
+
+def _check_bag(path: Path) -> None:
+    """The sensors, the truth and every result are there, whole and with all their messages."""
+    with BagReader(path) as reader:
+        counts = {name.lstrip("/"): count for name, count in reader.counts.items()}
+        assert reader.complete
+        assert sum(1 for _ in reader.messages()) == sum(counts.values())
+    assert counts.pop(ATP_STATUS.name) >= 1
+    estimates = (SAMPLES + 4) // 5
+    assert counts == {
+        **{topic.name: SAMPLES for topic in (POSITION, BRAKE_PRESSURE, *TRUTH)},
+        **{topic.name.lstrip("/"): estimates for topic in (*RESULTS, DIAGNOSTICS)},
+    }
+
+
+def test_equal_runs_leave_equal_bytes_however_busy_the_machine_is(tmp_path: Path) -> None:
+    """The second run is held up for longer than any watchdog waits: 2 s."""
+    bags = [tmp_path / "one", tmp_path / "two"]
+    for bag, busy_s in zip(bags, (0.0, 2.5), strict=True):
+        with executor_of_line() as executor:
+            line.play(executor, "tunnel_entry", 100.0, bag, 1, partial(_hold_up, executor, busy_s))
+    first, second = [{file.name: file.read_bytes() for file in bag.iterdir()} for bag in bags]
+    assert _statuses(bags[0]) == _statuses(bags[1])
+    assert first == second
+
+
+def _hold_up(executor: SingleThreadedExecutor, busy_s: float, samples: int, _: Estimate | None) -> bool:
+    """At one sample let everything but the simulator go on for so long."""
+    until = time.monotonic() + busy_s
+    while samples == 61 and time.monotonic() < until:
+        executor.spin_once(timeout_sec=0.1)
+    return True
+
+
+def _statuses(bag: Path) -> list[tuple[int, str, str]]:
+    with BagReader(bag) as reader:
+        return [
+            (record.log_ns, record.topic, str(record.message))
+            for record in reader.messages(["/atp/status", "/diagnostics"])
+        ]
+
+
+def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable[..., dict[str, Any]]) -> None:
+    for name in ("demo", "demo_2"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "mine.txt").write_text("keep")
+    result = run_demo()
+    assert Path(result["bag"]) == tmp_path / "demo_3" / "bag"
+    for name in ("demo", "demo_2"):
+        assert [path.name for path in (tmp_path / name).iterdir()] == ["mine.txt"]
+
+
+def test_bad_usage_ends_with_code_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        demo.main(["--scenario", "avalanche"])
+    assert ended.value.code == 2
+    err = capsys.readouterr().err
+    assert "'avalanche'" in err
+    assert "tunnel_exit" in err
+
+
+def test_a_bad_seed_is_one_line_and_code_2_and_leaves_nothing(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert demo.main(["--output", str(tmp_path / "demo"), "--seed", "-1"]) == 2
+    out, err = capfd.readouterr()
+    (line,) = err.splitlines()
+    assert out == ""
+    assert line.startswith("demo: seed = -1: give ")
+    assert not (tmp_path / "demo").exists()
+
+
+def test_a_full_disk_is_one_line_and_code_1_and_the_recording_complete_up_to_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(part, "STEP_BYTES", 4096)  # more would hold all of this short run
+    with file_size_limit(150_000):
+        assert demo.main(["--output", str(tmp_path / "demo")]) == 1
+    last = capfd.readouterr().err.splitlines()[-1]
+    bag = tmp_path / "demo" / "bag"
+    assert last == f"demo: {bag / file_name(0)}: File too large: the recording ends here, make room for another"
+    with BagReader(bag) as reader:
+        messages = sum(reader.counts.values())
+        assert 30 < reader.counts["/position"] < SAMPLES
+    assert_complete(bag, messages)
+
+
+def test_an_output_that_cannot_be_is_one_line_and_code_1(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("")
+    assert demo.main(["--output", str(tmp_path / "file" / "demo")]) == 1
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("demo: ")
+    assert "Not a directory" in line

@@ -1,0 +1,164 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""`recover` makes a complete recording of an interrupted, cut or foreign one."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from mcap.writer import CompressionType, Writer
+from rosbags.rosbag2 import Reader
+from test_recording_survives import file_size_limit
+
+from adhesion_node.bag import BagReader, BagWriter, Limits, sensors
+from adhesion_node.bag.writer import file_name
+from adhesion_node.tools import recover
+from adhesion_node.wire.topics import BRAKING_CURVE, POSITION
+
+S = 10**9
+
+
+def interrupted(path: Path, steps: int) -> None:
+    """Leave a recording as a killed recorder does: without index and metadata, ending within a chunk."""
+    writer = BagWriter(path)
+    writer.add_topic("/curve", BRAKING_CURVE.type, latched=True)
+    writer.write("/curve", BRAKING_CURVE.type, b"\0\1\0\0", 0)
+    for step in range(steps):
+        writer.write("/position", POSITION.type, sensors.position(step * S, step / 3, 0.25), step * S)
+        if step % 100 == 99:
+            writer.flush()
+    writer.close()
+    (path / "metadata.yaml").unlink()
+    with (path / file_name(0)).open("r+b") as file:
+        file.truncate(file.seek(0, 2) * 2 // 3)
+
+
+def test_an_interrupted_recording_becomes_complete(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    interrupted(tmp_path / "bag", 1000)
+    assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole"), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert summary["complete"] is False
+    assert summary["damage"] == err.splitlines()
+    assert "breaks off" in err
+    with (
+        BagReader(tmp_path / "bag") as before,
+        BagReader(tmp_path / "whole") as after,
+        Reader(tmp_path / "whole") as it,
+    ):
+        read = list(after.messages())
+        assert read == list(before.messages())
+        assert after.complete
+        assert after.infos["/curve"].latched
+        assert it.message_count == len(read) == sum(summary["messages"].values()) > 100
+
+
+def test_recovering_twice_changes_nothing(tmp_path: Path) -> None:
+    interrupted(tmp_path / "bag", 500)
+    recover.recover(tmp_path / "bag", tmp_path / "one")
+    summary = recover.recover(tmp_path / "one", tmp_path / "two")
+    assert summary["complete"]
+    assert (tmp_path / "one" / file_name(0)).read_bytes() == (tmp_path / "two" / file_name(0)).read_bytes()
+
+
+def test_types_of_others_are_kept(tmp_path: Path) -> None:
+    file = tmp_path / "foreign.mcap"
+    with file.open("wb") as stream:
+        writer: Any = Writer(stream, compression=CompressionType.LZ4)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("foo_msgs/msg/Bar", "ros2msg", b"int32 baz")
+        channel = writer.register_channel("/bar", "cdr", schema)
+        writer.add_message(channel, log_time=5, data=b"\0\1\0\0\7\0\0\0", publish_time=5)
+        writer.finish()
+    recover.recover(file, tmp_path / "kept")
+    with BagReader(tmp_path / "kept") as reader:
+        (record,) = reader.messages()
+        assert (record.topic, record.type, record.cdr, record.log_ns) == (
+            "/bar",
+            "foo_msgs/msg/Bar",
+            b"\0\1\0\0\7\0\0\0",
+            5,
+        )
+        assert reader.infos["/bar"].definition.text == "int32 baz"
+        with pytest.raises(ValueError, match="/bar at 5 ns: message type = 'foo_msgs/msg/Bar'"):
+            _ = record.message
+
+
+@pytest.mark.parametrize("content", [b"", b"garbage" * 50])
+def test_nothing_to_recover(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "x.mcap").write_bytes(content)
+    assert recover.main([str(tmp_path / "x.mcap"), "--output", str(tmp_path / "out")]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line.startswith("recover: ")
+    assert "name another recording" in line
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_output_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    interrupted(tmp_path / "bag", 200)
+    assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "bag")]) == 2
+    assert "it exists already" in capsys.readouterr().err
+    with BagReader(tmp_path / "bag") as reader:
+        assert reader.counts["/position"] > 0
+
+
+def test_bad_usage_is_code_2(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        recover.main(["bag"])
+    assert end.value.code == 2
+    assert "--output" in capsys.readouterr().err
+
+
+def test_it_says_what_is_lost_where_the_metadata_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with BagWriter(tmp_path / "bag", Limits(max_duration_ns=10 * S)) as writer:
+        for step in range(40):
+            writer.write("/position", POSITION.type, sensors.position(step * S, step / 3, 0.25), step * S)
+    (tmp_path / "bag" / file_name(1)).unlink()
+    cut(tmp_path / "bag" / file_name(3))
+    assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole"), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert (summary["messages"], summary["lost"]) == ({"/position": 20}, {"/position": 20})
+    assert summary["damage"] == err.splitlines()
+    last, missing, lost = summary["damage"]
+    assert f"{file_name(3)} breaks off at byte" in last
+    assert last.endswith(" bytes there are left out")
+    assert missing == f"{tmp_path / 'bag' / file_name(1)} is missing"
+    assert lost == "/position: 20 messages are lost"
+
+
+def cut(file: Path) -> None:
+    """Cut a file of one chunk within its chunk."""
+    with file.open("r+b") as stream:
+        stream.truncate(stream.seek(0, 2) // 5)
+
+
+def test_a_complete_recording_without_metadata_gets_it(tmp_path: Path) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.write("/position", POSITION.type, sensors.position(0, 0.0, 0.25), 0)
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    summary = recover.recover(tmp_path / "bag", tmp_path / "whole")
+    assert summary["damage"] == [f"{tmp_path / 'bag'} has no readable metadata.yaml: its recording was interrupted"]
+    assert summary["messages"] == {"/position": 1}
+    with Reader(tmp_path / "whole") as reader:
+        assert reader.message_count == 1
+
+
+def test_a_full_disk_leaves_nothing_half_recovered(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Neither when it is full from the beginning, nor when it fills up on the way."""
+    rng = np.random.default_rng(1)
+    with BagWriter(tmp_path / "bag") as writer:
+        for step in range(200):
+            writer.write("/text", "std_msgs/msg/String", rng.bytes(5000), step * S)
+    for size in (100_000, 700_000):
+        with file_size_limit(size):
+            assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole")]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith(f"recover: {tmp_path / 'whole'}")
+        assert "File too large" in line
+        assert not (tmp_path / "whole").exists()

@@ -1,0 +1,194 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Messages to values and back: round trips, through rosbags' messages as well, and every refusal by its text."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from copy import deepcopy
+from typing import Any
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseWithCovarianceStamped, TwistWithCovarianceStamped
+from rclpy.serialization import deserialize_message, serialize_message
+from rosbags.typesys import Stores, get_typestore
+from sensor_msgs.msg import FluidPressure
+from trajectory_msgs.msg import JointTrajectory
+
+from adhesion_node.core.physics import braking
+from adhesion_node.core.physics.train import CRH3
+from adhesion_node.nodes.ros import messages as convert
+from adhesion_node.wire import codecs as reading
+
+T_NS = 12_000_000_034
+ROS = get_typestore(Stores.ROS2_JAZZY)
+
+
+def as_rosbags(message: Any, name: str) -> Any:
+    """Return the message as rosbags reads it from a file; rclpy's buffer may be longer than the message."""
+    definition = ROS.get_msgdef(name)
+    read, _length = definition.deserialize_cdr_le(bytes(serialize_message(message))[4:], 0, definition.cls, ROS)
+    return read
+
+
+def make_position(x: float = 1234.5, variance: float = 0.25, frame: str = "track") -> PoseWithCovarianceStamped:
+    message = PoseWithCovarianceStamped(header=convert.header(T_NS))
+    message.header.frame_id = frame
+    message.pose.pose.position.x = x
+    message.pose.covariance[0] = variance
+    return message
+
+
+def make_pressure(pa: float = 511_325.0, frame: str = "track") -> FluidPressure:
+    message = FluidPressure(header=convert.header(T_NS), fluid_pressure=pa)
+    message.header.frame_id = frame
+    return message
+
+
+def make_speed(mps: float = 83.3, frame: str = "track") -> TwistWithCovarianceStamped:
+    message = TwistWithCovarianceStamped(header=convert.header(T_NS))
+    message.header.frame_id = frame
+    message.twist.twist.linear.x = mps
+    return message
+
+
+@pytest.mark.parametrize("view", [lambda message, _name: message, as_rosbags], ids=["rclpy", "rosbags"])
+def test_sensor_messages_are_read(view: Callable[[Any, str], Any]) -> None:
+    position = reading.position(view(make_position(), "geometry_msgs/msg/PoseWithCovarianceStamped"))
+    assert position == (12_000_000_034, 1234.5, 0.25)
+    pressure = reading.brake_pressure(view(make_pressure(), "sensor_msgs/msg/FluidPressure"))
+    assert pressure == (12_000_000_034, 410_000.0)
+    speed = reading.speed(view(make_speed(), "geometry_msgs/msg/TwistWithCovarianceStamped"))
+    assert speed == (12_000_000_034, 83.3)
+    assert {type(value) for value in (*position, *pressure, *speed)} == {int, float}
+
+
+def test_a_released_brake_never_pulls() -> None:
+    assert reading.brake_pressure(make_pressure(101_000.0)).pressure_pa == 0.0
+
+
+@pytest.mark.parametrize(
+    ("read", "message", "reason", "text"),
+    [
+        (reading.position, make_position(frame="map"), "WRONG_FRAME", r"header\.frame_id = 'map': set .* to 'track'"),
+        (reading.position, make_position(frame=""), "WRONG_FRAME", r"header\.frame_id = ''"),
+        (reading.position, make_position(math.nan), "NOT_FINITE", r"position x = nan: give a finite number"),
+        (reading.position, make_position(-math.inf), "NOT_FINITE", r"position x = -inf"),
+        (reading.position, make_position(1e308), "IMPLAUSIBLE_POSITION", r"position x = 1e\+308: position is in m"),
+        (reading.position, make_position(variance=0.0), "BAD_VARIANCE", r"covariance\[0\] = 0: give covariance"),
+        (reading.position, make_position(variance=-1.0), "BAD_VARIANCE", r"covariance\[0\] = -1"),
+        (reading.position, make_position(variance=1e308), "BAD_VARIANCE", r"covariance\[0\] = 1e\+308"),
+        (reading.position, make_position(variance=5e-324), "BAD_VARIANCE", r"covariance\[0\]"),
+        (reading.position, make_position(variance=math.nan), "NOT_FINITE", r"covariance\[0\] = nan"),
+        (reading.brake_pressure, make_pressure(frame="map"), "WRONG_FRAME", r"'map'"),
+        (reading.brake_pressure, make_pressure(0.0), "IMPLAUSIBLE_PRESSURE", r"= 0: .* absolute.* add 101325 Pa"),
+        (reading.brake_pressure, make_pressure(511.3), "IMPLAUSIBLE_PRESSURE", r"= 511\.3: .*multiply kPa by 1000"),
+        (reading.brake_pressure, make_pressure(1e308), "IMPLAUSIBLE_PRESSURE", r"1e\+308"),
+        (reading.brake_pressure, make_pressure(math.nan), "NOT_FINITE", r"fluid_pressure = nan"),
+        (reading.speed, make_speed(frame="base_link"), "WRONG_FRAME", r"'base_link'"),
+        (reading.speed, make_speed(300.0), "IMPLAUSIBLE_SPEED", r"speed x = 300: speed is in m/s, not km/h"),
+        (reading.speed, make_speed(math.inf), "NOT_FINITE", r"speed x = inf"),
+    ],
+)
+def test_bad_messages_are_refused_with_value_and_remedy(
+    read: Callable[[Any], object], message: Any, reason: str, text: str
+) -> None:
+    with pytest.raises(reading.Rejected, match=text) as refusal:
+        read(message)
+    assert refusal.value.reason == reason
+
+
+def test_results_hold_hand_computed_numbers() -> None:
+    assert convert.mu_message(0.0726).data == 0.0726
+    message = convert.deceleration_message(T_NS, 0.1, 0.01)
+    assert message.accel.accel.linear.x == pytest.approx(-0.98)
+    assert message.accel.covariance[0] == pytest.approx(0.009604)
+    assert (message.header.stamp.sec, message.header.stamp.nanosec, message.header.frame_id) == (12, 34, "track")
+
+
+def test_the_state_goes_round() -> None:
+    message = convert.state_message(T_NS, 1500.0, 0.04, 70.0, 0.01)
+    assert (message.child_frame_id, message.pose.pose.orientation.w) == ("train", 1.0)
+    assert (message.pose.covariance[0], message.twist.covariance[0]) == (0.04, 0.01)
+    assert convert.state(message) == (T_NS, 1500.0, 70.0)
+    assert convert.state(as_rosbags(message, "nav_msgs/msg/Odometry")) == (T_NS, 1500.0, 70.0)
+
+
+CURVE = braking.curve(CRH3, 80.0, 0.08, target_mps=10.0)
+MESSAGE = convert.curve_message(T_NS, CURVE, 2000.0)
+
+
+def test_a_curve_is_told_in_track_positions() -> None:
+    first, last = MESSAGE.points[0], MESSAGE.points[-1]
+    assert (MESSAGE.header.frame_id, list(MESSAGE.joint_names), len(MESSAGE.points)) == ("track", ["train"], 64)
+    assert (first.positions[0], first.velocities[0], first.time_from_start.sec) == (2000.0, 80.0, 0)
+    assert last.positions[0] == 2000.0 + CURVE.distance_m[-1]
+    assert first.accelerations[0] == -CURVE.deceleration_mps2[0]
+    assert last.time_from_start.sec + last.time_from_start.nanosec * 1e-9 == pytest.approx(CURVE.time_s[-1], abs=1e-8)
+
+
+@pytest.mark.parametrize(
+    "carry",
+    [
+        lambda message: message,
+        lambda message: deserialize_message(serialize_message(message), JointTrajectory),
+        lambda message: as_rosbags(message, "trajectory_msgs/msg/JointTrajectory"),
+    ],
+    ids=["built", "rclpy", "rosbags"],
+)
+def test_a_curve_goes_round(carry: Callable[[Any], Any]) -> None:
+    t_ns, read = convert.curve(carry(MESSAGE))
+    assert t_ns == T_NS
+    np.testing.assert_allclose(read.distance_m, CURVE.distance_m, atol=1e-9)
+    np.testing.assert_array_equal(read.speed_mps, CURVE.speed_mps)
+    np.testing.assert_array_equal(read.deceleration_mps2, CURVE.deceleration_mps2)
+    np.testing.assert_allclose(read.time_s, CURVE.time_s, atol=1e-8)
+
+
+def test_a_curve_without_length_goes_round() -> None:
+    standing = braking.curve(CRH3, 5.0, 0.08, target_mps=10.0)
+    _, read = convert.curve(convert.curve_message(T_NS, standing, 0.0))
+    assert read.distance_m[-1] == 0.0
+    assert set(read.speed_mps) == {10.0}
+
+
+def _set(name: str, index: int, value: float) -> Callable[[Any], None]:
+    return lambda message: setattr(message.points[index], name, [value])
+
+
+@pytest.mark.parametrize(
+    ("spoil", "reason", "text"),
+    [
+        (lambda m: setattr(m.header, "frame_id", "map"), "WRONG_FRAME", r"'map'"),
+        (lambda m: setattr(m, "joint_names", ["wheel"]), "BAD_CURVE", r"joints = \['wheel'\], points = 64: give one"),
+        (lambda m: setattr(m, "points", []), "BAD_CURVE", r"points = 0"),
+        (lambda m: setattr(m.points[3], "velocities", []), "BAD_CURVE", r"without exactly one value of each kind"),
+        (_set("positions", 3, math.nan), "NOT_FINITE", r"braking curve point 3 = \[nan"),
+        (_set("velocities", 0, math.inf), "NOT_FINITE", r"braking curve point 0"),
+        (_set("positions", 0, -1e308), "NOT_FINITE", r"braking curve point 0"),
+        (_set("positions", 9, 0.0), "BAD_CURVE", r"position turns at point 9"),
+        (_set("velocities", 9, 99.0), "BAD_CURVE", r"speed turns at point 9"),
+        (_set("velocities", 63, -1.0), "BAD_CURVE", r"a negative speed or no deceleration"),
+        (_set("accelerations", 9, 0.1), "BAD_CURVE", r"a negative speed or no deceleration"),
+        (lambda m: setattr(m.points[9].time_from_start, "sec", 0), "BAD_CURVE", r"time turns at point 9"),
+    ],
+)
+def test_a_curve_that_cannot_be_braked_along_is_refused(spoil: Callable[[Any], None], reason: str, text: str) -> None:
+    message = deepcopy(MESSAGE)
+    spoil(message)
+    with pytest.raises(reading.Rejected, match=text) as refusal:
+        convert.curve(message)
+    assert refusal.value.reason == reason
+
+
+def test_a_curve_is_built_and_read_well_within_its_budget() -> None:
+    def cost_s() -> float:
+        start = time.perf_counter()
+        convert.curve(convert.curve_message(T_NS, CURVE, 2000.0))
+        return time.perf_counter() - start
+
+    assert min(cost_s() for _ in range(20)) < 6e-3

@@ -1,0 +1,197 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Parameters: types, ranges, messages, atomic refusal, and what tools see."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import Any, Protocol
+
+import pytest
+from rclpy.clock import ROSClock
+from rclpy.context import Context
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from adhesion_node.nodes.ros.params import Spec, declare, unknown
+
+SPECS = (
+    Spec("start_mu", 0.09, "first guess of the adhesion coefficient", minimum=0.0, maximum=0.5),
+    Spec("particles", 20, "number of particles", minimum=2),
+    Spec("law", "wet", "speed law", choices=("dry", "wet")),
+    Spec("verbose", False, "say more"),
+    Spec("output", "bag", "where to"),
+    Spec("length_m", 200.0, "length of the train", "m"),
+)
+DEFAULTS = {"start_mu": 0.09, "particles": 20, "law": "wet", "verbose": False, "output": "bag", "length_m": 200.0}
+
+
+class Make(Protocol):
+    """Type of the fixture `make`."""
+
+    def __call__(self, overrides: dict[str, Any] | None = None, *, automatic: bool = True) -> Node: ...
+
+
+@pytest.fixture
+def make(context: Context) -> Iterator[Make]:
+    """Make nodes with given parameters; they are destroyed after the test."""
+    made: list[Node] = []
+
+    def _make(overrides: dict[str, Any] | None = None, *, automatic: bool = True) -> Node:
+        node = Node(
+            "probe",
+            context=context,
+            parameter_overrides=[Parameter(name, value=value) for name, value in (overrides or {}).items()],
+            automatically_declare_parameters_from_overrides=automatic,
+        )
+        made.append(node)
+        return node
+
+    yield _make
+    for node in made:
+        node.destroy_node()
+
+
+def follows_clock(node: Node) -> bool:
+    clock = node.get_clock()
+    assert isinstance(clock, ROSClock)
+    return clock.ros_time_is_active
+
+
+@pytest.fixture(params=[True, False], ids=["automatic", "declared"])
+def automatic(request: pytest.FixtureRequest) -> bool:
+    return bool(request.param)
+
+
+def typed(values: Iterable[object]) -> list[tuple[type, object]]:
+    return [(type(value), value) for value in values]
+
+
+def test_defaults_are_plain_values(make: Make, automatic: bool) -> None:
+    values = declare(make(automatic=automatic), SPECS)
+    assert values == DEFAULTS
+    assert typed(values.values()) == typed(DEFAULTS.values())
+
+
+def test_given_values_win_and_an_integer_serves_for_a_float(make: Make, automatic: bool) -> None:
+    node = make({"start_mu": 0, "law": "dry", "particles": 7, "verbose": True}, automatic=automatic)
+    values = declare(node, SPECS)
+    assert values == DEFAULTS | {"start_mu": 0.0, "law": "dry", "particles": 7, "verbose": True}
+    assert type(values["start_mu"]) is float
+    assert node.get_parameter("start_mu").type_ is Parameter.Type.DOUBLE
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("start_mu", 0.6, r"start_mu = 0\.6: give a finite number between 0 and 0\.5"),
+        ("start_mu", -1, r"start_mu = -1\.0: give a finite number between 0 and 0\.5"),
+        ("start_mu", float("nan"), r"start_mu = nan: give a finite number"),
+        ("start_mu", "wet", r"start_mu = 'wet': give a finite number"),
+        ("start_mu", True, r"start_mu = True: give a finite number"),
+        ("start_mu", [0.1], r"start_mu = .*0\.1.*: give a finite number"),
+        ("length_m", float("inf"), r"length_m = inf: give a finite number m"),
+        ("particles", 1, r"particles = 1: give an integer of at least 2"),
+        ("particles", 20.0, r"particles = 20\.0: give an integer"),
+        ("particles", False, r"particles = False: give an integer"),
+        ("law", "muddy", r"law = 'muddy': give one of dry, wet"),
+        ("law", 1, r"law = 1: give one of dry, wet"),
+        ("verbose", 1, r"verbose = 1: give true or false"),
+        ("output", 5, r"output = 5: give a text"),
+    ],
+)
+def test_a_bad_value_is_refused_with_name_value_and_what_is_allowed(
+    make: Make, automatic: bool, name: str, value: object, message: str
+) -> None:
+    node = make({name: value}, automatic=automatic)
+    with pytest.raises(ValueError, match=message) as refusal:
+        declare(node, SPECS)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_default_that_breaks_its_own_range_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"rate = 0\.0: give a finite number of at least 1 Hz"):
+        Spec("rate", 0.0, "a rate", "Hz", minimum=1.0)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"start_mu": 0.1}, {"law": "dry"}, {"particles": 20.5}, {"start_mu": 1}, {"use_sim_time": True, "law": "dry"}],
+)
+def test_nothing_changes_while_running(make: Make, changes: dict[str, Any]) -> None:
+    node = make()
+    declare(node, SPECS)
+    parameters = [Parameter(name, value=value) for name, value in changes.items()]
+    result = node.set_parameters_atomically(parameters)
+    assert not result.successful
+    (name, value), *_ = [change for change in changes.items() if change[0] != "use_sim_time"]
+    (spec,) = [spec for spec in SPECS if spec.name == name]
+    assert result.reason == (f"{name} = {value}: fixed at start; restart the node to change it, with {spec.allowed()}")
+    assert {spec.name: node.get_parameter(spec.name).value for spec in SPECS} == DEFAULTS
+    assert node.get_parameter("use_sim_time").value is False
+
+
+def test_a_value_out_of_range_is_refused_while_running(make: Make) -> None:
+    node = make()
+    declare(node, SPECS)
+    (result,) = node.set_parameters([Parameter("start_mu", value=7.5)])
+    assert not result.successful
+    for word in ("start_mu", "7.5", "0.0", "0.5"):
+        assert word in result.reason
+
+
+def test_a_parameter_cannot_be_removed(make: Make) -> None:
+    node = make()
+    declare(node, SPECS)
+    (result,) = node.set_parameters([Parameter("start_mu", Parameter.Type.NOT_SET)])
+    assert "fixed at start" in result.reason
+    assert node.get_parameter("start_mu").value == 0.09
+
+
+def test_tools_see_unit_range_and_choices(make: Make) -> None:
+    node = make()
+    declare(node, SPECS)
+    (range_,) = node.describe_parameter("start_mu").floating_point_range
+    assert (range_.from_value, range_.to_value) == (0.0, 0.5)
+    (least,) = node.describe_parameter("particles").integer_range
+    assert (least.from_value, least.to_value) == (2, 2**63 - 1)
+    assert node.describe_parameter("length_m").description == "length of the train [m]"
+    assert "one of dry, wet" in node.describe_parameter("law").additional_constraints
+
+
+def test_sim_time_still_works(make: Make) -> None:
+    assert not follows_clock(make())
+    node = make({"use_sim_time": True})
+    declare(node, SPECS)
+    assert follows_clock(node)
+
+
+def test_sim_time_of_a_wrong_type_is_refused(make: Make) -> None:
+    with pytest.raises(ValueError, match=r"use_sim_time = 1: give true or false"):
+        declare(make({"use_sim_time": 1}), SPECS)
+
+
+def test_sim_time_can_be_switched_while_running(make: Make) -> None:
+    node = make()
+    declare(node, SPECS)
+    (result,) = node.set_parameters([Parameter("use_sim_time", value=True)])
+    assert result.successful
+    assert follows_clock(node)
+
+
+def test_a_typo_is_named_with_the_nearest_parameter(make: Make) -> None:
+    given = {"start_nu": 0.1, "zzz": 1, "use_sim_time": True, "qos_overrides./position.subscription.depth": 5}
+    node = make(given)
+    declare(node, SPECS)
+    assert sorted(unknown(node, SPECS)) == [
+        "start_nu = 0.1: probe has no such parameter; did you mean start_mu?",
+        "zzz = 1: probe has no such parameter",
+    ]
+
+
+def test_the_effective_configuration_is_logged_once(make: Make, capfd: pytest.CaptureFixture[str]) -> None:
+    declare(make({"start_mu": 0, "start_nu": 1}), SPECS)
+    logged = capfd.readouterr().err
+    assert logged.count("start_mu = 0.0, particles = 20, law = wet") == 1
+    assert logged.count("did you mean start_mu?") == 1

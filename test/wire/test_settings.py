@@ -1,0 +1,207 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Settings by name: every one described and bounded, checked, parsed from text, and the same as a ROS parameter."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adhesion_node.core import Config
+from adhesion_node.core.physics.track import Curve, Grade, Tunnel
+from adhesion_node.core.physics.train import CRH3
+from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.estimator import PARAMETERS
+from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
+
+FREE_TEXTS = {"track", "frame"}
+"""The settings that are neither a number nor one of a few words."""
+
+NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]
+
+
+def named(setting: Setting) -> str:
+    return setting.name
+
+
+def another(setting: Setting) -> Any:
+    """Return a value that the setting allows and that is not its default."""
+    default = setting.default
+    if isinstance(default, bool):
+        return not default
+    if isinstance(default, int):  # 49 and 11 keep the step below the window
+        return default - 1 if default > setting.low else default + 1
+    if isinstance(default, float):
+        return math.nextafter(default, setting.high)
+    free = {"track": "tunnel 0 1000", "frame": "map"}
+    return free.get(setting.name) or next(choice for choice in setting.choices if choice != default)
+
+
+def in_use(setup: Setup, name: str) -> Any:
+    """Return what a set-up makes of a setting."""
+    if name in ("seed", "frame", "sensor_timeout_s"):
+        return getattr(setup, name)
+    group, _, field = name.rpartition(".")
+    return getattr(setup.config.train if group else setup.config, field)
+
+
+def test_names_are_unique() -> None:
+    assert len({setting.name for setting in SETTINGS}) == len(SETTINGS)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=named)
+def test_every_setting_says_what_it_is_and_what_it_may_be(setting: Setting) -> None:
+    assert len(setting.description.split()) > 1
+    assert not setting.description.endswith(".")
+    if isinstance(setting.default, str):
+        assert setting.name in FREE_TEXTS or setting.default in setting.choices
+    elif not isinstance(setting.default, bool):
+        assert -math.inf < setting.low <= setting.default <= setting.high < math.inf
+        assert setting.low < setting.high
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=named)
+def test_the_ros_parameter_is_the_same_setting(setting: Setting) -> None:
+    (spec,) = [spec for spec in PARAMETERS if spec.name == setting.name]
+    assert (type(spec.default), spec.default) == (type(setting.default), setting.default)
+    assert (spec.description, spec.unit, spec.choices) == (setting.description, setting.unit, setting.choices)
+    number = setting in NUMBERS
+    assert (spec.minimum, spec.maximum) == ((setting.low, setting.high) if number else (None, None))
+
+
+def test_there_is_no_ros_parameter_besides() -> None:
+    assert [spec.name for spec in PARAMETERS] == [setting.name for setting in SETTINGS]
+
+
+def test_nothing_named_is_the_nominal_set_up() -> None:
+    setup = setup_of({})
+    assert setup == Setup(Config(), 1, "track", 0.5)
+    assert setup.config.train == CRH3
+    assert setup_of({setting.name: setting.default for setting in SETTINGS}) == setup
+
+
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.name != "track"], ids=named)
+def test_every_setting_is_used(setting: Setting) -> None:
+    value = another(setting)
+    assert value != setting.default
+    changed = setup_of({setting.name: value})
+    assert in_use(changed, setting.name) == value
+    others = [other.name for other in SETTINGS if other not in (setting,) and other.name != "track"]
+    assert [in_use(changed, name) for name in others] == [in_use(setup_of({}), name) for name in others]
+
+
+def test_the_track_is_built_for_the_train() -> None:
+    profile = "grade 0 2000 -10; curve 500 700 4800 12; tunnel 1000 3000"
+    track = setup_of({"track": profile, "train.length_m": 400.0}).config.track
+    assert track.sections == (
+        Grade(0.0, 2000.0, -10.0),
+        Curve(500.0, 700.0, 4800.0, 12.0),
+        Tunnel(1000.0, 3000.0),
+    )
+    assert track.train_length_m == 400.0
+    # At 600 m: -10/2000 downhill and, shorter than the train, the curve's 0.0105 * 12/400.
+    (resistance,) = track.specific_resistance(np.array([600.0]))
+    assert resistance == pytest.approx(-0.005 + 0.0105 * 12 / 400)
+
+
+@pytest.mark.parametrize("setting", NUMBERS, ids=named)
+def test_a_number_beyond_its_range_is_refused_by_name(setting: Setting) -> None:
+    kind = type(setting.default)
+    for value in (kind(setting.low - 1), kind(setting.high * 2 + 1)):
+        with pytest.raises(ValueError, match=rf"^(setting )?{setting.name} = {value!r}: ".replace("+", r"\+")):
+            setup_of({setting.name: value})
+
+
+@pytest.mark.parametrize("setting", NUMBERS, ids=named)
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, "much", True, None, [1.0]], ids=repr)
+def test_what_is_no_number_is_refused_by_name(setting: Setting, value: Any) -> None:
+    with pytest.raises(ValueError, match=rf"{setting.name} = "):
+        setup_of({setting.name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("seed", 1.0),
+        ("window", 50.0),
+        ("train.pads", 96.5),
+        ("speed_while_braking", 1),
+        ("speed_while_braking", "true"),
+        ("low_adhesion", "ice"),
+        ("low_adhesion", 5),
+        ("frame", 5),
+        ("frame", None),
+        ("track", "tunnel 0"),
+        ("track", "tunnel 1000 0"),
+        ("track", "river 0 1000"),
+        ("track", 5),
+    ],
+)
+def test_a_wrong_type_or_word_is_refused_by_name(name: str, value: Any) -> None:
+    with pytest.raises(ValueError, match=rf"{name}( =| section).*: "):
+        setup_of({name: value})
+
+
+def test_an_integer_serves_for_a_float() -> None:
+    changed = setup_of({"train.mass_kg": 400_000, "start_mu": 0, "max_lag_s": 1}).config
+    assert changed == setup_of({"train.mass_kg": 400e3, "start_mu": 0.0, "max_lag_s": 1.0}).config
+    assert changed.train.mass_kg == 400e3
+
+
+@pytest.mark.parametrize("name", ["windw", "mass_kg", "train.window", "train", "motion", "", "Track"])
+def test_an_unknown_name_is_refused_with_those_there_are(name: str) -> None:
+    with pytest.raises(ValueError, match="there is none; choose of") as refusal:
+        setup_of({name: 1})
+    assert f"setting {name} = 1: " in str(refusal.value)
+    assert all(setting.name in str(refusal.value) for setting in SETTINGS)
+
+
+def test_settings_that_contradict_each_other_are_refused() -> None:
+    with pytest.raises(ValueError, match="step = 5: choose less than the window, 5"):
+        setup_of({"window": 5})
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("window=40", ("window", 40)),
+        ("seed=-1", ("seed", -1)),
+        ("start_mu=0.12", ("start_mu", 0.12)),
+        ("start_mu=0", ("start_mu", 0.0)),
+        ("tolerance=1e-4", ("tolerance", 1e-4)),
+        ("train.mass_kg=400000", ("train.mass_kg", 400e3)),
+        ("speed_while_braking=true", ("speed_while_braking", True)),
+        ("speed_while_braking=False", ("speed_while_braking", False)),
+        ("low_adhesion=wet", ("low_adhesion", "wet")),
+        ("frame=a=b", ("frame", "a=b")),
+        ("track=", ("track", "")),
+        ("track=grade 0 2000 10; tunnel 0 5", ("track", "grade 0 2000 10; tunnel 0 5")),
+    ],
+)
+def test_a_text_becomes_the_settings_type(text: str, expected: tuple[str, Any]) -> None:
+    parsed = parse_setting(text)
+    assert parsed == expected
+    assert type(parsed[1]) is type(expected[1])
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("window=forty", "setting window = 'forty': give a value of type int"),
+        ("window=40.0", "setting window = '40.0': give a value of type int"),
+        ("window=", "setting window = '': give a value of type int"),
+        ("start_mu=0,12", "setting start_mu = '0,12': give a value of type float"),
+        ("speed_while_braking=1", "setting speed_while_braking = '1': give a value of type bool"),
+        ("windw=40", "setting 'windw=40': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+        ("window", "setting 'window': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+        ("", "setting '': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+    ],
+)
+def test_a_text_that_does_not_fit_is_refused_by_name(text: str, message: str) -> None:
+    with pytest.raises(ValueError, match="setting ") as refusal:
+        parse_setting(text)
+    assert str(refusal.value).startswith(message)
