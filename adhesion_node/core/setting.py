@@ -21,6 +21,8 @@ class Setting(NamedTuple):
     low: float
     high: float
     choices: tuple[str, ...]
+    group: str = ""
+    """What the setting belongs to, for people who look for it."""
 
 
 def setting(
@@ -30,10 +32,14 @@ def setting(
     low: float = -math.inf,
     high: float = math.inf,
     choices: tuple[str, ...] = (),
+    group: str = "",
 ) -> Any:
-    """A dataclass field; `low` and `high` belong to the range of a number, `choices` are those of a text."""
-    metadata = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices}
-    return field(default=default, metadata=metadata)
+    """A dataclass field; `low` and `high` belong to the range of a number, `choices` are those of a text.
+
+    `group` is the heading under which documentation and --help show it.
+    """
+    rule = {"description": description, "unit": unit, "low": low, "high": high, "choices": choices, "group": group}
+    return field(default=default, metadata=rule)
 
 
 def check_settings(instance: Any, what: str) -> None:
