@@ -3,7 +3,8 @@
 
 """The estimator as pure functions of arrays: no ROS, no files, no clock, no logging."""
 
-from .belief.outcome import Outcome, Regime
+from .belief.outcome import Outcome
+from .belief.regime import Regime
 from .config import Config
 from .estimate import Estimate
 from .estimator import State, finish, init, step

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from .methods import METHODS
 from .physics.adhesion import LAWS, SpeedLaw
 from .physics.motion import Motion
 from .physics.track import LEVEL, Track
@@ -26,8 +27,8 @@ class Config:
     track: Track = LEVEL
     method: str = setting(
         "rail_condition",
-        "rail_condition: a factor on the speed law, by a Gaussian smoother; particle_em: constant mu, the paper's",
-        choices=("rail_condition", "particle_em"),
+        "; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()),
+        choices=tuple(METHODS),
     )
     law: str = setting(
         "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))

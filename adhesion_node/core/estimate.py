@@ -10,14 +10,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .belief.gaussian import Gaussian
-from .belief.outcome import Regime
 from .belief.rail import Rail, age, ignorance
+from .belief.regime import Regime
 from .config import Config
 from .intake.samples import Measurement
-from .methods.particle_em.em import Search
-from .methods.particle_em.method import Evaluate, evaluate, judge
-from .methods.protocol import BrakingWindow, Verdict
-from .methods.rail_condition.method import evaluate_condition
+from .methods.protocol import AnyMethod, Context, MethodWindow, Verdict
 from .physics.adhesion import SpeedLaw
 
 LOWEST_NET_ADHESION = -0.05
@@ -37,17 +34,15 @@ class Estimate(NamedTuple):
     speed_mps: float
     position_std_m: float
     speed_std_mps: float
+    changes: int = 0
+    """Changes of the rail found so far."""
     window: int = 0
-    """Measurements in the window; 0 where none was evaluated."""
+    """This and the following as in `Fit`."""
     iterations: int = 0
     converged: bool = True
     log_likelihood: float = 0.0
     ess: float = 0.0
-    """Smallest effective sample size in the window; 0 where no particles were used."""
-    changes: int = 0
-    """Changes of the rail found so far."""
     shape: SpeedLaw | None = None
-    """How mu goes on, up to a factor, as the train slows down; None: nothing is known of it."""
 
 
 class Knowledge(NamedTuple):
@@ -64,92 +59,65 @@ class Knowledge(NamedTuple):
     position_m: float = 0.0
     """When and where the rail was known so."""
 
+    def aged(self, config: Config, t_ns: int, belief: Gaussian) -> Rail:
+        """The rail as it was known, aged to `t_ns` and the belief of (s, v); ignorance before the first window."""
+        nothing = ignorance(float(config.low_law(belief.mean[1])), config.unknown_std)
+        if self.rail is None:
+            return nothing
+        elapsed = (t_ns - self.t_ns) * 1e-9 / config.memory_s
+        travelled = abs(float(belief.mean[0]) - self.position_m) / config.memory_m
+        return age(self.rail, nothing, elapsed + travelled)
 
-class Result(NamedTuple):
-    """An estimate and what it leaves behind."""
+    def after(self, t_ns: int, verdict: Verdict) -> Knowledge:
+        """What is known after a verdict."""
+        return Knowledge(
+            windows=self.windows + (verdict.fit.window > 0),
+            mu=self.mu if verdict.mu is None else verdict.mu,
+            changes=self.changes + verdict.changed,
+            rail=verdict.rail,
+            t_ns=t_ns,
+            position_m=float(verdict.belief.mean[0]),
+        )
 
-    estimate: Estimate
-    knowledge: Knowledge
-    law: Gaussian
-    """Of (s, v) at the estimate; the window's where there is one."""
-    window: BrakingWindow | None
-    """To go on with."""
 
-
-def estimate(
+def judge(
     config: Config,
+    method: AnyMethod,
     seed: int,
     newest: Measurement,
-    law: Gaussian,
-    window: BrakingWindow | None,
+    belief: Gaussian,
+    window: MethodWindow | None,
     knowledge: Knowledge,
-    evaluate: Evaluate = evaluate,
-) -> Result:
-    """Evaluate the window, if there is one, on top of what was known; `law` is the tracker's at `newest`."""
-    rail = _aged(config, newest, law, knowledge)
+) -> Verdict:
+    """Evaluate the window, if there is one, on top of what was known; `belief` is the tracker's at `newest`."""
+    rail = knowledge.aged(config, newest.t_ns, belief)
     if window is None or len(window.samples) < 2:
-        return _result(newest, law, window, knowledge, rail, Regime.COASTING)
-    unmeasured = newest.brake_pressure_pa is None
-    lowest = LOWEST_NET_ADHESION if unmeasured else 0.0
-    if config.method == "particle_em":
-        start = config.start_mu if knowledge.mu is None else knowledge.mu
-        search = Search(start, config.iterations, config.tolerance, lowest)
-        evaluation = evaluate(config, window, search, np.random.default_rng([seed, knowledge.windows]))
-        verdict = judge(config, evaluation, rail, start, unmeasured)
-    else:
-        verdict = evaluate_condition(config, window, rail, config.start_mu if knowledge.mu is None else None, lowest)
-        if unmeasured and verdict.rail.mu <= 2.0 * verdict.rail.std:
-            verdict = verdict._replace(regime=Regime.COASTING, rail=rail)
-    return _judged(newest, window, knowledge, verdict)
-
-
-def _aged(config: Config, newest: Measurement, law: Gaussian, knowledge: Knowledge) -> Rail:
-    """The rail as it was known, aged to now; ignorance before the first window."""
-    nothing = ignorance(float(config.low_law(law.mean[1])), config.unknown_std)
-    if knowledge.rail is None:
-        return nothing
-    elapsed = (newest.t_ns - knowledge.t_ns) * 1e-9 / config.memory_s
-    travelled = abs(float(law.mean[0]) - knowledge.position_m) / config.memory_m
-    return age(knowledge.rail, nothing, elapsed + travelled)
-
-
-def _judged(newest: Measurement, window: BrakingWindow, knowledge: Knowledge, verdict: Verdict) -> Result:
-    knowledge = knowledge._replace(
-        windows=knowledge.windows + 1, mu=verdict.mu, changes=knowledge.changes + verdict.changed
+        return Verdict(Regime.COASTING, rail, belief, window)
+    measured = newest.brake_pressure_pa is not None
+    context = Context(
+        rail=rail,
+        mu=knowledge.mu,
+        pressure_measured=measured,
+        lowest_mu=0.0 if measured else LOWEST_NET_ADHESION,
+        rng=np.random.default_rng([seed, knowledge.windows]),
     )
-    result = _result(newest, verdict.law, verdict.following, knowledge, verdict.rail, verdict.regime)
-    return result._replace(
-        estimate=result.estimate._replace(
-            window=len(window.samples),
-            iterations=verdict.iterations,
-            converged=verdict.converged,
-            log_likelihood=verdict.log_likelihood,
-            ess=verdict.ess,
-            shape=verdict.shape,
-        )
-    )
+    return method.evaluate(config, window, context)
 
 
-def _result(
-    newest: Measurement,
-    law: Gaussian,
-    window: BrakingWindow | None,
-    knowledge: Knowledge,
-    rail: Rail,
-    regime: Regime,
-) -> Result:
-    position, speed = (float(value) for value in law.mean)
-    known = knowledge._replace(rail=rail, t_ns=newest.t_ns, position_m=position)
-    estimate = Estimate(
-        t_ns=newest.t_ns,
+def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
+    """Tell a verdict; `changes` of the rail were found so far."""
+    rail, belief = verdict.rail, verdict.belief
+    position, speed = (float(value) for value in belief.mean)
+    return Estimate(
+        t_ns=t_ns,
         mu=rail.mu,
         mu_std=rail.std,
         mu_lower=rail.lower,
-        regime=regime,
+        regime=verdict.regime,
         position_m=position,
         speed_mps=max(speed, 0.0),
-        position_std_m=law.position_std,
-        speed_std_mps=law.speed_std,
-        changes=knowledge.changes,
+        position_std_m=belief.position_std,
+        speed_std_mps=belief.speed_std,
+        changes=changes,
+        **verdict.fit._asdict(),
     )
-    return Result(estimate, known, law, window)

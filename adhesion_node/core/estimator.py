@@ -21,10 +21,10 @@ from .belief.gaussian import Gaussian
 from .belief.outcome import Outcome
 from .belief.window import Sample
 from .config import Config
-from .estimate import Estimate, Knowledge, Result, estimate
+from .estimate import Estimate, Knowledge, estimate_of, judge
 from .intake.samples import Measurement
-from .methods.particle_em.method import Evaluate, evaluate
-from .methods.protocol import BrakingWindow
+from .methods import METHODS
+from .methods.protocol import AnyMethod, MethodWindow, Verdict
 
 SLOWEST_MPS = 3.0
 """Speed below which the windows stop: a train about to stand still says nothing of the adhesion."""
@@ -38,6 +38,8 @@ class State(NamedTuple):
     """Everything the estimator remembers. Immutable: `step` returns a new one."""
 
     seed: int
+    method: AnyMethod
+    """How the adhesion is identified; another value may be put here."""
     counts: Mapping[Outcome, int] = MappingProxyType(dict.fromkeys(Outcome, 0))
     outcome: Outcome = Outcome.ACCEPTED
     """What became of the measurement that came last."""
@@ -47,7 +49,7 @@ class State(NamedTuple):
     """The newest measurement that was accepted."""
     law: Gaussian | None = None
     """Law of (s, v) at the newest accepted measurement, from the tracker."""
-    window: BrakingWindow | None = None
+    window: MethodWindow | None = None
     """The present braking; None while coasting or while the speed is not known."""
     knowledge: Knowledge = Knowledge()
     outliers: int = 0
@@ -58,27 +60,24 @@ class State(NamedTuple):
 
 def init(config: Config, seed: int) -> State:
     """State before the first measurement. Raises ValueError for a negative seed."""
-    del config  # part of every estimator's signature; this one's first state needs nothing of it
     if seed < 0:
         raise ValueError(f"seed = {seed}: give an integer of at least 0")
-    return State(seed)
+    return State(seed, METHODS[config.method])
 
 
-def step(
-    config: Config, state: State, measurement: Measurement, evaluate: Evaluate = evaluate
-) -> tuple[State, Estimate | None]:
+def step(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Take one measurement; every `config.step` accepted ones return an estimate.
 
     What became of the measurement stands in `State.outcome` and is counted in `State.counts`. With `max_lag_s`
     above 0 a measurement waits for late ones to be sorted in, and is judged when its turn comes; should several
-    estimates fall due at once, after a gap, the newest is returned. `evaluate` identifies mu in a window.
+    estimates fall due at once, after a gap, the newest is returned.
     """
     newest = _newest(state)
     if not measurement.is_valid():
         return _counted(state, Outcome.INVALID), None
     estimates: list[Estimate] = []
     if newest is not None and abs(measurement.t_ns - newest.t_ns) > config.reset_s * 1e9:
-        state, estimates = _take_all(config, state._replace(pending=()), state.pending, evaluate)
+        state, estimates = _take_all(config, state._replace(pending=()), state.pending)
         state = _reset(state)
     if any(waiting.t_ns == measurement.t_ns for waiting in state.pending):
         return _counted(state, Outcome.DUPLICATE), None
@@ -87,16 +86,16 @@ def step(
     due_ns = pending[-1].t_ns - round(config.max_lag_s * 1e9)
     due = max(bisect_right(pending, due_ns, key=lambda waiting: waiting.t_ns), len(pending) - MOST_WAITING)
     state = state._replace(pending=tuple(pending[due:]), outcome=Outcome.ACCEPTED)
-    state, later = _take_all(config, state, pending[:due], evaluate)
+    state, later = _take_all(config, state, pending[:due])
     return state, next(reversed(estimates + later), None)
 
 
-def finish(config: Config, state: State, evaluate: Evaluate = evaluate) -> tuple[State, tuple[Estimate, ...]]:
+def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
-    state, estimates = _take_all(config, state._replace(pending=()), state.pending, evaluate)
+    state, estimates = _take_all(config, state._replace(pending=()), state.pending)
     if state.newest is not None and state.since_estimate:
-        state, last = _estimate(config, state, evaluate)
-        estimates.append(last.estimate)
+        state, _, last = _estimate(config, state)
+        estimates.append(last)
     return state, tuple(estimates)
 
 
@@ -112,23 +111,22 @@ def _counted(state: State, outcome: Outcome) -> State:
 def _reset(state: State) -> State:
     """Forget all but the counts, what still waits, and the number of windows, which keeps the random streams apart."""
     knowledge = Knowledge(windows=state.knowledge.windows)
-    return _counted(State(state.seed, counts=state.counts, pending=state.pending, knowledge=knowledge), Outcome.RESET)
+    new = State(state.seed, state.method, counts=state.counts, pending=state.pending, knowledge=knowledge)
+    return _counted(new, Outcome.RESET)
 
 
-def _take_all(
-    config: Config, state: State, waiting: Iterable[Measurement], evaluate: Evaluate
-) -> tuple[State, list[Estimate]]:
+def _take_all(config: Config, state: State, waiting: Iterable[Measurement]) -> tuple[State, list[Estimate]]:
     estimates = []
     for measurement in waiting:
-        state, result = _take(config, state, measurement, evaluate)
+        state, result = _take(config, state, measurement)
         estimates += [] if result is None else [result]
     return state, estimates
 
 
-def _take(config: Config, state: State, measurement: Measurement, evaluate: Evaluate) -> tuple[State, Estimate | None]:
+def _take(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
     if state.newest is None or state.law is None:
-        return _accept(config, state, measurement, tracker.meet(measurement), 0.0, evaluate)
+        return _accept(config, state, measurement, tracker.meet(measurement), 0.0)
     if measurement.t_ns <= state.newest.t_ns:
         same = measurement.t_ns == state.newest.t_ns
         return _counted(state, Outcome.DUPLICATE if same else Outcome.LATE), None
@@ -138,13 +136,13 @@ def _take(config: Config, state: State, measurement: Measurement, evaluate: Eval
     if tracker.innovation(law, measurement) > config.gate_sigma:
         if state.outliers + 1 < config.max_outliers:
             return _counted(state._replace(outliers=state.outliers + 1), Outcome.OUTLIER), None
-        return _accept(config, _reset(state), measurement, tracker.meet(measurement), 0.0, evaluate)
+        return _accept(config, _reset(state), measurement, tracker.meet(measurement), 0.0)
     law = tracker.correct(law, measurement, _speed_variance(config, measurement))
-    return _accept(config, state, measurement, law, dt_s, evaluate)
+    return _accept(config, state, measurement, law, dt_s)
 
 
 def _accept(
-    config: Config, state: State, measurement: Measurement, law: Gaussian, dt_s: float, evaluate: Evaluate
+    config: Config, state: State, measurement: Measurement, law: Gaussian, dt_s: float
 ) -> tuple[State, Estimate | None]:
     """Let an accepted measurement join or open the window; give an estimate when one is due."""
     brake = config.brake(measurement.brake_pressure_pa)
@@ -159,7 +157,7 @@ def _accept(
     )
     window = state.window if dt_s <= config.max_gap_s else None
     if window is not None:
-        window = window.extended(sample)
+        window = state.method.extend(window, sample)
     state = _counted(state, Outcome.ACCEPTED)._replace(
         newest=measurement,
         law=law,
@@ -168,28 +166,31 @@ def _accept(
         since_estimate=state.since_estimate + 1,
     )
     if brake == 0.0 or law.mean[1] < SLOWEST_MPS:
-        return _release(config, state, evaluate)
+        return _release(config, state)
     if window is None and tracker.is_settled(law, measurement.variance_m2 * dt_s):
-        state = state._replace(window=BrakingWindow(law, (sample,)))
+        state = state._replace(window=state.method.open(law, sample))
     if state.since_estimate < config.step:
         return state, None
-    state, result = _estimate(config, state, evaluate)
-    return state, result.estimate
+    state, _, estimate = _estimate(config, state)
+    return state, estimate
 
 
-def _release(config: Config, state: State, evaluate: Evaluate) -> tuple[State, Estimate | None]:
+def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
     """Coast, or end a braking with its last, short window."""
     if state.window is None and state.since_estimate < config.step:
         return state, None
-    state, result = _estimate(config, state, evaluate)
-    return state._replace(window=None, law=result.law), result.estimate
+    state, verdict, estimate = _estimate(config, state)
+    return state._replace(window=None, law=verdict.belief), estimate
 
 
-def _estimate(config: Config, state: State, evaluate: Evaluate) -> tuple[State, Result]:
-    assert state.newest is not None  # an estimate follows an accepted measurement
-    assert state.law is not None
-    result = estimate(config, state.seed, state.newest, state.law, state.window, state.knowledge, evaluate)
-    return state._replace(window=result.window, knowledge=result.knowledge, since_estimate=0), result
+def _estimate(config: Config, state: State) -> tuple[State, Verdict, Estimate]:
+    newest, law, knowledge = state.newest, state.law, state.knowledge
+    assert newest is not None  # an estimate follows an accepted measurement
+    assert law is not None
+    verdict = judge(config, state.method, state.seed, newest, law, state.window, knowledge)
+    knowledge = knowledge.after(newest.t_ns, verdict)
+    state = state._replace(window=verdict.window, knowledge=knowledge, since_estimate=0)
+    return state, verdict, estimate_of(newest.t_ns, verdict, knowledge.changes)
 
 
 def _speed_variance(config: Config, measurement: Measurement) -> float:

@@ -65,7 +65,7 @@ class Pipeline:
         """End the data so far as `finish` does and start anew: only the counts and the digest go on."""
         predictions = self.finish()
         counts = {**self.state.counts, Outcome.RESET: self.state.counts[Outcome.RESET] + 1}
-        self.state = init(self.config, self._seed)._replace(counts=counts)
+        self.state = init(self.config, self._seed)._replace(counts=counts, method=self.state.method)
         self._begin()
         return predictions
 

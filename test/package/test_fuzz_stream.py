@@ -12,7 +12,6 @@ import math
 import pickle
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
-from functools import partial
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -23,16 +22,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from oracles import ride
 
-from adhesion_node.core import Config, Measurement, Outcome, step
+from adhesion_node.core import Config, Measurement, Outcome
 from adhesion_node.core.intake import inbox as align
 from adhesion_node.core.intake.inbox import PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.methods.particle_em.em import Search
-from adhesion_node.core.methods.particle_em.method import Evaluation, evaluate
-from adhesion_node.core.methods.protocol import BrakingWindow
+from adhesion_node.core.methods.particle_em.method import Evaluation, ParticleEm, ParticleWindow, evaluate
+from adhesion_node.core.methods.protocol import MethodWindow
 from adhesion_node.core.methods.rail_condition.method import SHORT_S
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
-from adhesion_node.run import pipeline as pipeline_module
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import codecs as reading
 from adhesion_node.wire.codecs import MAX_ABSOLUTE_PA, Reason, Rejected
@@ -111,7 +109,7 @@ def shifted(number: int, origin_ns: int) -> Measurement:
     return GOOD[index]._replace(t_ns=origin_ns + rounds * (GOOD[-1].t_ns + S // 10) + GOOD[index].t_ns)
 
 
-def _lasted_s(window: BrakingWindow, step: int) -> float:
+def _lasted_s(window: MethodWindow, step: int) -> float:
     """How long it was at most when it was last evaluated."""
     return (window.samples[-step].t_ns - window.samples[0].t_ns) * 1e-9
 
@@ -266,13 +264,13 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
     """No more windows than the accepted measurements allow, no more in memory than the inbox may hold."""
     evaluations = Counter[str]()
 
-    def counted(config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:
+    def counted(config: Config, window: ParticleWindow, search: Search, rng: np.random.Generator) -> Evaluation:
         evaluations["done"] += 1
         return evaluate(config, window, search, rng)
 
-    monkeypatch.setattr(pipeline_module, "step", partial(step, evaluate=counted))
     monkeypatch.setattr(align, "MOST", 500)
     pipeline = Pipeline(Config(method="particle_em", iterations=1, particles=2, window=30, step=20), 1)
+    pipeline.state = pipeline.state._replace(method=ParticleEm(counted))
     rng = np.random.default_rng(1)
     sizes = []
     for number in range(6_000):

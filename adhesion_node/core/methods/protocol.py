@@ -1,64 +1,111 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The sliding window of one braking: grows to S measurements, then moves on by L (steps 1, 4 and 5 of the paper)."""
+"""What a method is: a value that opens, extends and evaluates the sliding window of one braking.
+
+A window grows to S measurements, then moves on by L (steps 1, 4 and 5 of the paper). What else it holds is the
+method's own; the estimator keeps it between two measurements and never looks inside.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+
+import numpy as np
 
 from ..belief.gaussian import Gaussian
-from ..belief.outcome import Regime
 from ..belief.rail import Rail
+from ..belief.regime import Regime
 from ..belief.window import Sample
-from ..config import Config
 from ..physics.adhesion import SpeedLaw
-from ..physics.train import Array
-from .rail_condition.hypotheses import Hypothesis
-from .rail_condition.noise import Noise
+
+if TYPE_CHECKING:  # Config offers the methods' names, so it stands above them
+    from ..config import Config
 
 
-class BrakingWindow(NamedTuple):
-    """Samples of the window and the law of (s, v) at the first one, which the first one's measurement shaped."""
+class MethodWindow(Protocol):
+    """A method's window of one braking, immutable."""
 
-    prior: Gaussian
-    samples: tuple[Sample, ...]
-    hypotheses: tuple[Hypothesis, ...] = ()
-    """Joint laws with the rail condition at the first sample; empty until such a window is evaluated."""
-    noise: Noise = Noise()
-    """Identified so far."""
-    trajectory: Array | None = None
-    """Smoothed positions and speeds of its first samples, from the last evaluation; where the next one begins."""
-    known: Rail | None = None
-    """The rail as it was known when the braking began; None when it has changed since."""
+    @property
+    def samples(self) -> tuple[Sample, ...]:
+        """Its measurements; the first one shaped the belief of (s, v) that the window began with."""
+        ...
 
-    def extended(self, sample: Sample) -> BrakingWindow:
-        """The window with one more sample."""
-        return self._replace(samples=(*self.samples, sample))
 
-    def spent(self, config: Config) -> int:
-        """Samples to leave behind, so that L more fill the window again; 0 while it still grows."""
-        spent = len(self.samples) - config.window + config.step
-        return spent if spent >= config.step else 0
+class Context(NamedTuple):
+    """What is known beside the window when it is evaluated."""
+
+    rail: Rail
+    """The rail as it was known, aged to now."""
+    mu: float | None
+    """Adhesion that the last window gave, to start from (12); None before the first window."""
+    pressure_measured: bool
+    """Else a full brake is assumed, and traction may be at work."""
+    lowest_mu: float
+    """Least net adhesion to look for: 0, or a negative number where traction may be at work."""
+    rng: np.random.Generator
+    """The window's own random stream."""
+
+
+class Fit(NamedTuple):
+    """How a window was evaluated; an estimate tells it as it is."""
+
+    window: int = 0
+    """Measurements in the window; 0 where none was evaluated."""
+    iterations: int = 0
+    converged: bool = True
+    log_likelihood: float = 0.0
+    ess: float = 0.0
+    """Smallest effective sample size in the window; 0 where no particles were used."""
+    shape: SpeedLaw | None = None
+    """How mu goes on, up to a factor, as the train slows down; None: nothing is known of it."""
 
 
 class Verdict(NamedTuple):
-    """What a method makes of a window."""
+    """What is made of a window."""
 
     regime: Regime
     rail: Rail
-    law: Gaussian
+    belief: Gaussian
     """Of (s, v) at the newest sample."""
-    following: BrakingWindow
-    """The window to go on with."""
-    mu: float
-    """Adhesion for the next window to start from (12)."""
-    iterations: int
-    converged: bool
-    log_likelihood: float
-    shape: SpeedLaw | None = None
-    """How the adhesion goes on as the train slows down; None where a method says nothing of it."""
-    ess: float = 0.0
-    """Smallest effective sample size in the window; 0 where no particles were used."""
+    window: MethodWindow | None
+    """To go on with."""
+    mu: float | None = None
+    """Adhesion for the next window to start from (12); None leaves it as it was."""
     changed: bool = False
     """Whether the rail has changed within the window."""
+    fit: Fit = Fit()
+
+
+Window = TypeVar("Window", bound=MethodWindow)
+
+
+class Method(Protocol[Window]):
+    """Identifies the adhesion; a value without state of its own, all that it remembers is in its window."""
+
+    @property
+    def summary(self) -> str:
+        """What it does, for the description of the setting `method`."""
+        ...
+
+    def open(self, prior: Gaussian, sample: Sample) -> Window:
+        """Open a window at a braking's first sample; `prior` is the belief of (s, v) there, the sample included."""
+        ...
+
+    def extend(self, window: Window, sample: Sample) -> Window:
+        """Return the window with one more sample."""
+        ...
+
+    def evaluate(self, config: Config, window: Window, context: Context) -> Verdict:
+        """Judge a window of at least two samples, and move it on where it is full."""
+        ...
+
+
+AnyMethod = Method[Any]
+
+
+def spent(config: Config, samples: Sequence[Sample]) -> int:
+    """Samples to leave behind, so that L more fill the window again; 0 while it still grows."""
+    count = len(samples) - config.window + config.step
+    return count if count >= config.step else 0

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ...core.belief.gaussian import Gaussian, coast
-from ...core.belief.outcome import Regime
+from ...core.belief.regime import Regime
 from ...core.belief.tracker import meet
 from ...core.config import Config
 from ...core.estimate import Estimate

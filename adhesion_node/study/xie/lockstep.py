@@ -23,8 +23,8 @@ from ...core.belief.gaussian import Gaussian
 from ...core.belief.rail import kept_of_start
 from ...core.belief.window import Window, window_of
 from ...core.methods.particle_em.em import Search
-from ...core.methods.particle_em.method import Evaluate, Evaluation
-from ...core.methods.protocol import BrakingWindow
+from ...core.methods.particle_em.method import Evaluate, Evaluation, ParticleEm, ParticleWindow
+from ...core.methods.protocol import spent
 from . import batch
 from .batch_filter import filter_windows
 from .batch_particles import stack
@@ -33,9 +33,9 @@ Taken = TypeVar("Taken")
 
 
 class Due(NamedTuple):
-    """A window to evaluate: the arguments of `core.paper.evaluate`."""
+    """A window to evaluate: the arguments of `particle_em.method.evaluate`."""
 
-    window: BrakingWindow
+    window: ParticleWindow
     search: Search
     rng: np.random.Generator
 
@@ -75,7 +75,7 @@ def drive(runs: Sequence[Run], window_ms: list[float] | None = None) -> list[lis
 
 
 def evaluate_all(config: Config, dues: Sequence[Due]) -> list[Evaluation]:
-    """`core.paper.evaluate` of many windows; those of equal length go together."""
+    """`particle_em.method.evaluate` of many windows; those of equal length go together."""
     windows = [window_of(due.window.samples) for due in dues]
     groups: dict[int, list[int]] = defaultdict(list)
     for index, window in enumerate(windows):
@@ -92,11 +92,10 @@ def _evaluate_equal(config: Config, dues: Sequence[Due], windows: Sequence[Windo
     stacked = stack(priors, windows)
     searches, rngs = [due.search for due in dues], _shared([due.rng for due in dues])
     found = batch.identify(config.motion, stacked, searches, config.particles, rngs)
-    spent = windows[0].steps + 1 - config.window + config.step
-    slides = spent >= config.step
+    gone = spent(config, dues[0].window.samples)
     covariances = np.stack([prior.covariance for prior in priors])
     mu = np.array([identified.mu for identified in found])
-    filtered = filter_windows(config.motion, stacked, covariances, mu, spent if slides else windows[0].steps)
+    filtered = filter_windows(config.motion, stacked, covariances, mu, gone or windows[0].steps)
     evaluations = []
     for run, (due, identified) in enumerate(zip(dues, found, strict=True)):
         information = float(filtered.information[run])
@@ -110,7 +109,7 @@ def _evaluate_equal(config: Config, dues: Sequence[Due], windows: Sequence[Windo
                 std,
                 kept_of_start(information, identified.weight, identified.iterations),
                 last,
-                BrakingWindow(passed, due.window.samples[spent:]) if slides else due.window,
+                ParticleWindow(passed, due.window.samples[gone:]) if gone else due.window,
             )
         )
     return evaluations
@@ -123,11 +122,16 @@ def _shared(rngs: Sequence[np.random.Generator]) -> list[np.random.Generator]:
 
 
 def _stepping(run: Run, state: State, tick: int) -> Callable[[Evaluate], tuple[State, Estimate | None]]:
-    return lambda evaluate: step(run.config, state, run.measurements[tick], evaluate)
+    return lambda evaluate: step(run.config, _by(state, evaluate), run.measurements[tick])
 
 
 def _finishing(config: Config, state: State) -> Callable[[Evaluate], tuple[State, tuple[Estimate, ...]]]:
-    return lambda evaluate: finish(config, state, evaluate)
+    return lambda evaluate: finish(config, _by(state, evaluate))
+
+
+def _by(state: State, evaluate: Evaluate) -> State:
+    """The state with windows evaluated that way."""
+    return state._replace(method=ParticleEm(evaluate))
 
 
 def _timed(window_ms: list[float], config: Config, dues: Sequence[Due]) -> list[Evaluation]:
@@ -159,11 +163,11 @@ def _together(
 
 
 class _Ask(NamedTuple):
-    """Stands for the core's `evaluate`: gives the answers at hand, and stops the call where they end."""
+    """Stands for the method's own `evaluate`: gives the answers at hand, and stops the call where they end."""
 
     answers: Iterator[Evaluation]
 
-    def __call__(self, config: Config, window: BrakingWindow, search: Search, rng: np.random.Generator) -> Evaluation:
+    def __call__(self, config: Config, window: ParticleWindow, search: Search, rng: np.random.Generator) -> Evaluation:
         del config
         answer = next(self.answers, None)
         if answer is None:

@@ -18,8 +18,7 @@ from adhesion_node.core.belief import tracker
 from adhesion_node.core.belief.gaussian import Gaussian, coast, filter_window, observe
 from adhesion_node.core.belief.window import Sample, Window, window_of
 from adhesion_node.core.methods.particle_em.em import Search
-from adhesion_node.core.methods.particle_em.method import evaluate
-from adhesion_node.core.methods.protocol import BrakingWindow
+from adhesion_node.core.methods.particle_em.method import ParticleWindow, evaluate
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL
 from adhesion_node.core.physics.train import CRH3
@@ -196,12 +195,13 @@ def test_the_state_of_a_window_includes_what_mu_leaves_open() -> None:
     samples = [Sample(m.t_ns, 0.0952, m.position_m, 0.25, 0.0, math.inf) for m in ride([(2.5, 410e3)])]
     config = Config(window=20, step=5, particles=8, iterations=8)
     prior = Gaussian(np.array([0.0, 80.0]), np.diag([0.01, 0.01]))
-    evaluation = evaluate(config, BrakingWindow(prior, tuple(samples)), Search(0.07, 8, 0.0), np.random.default_rng(0))
+    evaluation = evaluate(config, ParticleWindow(prior, tuple(samples)), Search(0.07, 8, 0.0), np.random.default_rng(0))
     arrays, mu = window_of(samples), evaluation.identified.mu
     filtered = filter_window(config.motion, prior, arrays, mu)
     moved = filter_window(config.motion, prior, arrays, mu + 1e-4).laws[-1].mean - filtered.laws[-1].mean
     open_ = moved / 1e-4 * min(evaluation.std, config.unknown_std)
-    assert evaluation.law.covariance == pytest.approx(filtered.laws[-1].covariance + np.outer(open_, open_), rel=1e-3)
+    expected = filtered.laws[-1].covariance + np.outer(open_, open_)
+    assert evaluation.belief.covariance == pytest.approx(expected, rel=1e-3)
     assert np.all(np.outer(open_, open_) > 0.2 * filtered.laws[-1].covariance)  # it matters
     # 25 samples where S is 20 and L is 5: ten are spent, and the prior is the law at the eleventh
     assert evaluation.following.samples == tuple(samples[10:])

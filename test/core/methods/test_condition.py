@@ -14,6 +14,7 @@ from journeys import LIMIT, Journey, Rail, braking, wet
 from oracles import drive
 
 from adhesion_node.core import Config, Estimate, Regime
+from adhesion_node.core.methods.rail_condition.method import ConditionWindow
 from adhesion_node.core.physics.adhesion import SNOW, WET
 
 LAW_KNOWN = Config(law_probability=1.0, step=10)
@@ -131,7 +132,7 @@ def test_a_limited_brake_hands_on_no_knowledge_of_the_adhesion() -> None:
     open_rail, seen_rail = (braking(rail, 15.0, 2) for rail in (lambda _, v: 0.14, wet(0.8)))
     for journey, low, high in ((open_rail, 0.03, 0.05), (seen_rail, 0.0, 0.002)):
         window = drive(Config(), journey.measurements)[0].window
-        assert window is not None
+        assert isinstance(window, ConditionWindow)
         assert low < math.sqrt(window.hypotheses[0].variance) < high
 
 

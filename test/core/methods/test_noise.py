@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from adhesion_node.core import Config, Measurement, init, step
+from adhesion_node.core.methods.rail_condition.method import ConditionWindow
 from adhesion_node.core.methods.rail_condition.noise import Noise
 from sim_node.train.run import run
 from sim_node.train.scenario import find
@@ -22,7 +23,7 @@ def _identified(true_std_m: float, given_std_m: float, config: Config, seed: int
         assert reading.position_m is not None
         gauge = max(reading.pressure_pa - ATMOSPHERE_PA, 0.0)
         state, _ = step(config, state, Measurement(reading.t_ns, reading.position_m, given_std_m**2, gauge))
-        noise = state.window.noise if state.window is not None else noise
+        noise = state.window.noise if isinstance(state.window, ConditionWindow) else noise
     return noise
 
 

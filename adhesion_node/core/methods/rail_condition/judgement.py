@@ -7,15 +7,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...belief.outcome import Regime
 from ...belief.rail import Rail, learn_bound, lower_bound
+from ...belief.regime import Regime
 from ...belief.window import Sample
-from ...config import Config
 from ...physics.train import Array
 from .hypotheses import Hypothesis, probabilities
+
+if TYPE_CHECKING:
+    from ...config import Config
 
 UNDECIDED = 0.5
 """Share of ignorance's standard deviation above which a window has seen too little to tell what limits the motion."""

@@ -11,23 +11,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...belief.gaussian import Gaussian
 from ...belief.rail import Rail
-from ...belief.window import window_of
-from ...config import Config
+from ...belief.regime import Regime
+from ...belief.window import Sample, window_of
 from ...physics.train import Array
-from ..protocol import BrakingWindow, Verdict
+from ..protocol import Context, Fit, Verdict, spent
 from .changes import Change, change, position_step
 from .hypotheses import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
 from .judgement import judge, most_used
-from .noise import learn_noise
+from .noise import Noise, learn_noise
 from .problem import Belief, Model, Problem
 from .smoother import Search, Smoothed, posterior, smooth
+
+if TYPE_CHECKING:
+    from ...config import Config
 
 EDGE = 5
 """Steps at either end of a window in which a change of the rail is not looked for."""
@@ -49,6 +52,21 @@ SHORT_S = 4.5
 """Time up to which a window grows beyond S measurements while it cannot yet tell kappa from the brake's limit."""
 
 
+class ConditionWindow(NamedTuple):
+    """Samples of the window and the belief of (s, v) at the first one, which the first one's measurement shaped."""
+
+    prior: Gaussian
+    samples: tuple[Sample, ...]
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """Joint beliefs with the rail condition at the first sample; empty until such a window is evaluated."""
+    noise: Noise = Noise()
+    """Identified so far."""
+    trajectory: Array | None = None
+    """Smoothed positions and speeds of its first samples, from the last evaluation; where the next one begins."""
+    known: Rail | None = None
+    """The rail as it was known when the braking began; None when it has changed since."""
+
+
 class Found(NamedTuple):
     """What a window says under one hypothesis."""
 
@@ -65,45 +83,58 @@ class Found(NamedTuple):
         return CLEAR * math.sqrt(self.now.belief.covariance[2, 2])
 
 
-def evaluate_condition(
-    config: Config, window: BrakingWindow, before: Rail, start: float | None, lowest: float
-) -> Verdict:
-    """Identify the rail condition; where the rail has changed within the window, from the change on.
+@dataclass(frozen=True, slots=True)
+class RailCondition:
+    """The method."""
 
-    `before` is the rail as it was known, which a new braking begins with; `start` the adhesion to start from.
-    """
-    if not window.hypotheses:
-        window = window._replace(hypotheses=_opened(config, with_rail(window.prior, before)), known=before)
-    arrays = window_of(window.samples, window.noise.factor)
-    found = list[Found]()
-    for hypothesis in window.hypotheses:
-        near = found[0].smoothed.trajectory if found else window.trajectory
-        model = Model(config.motion, hypothesis.law, config.tail_dof)
-        problem = Problem(model, arrays, hypothesis.belief)
-        found.append(_find(config, problem, hypothesis, (start, lowest), near))
-    leading = max(found, key=lambda each: each.now.log_weight)
-    changed = _changed(config, found, leading)
-    now = tuple(each.now for each in found) if changed is None else changed.hypotheses
-    law = _state(leading.now.belief if changed is None else now[0].belief)
-    if changed is not None and changed.certain:
-        known = None if changed.of_rail else window.known
-        following = BrakingWindow(law, window.samples[-1:], now, window.noise, known=known)
-    else:
-        following = _following(config, window, found)
-    limit = most_used(config, window.samples, leading.smoothed.trajectory[:, 1], leading.now.mu)
-    regime, rail = judge(config, now, before, following.known, limit)
-    return Verdict(
-        regime=regime,
-        rail=rail,
-        law=law,
-        following=following,
-        mu=leading.now.mu,
-        shape=leading.now.law,
-        iterations=leading.smoothed.iterations,
-        converged=leading.smoothed.converged,
-        log_likelihood=leading.now.log_weight,
-        changed=changed is not None and changed.of_rail,
-    )
+    summary: str = "a factor on the speed law, by a Gaussian smoother"
+
+    def open(self, prior: Gaussian, sample: Sample) -> ConditionWindow:
+        """Open a window at the sample, of which `prior` holds the position already."""
+        return ConditionWindow(prior, (sample,))
+
+    def extend(self, window: ConditionWindow, sample: Sample) -> ConditionWindow:
+        """Return the window with one more sample."""
+        return window._replace(samples=(*window.samples, sample))
+
+    def evaluate(self, config: Config, window: ConditionWindow, context: Context) -> Verdict:
+        """Identify the rail condition; where the rail has changed within the window, from the change on.
+
+        A new braking begins with the rail as it was known.
+        """
+        if not window.hypotheses:
+            before = with_rail(window.prior, context.rail)
+            window = window._replace(hypotheses=_opened(config, before), known=context.rail)
+        arrays = window_of(window.samples, window.noise.factor)
+        start = config.start_mu if context.mu is None else None
+        found = list[Found]()
+        for hypothesis in window.hypotheses:
+            near = found[0].smoothed.trajectory if found else window.trajectory
+            model = Model(config.motion, hypothesis.law, config.tail_dof)
+            problem = Problem(model, arrays, hypothesis.belief)
+            found.append(_find(config, problem, hypothesis, (start, context.lowest_mu), near))
+        leading = max(found, key=lambda each: each.now.log_weight)
+        changed = _changed(config, found, leading)
+        now = tuple(each.now for each in found) if changed is None else changed.hypotheses
+        belief = _state(leading.now.belief if changed is None else now[0].belief)
+        if changed is not None and changed.certain:
+            known = None if changed.of_rail else window.known
+            following = ConditionWindow(belief, window.samples[-1:], now, window.noise, known=known)
+        else:
+            following = _following(config, window, found)
+        limit = most_used(config, window.samples, leading.smoothed.trajectory[:, 1], leading.now.mu)
+        regime, rail = judge(config, now, context.rail, following.known, limit)
+        if not context.pressure_measured and rail.mu <= 2.0 * rail.std:
+            regime, rail = Regime.COASTING, context.rail
+        fit = Fit(
+            window=len(window.samples),
+            iterations=leading.smoothed.iterations,
+            converged=leading.smoothed.converged,
+            log_likelihood=leading.now.log_weight,
+            shape=leading.now.law,
+        )
+        rail_changed = changed is not None and changed.of_rail
+        return Verdict(regime, rail, belief, following, mu=leading.now.mu, changed=rail_changed, fit=fit)
 
 
 def _opened(config: Config, belief: Belief) -> tuple[Hypothesis, ...]:
@@ -174,12 +205,12 @@ def _place_step(found: Found) -> Change:
     return position_step(found.problem, found.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), STEP_STD_M)
 
 
-def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) -> BrakingWindow:
+def _following(config: Config, window: ConditionWindow, found: Sequence[Found]) -> ConditionWindow:
     """The window moved on, each hypothesis with the law that the samples left behind give."""
-    spent, trajectory = window.spent(config), found[0].smoothed.trajectory
-    if not spent or _waits(window, found):
+    count, trajectory = spent(config, window.samples), found[0].smoothed.trajectory
+    if not count or _waits(window, found):
         return window._replace(trajectory=trajectory)
-    gone = found[0].problem.window.beginning(spent)
+    gone = found[0].problem.window.beginning(count)
     drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
     passed = []
     for each in found:
@@ -192,12 +223,13 @@ def _following(config: Config, window: BrakingWindow, found: Sequence[Found]) ->
         if probability >= NEGLIGIBLE
     )
     noise = (
-        learn_noise(window.noise, found[0].problem, found[0].smoothed, spent) if config.identify_noise else window.noise
+        learn_noise(window.noise, found[0].problem, found[0].smoothed, count) if config.identify_noise else window.noise
     )
-    return BrakingWindow(_state(kept[0].belief), window.samples[spent:], kept, noise, trajectory[spent:], window.known)
+    prior = _state(kept[0].belief)
+    return ConditionWindow(prior, window.samples[count:], kept, noise, trajectory[count:], window.known)
 
 
-def _waits(window: BrakingWindow, found: Sequence[Found]) -> bool:
+def _waits(window: ConditionWindow, found: Sequence[Found]) -> bool:
     """Whether to leave nothing behind yet, as no step would tell of kappa: S measurements at 50 Hz are but a second."""
     lasts_s = (window.samples[-1].t_ns - window.samples[0].t_ns) * 1e-9
     return lasts_s < SHORT_S and all(np.max(each.smoothed.steps.headroom) < each.margin for each in found)
