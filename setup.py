@@ -12,13 +12,12 @@ NAME = "adhesion_node"
 HERE = Path(__file__).parent
 MANIFEST = ElementTree.parse(HERE / "package.xml")
 
-NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "simulator", "slip_simulator")
+NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "live", "simulator", "slip_simulator")
 TOOLS = {
     "import_csv": "adhesion_node.tools.import_csv",
     "recover": "adhesion_node.tools.recover",
     "demo": "adhesion_node.tools.demo",
     "report": "adhesion_node.report.__main__",
-    "live": "adhesion_node.live.__main__",
     "study": "adhesion_node.study.__main__",
     "bench": "adhesion_node.bench.__main__",
 }

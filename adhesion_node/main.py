@@ -27,6 +27,7 @@ estimator = _node("adhesion_node.nodes.estimator")
 creep_estimator = _node("adhesion_node.nodes.creep_estimator")
 atp_monitor = _node("adhesion_node.nodes.atp_monitor")
 recorder = _node("adhesion_node.nodes.recorder")
+live = _node("adhesion_node.live.__main__")
 simulator = _node("sim_node.nodes.simulator")
 slip_simulator = _node("sim_node.nodes.slip_simulator")
 

@@ -28,7 +28,7 @@ LATEST_S = 4.0
 END_S = 30.0
 
 BURSTS = ((signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT), (signal.SIGTERM, signal.SIGINT))
-NODES = ("estimator", "recorder", "atp_monitor", "simulator", "creep_estimator")
+NODES = ("estimator", "recorder", "atp_monitor", "simulator", "creep_estimator", "live")
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,8 @@ def attempt(rng: random.Random, folder: Path) -> Ending:
     node, burst = rng.choice(NODES), rng.choice(BURSTS)
     delay_s = rng.uniform(0.005, LATEST_S)
     bag = folder / f"bag_{rng.getrandbits(40):x}"
-    program = start(node, *(("--output", str(bag)) if node == "recorder" else ()))
+    own = {"recorder": ("--output", str(bag)), "live": ("--port", "0")}
+    program = start(node, *own.get(node, ()))
     time.sleep(delay_s)  # the moment itself is what is tried
     for number in burst:
         program.send_signal(number)

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 from ..bag import BagReader
 from ..core import Regime
 from ..core.physics import braking
-from ..core.physics.train import Array, Train
+from ..core.physics.train import GRAVITY, Array, Train
 from ..wire import codecs as reading
 from ..wire.topics import (
     ATP_STATUS,
     BRAKE_PRESSURE,
     BRAKING_CURVE,
     BRAKING_CURVE_NOMINAL,
+    DECELERATION,
     DIAGNOSTICS,
     MU,
     MU_LOWER,
@@ -30,7 +31,7 @@ from ..wire.topics import (
     TRUTH_STATE,
     Topic,
 )
-from .series import Series, Times, read_last_status, read_remarks, read_series, read_status
+from .series import Series, Times, read_last_status, read_remarks, read_series, read_status, read_unstamped
 
 FIXED_MU = 0.0726
 """The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""
@@ -106,16 +107,15 @@ class Run(NamedTuple):
 
 def read_run(reader: BagReader) -> Run:
     """Read the series. Raises ValueError when the recording holds no estimates."""
-    speed = read_series(reader, STATE, speed_of)
     run = Run(
         true_mu=read_series(reader, TRUTH_MU, lambda message: message.data),
         true_position=read_series(reader, TRUTH_STATE, position_of),
         true_speed=read_series(reader, TRUTH_STATE, speed_of),
         pressure=read_series(reader, BRAKE_PRESSURE, lambda message: message.fluid_pressure),
-        mu=_stamped(read_series(reader, MU, lambda message: message.data), speed),
-        mu_lower=_stamped(read_series(reader, MU_LOWER, lambda message: message.data), speed),
+        mu=_read_mu(reader),
+        mu_lower=read_unstamped(reader, MU_LOWER, (STATE, DECELERATION)),
         position=read_series(reader, STATE, position_of),
-        speed=speed,
+        speed=read_series(reader, STATE, speed_of),
         regime=read_status(reader, DIAGNOSTICS, "regime"),
         safe=_read_curves(reader, BRAKING_CURVE),
         nominal=_read_curves(reader, BRAKING_CURVE_NOMINAL),
@@ -170,9 +170,10 @@ def _held(train: Train, speed_mps: float, mu: float, target_mps: float) -> float
     return float(braking.curve(train, speed_mps, mu, target_mps).distance_m[-1])
 
 
-def _stamped(series: Series, states: Series) -> Series:
-    """An adhesion has no header but comes with a state: where none of either is lost, it takes the state's stamp."""
-    return series._replace(t_ns=states.t_ns) if series.t_ns.size == states.t_ns.size else series
+def _read_mu(reader: BagReader) -> Series:
+    """Read mu from its stamped form, the deceleration -mu g, where it was recorded, else from the number alone."""
+    stamped = read_series(reader, DECELERATION, lambda message: -message.accel.accel.linear.x / GRAVITY)
+    return stamped if stamped.t_ns.size else read_unstamped(reader, MU, (STATE,))
 
 
 def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:

@@ -5,7 +5,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from bisect import bisect_left
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,6 +39,25 @@ def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any]) ->
     rows = [(_time(record.message, record.log_ns), value(record.message)) for record in reader.messages([topic.name])]
     rows.sort(key=lambda row: row[0])  # stamps may come late; log times do not tell
     return Series(np.array([t for t, _ in rows], dtype=np.int64), np.array([v for _, v in rows]))
+
+
+def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> Series:
+    """Read a topic of Float64: each message takes the stamp of the message of `beside` that was logged nearest to it.
+
+    What is published together is logged together, so a lost message leaves a gap and moves no other one. Of several
+    that would take one stamp the nearest in log time does. Empty when either is missing.
+    """
+    anchors = sorted(
+        (record.log_ns, _time(record.message, 0)) for name in beside for record in reader.messages([name.name])
+    )
+    rows = [(record.log_ns, record.message.data) for record in reader.messages([topic.name])] if anchors else []
+    nearest: dict[int, tuple[int, Any]] = {}
+    for log_ns, value in rows:
+        after = bisect_left(anchors, (log_ns,))
+        distance, stamp = min((abs(log - log_ns), stamp) for log, stamp in anchors[max(after - 1, 0) : after + 1])
+        nearest[stamp] = min(nearest.get(stamp, (distance, value)), (distance, value), key=lambda row: row[0])
+    stamps = sorted(nearest)
+    return Series(np.array(stamps, dtype=np.int64), np.array([nearest[stamp][1] for stamp in stamps]))
 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:

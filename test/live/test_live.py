@@ -201,7 +201,9 @@ def wait_for(url: str, process: subprocess.Popen[str]) -> HTTPResponse:
 
 def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
     port = free_port()
-    process = start(f"from adhesion_node.live.__main__ import main; raise SystemExit(main(['--port', '{port}']))")
+    process = start(
+        f"import sys; from adhesion_node.main import live; sys.argv[1:] = ['--port', '{port}']; sys.exit(live())"
+    )
     try:
         with wait_for(f"http://127.0.0.1:{port}/", process) as response:
             event(response)
@@ -216,10 +218,10 @@ def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
 
 DEMO = """
 from dataclasses import replace
-from adhesion_node import demo
-from adhesion_node.core.track import LEVEL
-from sim_node import scenario
-from sim_node.scenario import SCENARIOS, Brake
+from adhesion_node.tools import demo
+from adhesion_node.core.physics.track import LEVEL
+from sim_node.train import scenario
+from sim_node.train.scenario import SCENARIOS, Brake
 cut = replace(SCENARIOS["tunnel_entry"], brake=Brake(1.0), track=LEVEL, end_s=3.0)
 scenario.SCENARIOS = demo.SCENARIOS = {**SCENARIOS, "tunnel_entry": cut}
 raise SystemExit(demo.main(["--live", "--port", "PORT"]))

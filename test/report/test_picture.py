@@ -30,6 +30,7 @@ from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,
     BRAKING_CURVE,
     BRAKING_CURVE_NOMINAL,
+    DECELERATION,
     DIAGNOSTICS,
     MU,
     MU_LOWER,
@@ -133,6 +134,43 @@ def test_the_truth_is_drawn_where_there_is_one(tmp_path: Path) -> None:
 def test_a_single_estimate_is_drawn(tmp_path: Path) -> None:
     picture.draw(read(record(tmp_path / "bag", seconds=1)), tmp_path / "run.png", "short", 0.0)
     assert png_size(tmp_path / "run.png") == (1210, 1320)
+
+
+def record_with_losses(path: Path, *lost: tuple[Topic, int]) -> Path:
+    """Record 20 estimates, mu rising by 0.001 each second, as a live node logs them: 0.3 s after their stamps."""
+    with BagWriter(path) as writer:
+        for second in range(20):
+            t_ns, mu = START_NS + second * S, 0.08 + 0.001 * second
+            published: tuple[tuple[Topic, Any], ...] = (
+                (MU, Float64(data=mu)),
+                (MU_LOWER, Float64(data=mu - 0.01)),
+                (DECELERATION, convert.deceleration_message(t_ns, mu, 0.001)),
+                (STATE, convert.state_message(t_ns, 80.0 * second, 1.0, 80.0, 1.0)),
+            )
+            for at, (topic, message) in enumerate(published):
+                if (topic, second) not in lost:
+                    log_ns = t_ns + 3 * S // 10 + at * S // 1000
+                    writer.write(f"/{topic.name}", topic.type, serialize_message(message), log_ns)
+    return path
+
+
+@pytest.mark.parametrize(
+    "lost",
+    [
+        ((MU, 7),),
+        ((MU_LOWER, 7),),
+        ((MU, 7), (STATE, 12)),  # as many of either: by their count they would pair
+        ((MU_LOWER, 7), (STATE, 12)),
+        ((MU_LOWER, 7), (STATE, 12), (DECELERATION, 12)),
+        ((MU, 7), (MU, 8), *((DECELERATION, second) for second in range(20))),  # recorded without the stamped form
+    ],
+)
+def test_a_lost_message_moves_no_other_one(lost: tuple[tuple[Topic, int], ...], tmp_path: Path) -> None:
+    run = read(record_with_losses(tmp_path / "bag", *lost))
+    rising = {START_NS + second * S: 0.08 + 0.001 * second for second in range(20)}
+    for series, less, most_missing in ((run.mu, 0.0, 2), (run.mu_lower, 0.01, 2)):
+        assert series.t_ns.size >= 20 - most_missing
+        assert series.values == pytest.approx([rising[t_ns] - less for t_ns in series.t_ns.tolist()], abs=1e-12)
 
 
 @pytest.mark.parametrize("left_out", [(MU,), (STATE,), (MU, MU_LOWER, STATE)])
