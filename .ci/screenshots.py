@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Take the README's pictures of the pages, bags/live.png and bags/report.png, in a real browser.
+"""Take the pictures of the pages, doc/pictures/live.png and report.png, in a real browser.
 
 Usage: PYTHONPATH=.:test python .ci/screenshots.py, with the extras `ros`, `live` and `test`, and with chromium. Takes
 about a minute: the live page is that of `demo --live`, 45 s after its start.
@@ -20,7 +20,8 @@ from browser import open_page
 
 from adhesion_node.report.__main__ import main as report
 
-BAGS = Path(__file__).resolve().parent.parent / "bags"
+ROOT = Path(__file__).resolve().parent.parent
+BAGS, PICTURES = ROOT / "bags", ROOT / "doc" / "pictures"
 SHOWN_AT = "45 s"
 PATIENCE_MS = 90_000.0
 DEMO = (
@@ -41,7 +42,7 @@ def picture_live(folder: Path) -> None:
             page.set_viewport_size({"width": 1250, "height": 985})
             page.goto(f"http://127.0.0.1:{port}/")
             page.locator("#state").get_by_text(SHOWN_AT, exact=True).wait_for(timeout=PATIENCE_MS)
-            page.screenshot(path=BAGS / "live.png")
+            page.screenshot(path=PICTURES / "live.png")
     finally:
         demo.send_signal(signal.SIGINT)
         demo.communicate()
@@ -54,7 +55,7 @@ def picture_report(folder: Path) -> None:
     with open_page() as (page, _):
         page.set_viewport_size({"width": 1250, "height": 1350})
         page.goto(f"{(folder / 'report' / 'report.html').as_uri()}#t=40")
-        page.screenshot(path=BAGS / "report.png")
+        page.screenshot(path=PICTURES / "report.png")
 
 
 if __name__ == "__main__":

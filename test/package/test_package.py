@@ -112,6 +112,7 @@ def test_every_file_of_bags_is_installed_in_its_folder() -> None:
     recordings = [path.relative_to(ROOT) for path in (ROOT / "bags").rglob("*") if path.is_file()]
     assert recordings
     assert {(Path("share/adhesion_node") / path.parent, path) for path in recordings} <= installed
+    assert not [path for _, path in installed if path.suffix == ".png"]
 
 
 def test_every_source_folder_is_a_package() -> None:
@@ -156,13 +157,13 @@ def test_what_is_imported_is_declared() -> None:
     assert not any(ROS.fullmatch(name) for name in required), "ROS is no PyPI requirement; it stands in the extra `ros`"
 
 
-def test_rosdep_knows_every_key_and_the_readme_those_by_pip() -> None:
+def test_rosdep_knows_every_key_and_the_documentation_those_by_pip() -> None:
     keys = {depend.text for kind in ("exec_depend", "test_depend") for depend in manifest().findall(kind)}
     assert {key for key in keys if not ROS.fullmatch(str(key))} == BY_APT | BY_PIP
     assert {key for _, key in FROM_PYPI.values()} <= BY_APT | BY_PIP
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    skipped = re.search(r'^rosdep install .* --skip-keys "(.*)"$', readme, re.MULTILINE)
-    installed = re.search(r"^venv/bin/pip install '(rosbags.*)' '(mcap-ros2-support.*)'$", readme, re.MULTILINE)
+    page = (ROOT / "doc" / "install.md").read_text(encoding="utf-8")
+    skipped = re.search(r'^rosdep install .* --skip-keys "(.*)"$', page, re.MULTILINE)
+    installed = re.search(r"^venv/bin/pip install '(rosbags.*)' '(mcap-ros2-support.*)'$", page, re.MULTILINE)
     assert skipped is not None
     assert installed is not None
     assert set(skipped[1].split()) == BY_PIP
@@ -183,7 +184,7 @@ HEAD = "# Copyright 2026 the adhesion_node authors\n# SPDX-License-Identifier: A
 
 
 def test_every_python_file_states_copyright_and_license() -> None:
-    written = [path for folder in (*OWN, "test", ".ci") for path in (ROOT / folder).rglob("*.py")]
+    written = [path for folder in (*OWN, "test", "doc", ".ci") for path in (ROOT / folder).rglob("*.py")]
     assert len(written) > len(sources())
     texts = {path: path.read_text(encoding="utf-8") for path in (*written, ROOT / "setup.py")}
     bare = [str(path) for path, text in texts.items() if not re.match(rf"(#!.*\n)?{re.escape(HEAD)}", text)]

@@ -1,0 +1,124 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Tables of what the package offers to ROS, out of its declarations: parameters by node, topics, faults."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import groupby
+from pathlib import Path
+
+import adhesion_node
+from adhesion_node.nodes import atp_monitor, creep_estimator, estimator
+from adhesion_node.nodes.ros import qos
+from adhesion_node.nodes.ros.params import Spec
+from adhesion_node.wire import topics
+from adhesion_node.wire.topics import Topic
+from sim_node.faults.plan import FAULTS, NONE
+from sim_node.nodes import simulator, slip_simulator
+
+SOURCES = Path(adhesion_node.__file__).resolve().parent.parent
+
+NODES: dict[str, Sequence[Spec]] = {
+    "estimator": estimator.PARAMETERS,
+    "atp_monitor": atp_monitor.PARAMETERS,
+    "creep_estimator": creep_estimator.PARAMETERS,
+    "simulator": simulator.PARAMETERS,
+    "slip_simulator": slip_simulator.PARAMETERS,
+}
+
+MEANINGS = {
+    topics.POSITION: "**in**: measured position along the track, pose.position.x m, covariance[0] m²",
+    topics.BRAKE_PRESSURE: "**in**: brake cylinder, **absolute** Pa",
+    topics.SPEED: "**in**, optional: m/s; used while coasting, as a braked axle slides (`speed_while_braking`)",
+    topics.WHEEL_SPEED: "**in**, optional: rad/s, one velocity per axle. Sliding wheels show that adhesion limits, "
+    "rolling ones that the brake does. **In** of `creep_estimator`: the driven axles",
+    topics.TRACTION_FORCE: "**in** of `creep_estimator`: force.x N, all driven axles together, at the rim",
+    topics.MU: "μ̂, one per window",
+    topics.MU_LOWER: "its lower bound at the one-sided `confidence`, one per window",
+    topics.DECELERATION: "−μ̂ g, m/s², and its variance, stamped: the form for machines",
+    topics.STATE: "position and speed with their variances",
+    topics.BRAKING_CURVE: "full braking to standstill on `mu_lower`: 64 points, joint `train`",
+    topics.BRAKING_CURVE_NOMINAL: "the same on μ̂",
+    topics.CREEP_MU_MAX: "the peak of the creep curve; nothing while the data cannot tell it",
+    topics.CREEP_LAMBDA_M: "the creep at that peak",
+    topics.ATP_STATUS: "supervision: `level`, its limits in m/s, distance and margin in m",
+    topics.DIAGNOSTICS: "regime, window, ESS, drops by reason, digest; of `creep_estimator` p₁, p₂, the peak with its "
+    "standard deviation and bounds, whether and why it is withheld",
+    topics.TRUTH_STATE: "simulators only: position and speed as they are",
+    topics.TRUTH_MU: "simulators only: the available adhesion; of `slip_simulator` the peak",
+    topics.CLOCK: "time of a simulated or replayed run; the nodes follow it with `use_sim_time`",
+}
+"""What the messages of a topic say."""
+
+LATCHED = {topic for topic, profile in estimator.OUTPUTS.items() if profile is qos.EXPIRING}
+MEASURED = {*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH, topics.CLOCK}
+
+
+def parts() -> dict[str, str]:
+    """Return the tables by the name of their part."""
+    return {
+        **{f"parameters of {node}": "\n\n".join(_groups(specs)) for node, specs in NODES.items()},
+        "topics": table(("topic", "type", "QoS", "meaning"), map(_topic, MEANINGS)),
+        "house": table(("folder", "what is in it"), _house()),
+        "faults": table(("`fault`", "what happens", "lasts, s", "share", "size"), _faults()),
+    }
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a Markdown table."""
+    lines = [head, *rows]
+    shown = [f"| {' | '.join(cells)} |" for cells in lines]
+    return "\n".join([shown[0], "|" + "---|" * len(head), *shown[1:]])
+
+
+def _groups(specs: Sequence[Spec]) -> Iterator[str]:
+    """Yield a table for each group of settings, in the order of their declaration, under its name."""
+    head = ("parameter", "default", "unit", "range", "meaning")
+    for group, members in groupby(specs, key=lambda spec: getattr(spec, "group", "")):
+        if group:
+            yield f"### {group[0].upper()}{group[1:]}"
+        yield table(head, map(_parameter, members))
+
+
+def _parameter(spec: Spec) -> tuple[str, ...]:
+    default = f"{spec.default:.6g}" if isinstance(spec.default, float) else str(spec.default).lower()
+    return f"`{spec.name}`", default, spec.unit, _range(spec), spec.description
+
+
+def _range(spec: Spec) -> str:
+    if spec.choices:
+        return ", ".join(spec.choices)
+    if isinstance(spec.default, bool):
+        return "true, false"
+    return "text" if isinstance(spec.default, str) else f"{spec.minimum:g} to {spec.maximum:g}"
+
+
+def _topic(topic: Topic) -> tuple[str, ...]:
+    quality = "sensor" if topic in MEASURED else "latched" if topic in LATCHED else "result"
+    return f"`{topic.name}`", topic.type.replace("/msg/", "/"), quality, MEANINGS[topic]
+
+
+def _house() -> Iterator[tuple[str, str]]:
+    """Yield every package of the sources with its first sentence."""
+    for package in ("adhesion_node", "sim_node"):
+        for init in sorted((SOURCES / package).rglob("__init__.py")):
+            folder = init.parent.relative_to(SOURCES)
+            purpose = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+            yield f"`{folder.as_posix()}`", purpose.partition("\n")[0]
+
+
+def _faults() -> Iterator[tuple[str, ...]]:
+    for name, fault in FAULTS.items():
+        if name != NONE:
+            lasts, share, size = fault.dose.duration_s, fault.dose.share, fault.dose.size
+            sized = f"{size:g} {fault.size}" if fault.size else ""
+            yield (
+                f"`{name}`",
+                fault.description,
+                f"{lasts:g}" if 0.0 < lasts < 1e9 else "",
+                f"{100 * share:g} %" if share not in (0.0, 1.0) else "",
+                sized,
+            )
