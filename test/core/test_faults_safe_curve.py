@@ -10,9 +10,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesion_node.study.robust.fault_cases import CASES, Case
-from adhesion_node.study.robust.fault_runs import one
-from adhesion_node.study.robust.stopping import stopping_distances
+from adhesion_node.study.robust.cases import FAULTS as CASES
+from adhesion_node.study.robust.cases import Case
+from adhesion_node.study.trial.stopping import stopping_distances
 from sim_node.train.plant import advance
 from sim_node.train.scenario import SCENARIOS
 
@@ -29,12 +29,13 @@ KNOWN = [case for case in CASES if case.name in FAULTS]
 
 @pytest.mark.parametrize("case", KNOWN, ids=lambda case: case.name)
 def test_the_safe_curve_is_never_shorter_than_the_true_distance(case: Case) -> None:
-    config = replace(case.config, step=20)  # a quarter of the estimates, half the time
-    rows = one(case._replace(config=config), seed=1)["rows"]
-    under_fault = rows[rows["t_s"] >= case.start_s]
+    config = replace(case.estimator.config, step=20)  # a quarter of the estimates, half the time
+    trials = case.trials(1)._replace(first_seed=1, estimator=case.estimator._replace(config=config))
+    rows = trials.compute()["rows"]
+    under_fault = rows[rows["t_ns"] * 1e-9 >= case.world.plan.fault_start_s]
     assert under_fault.size >= 10
     assert np.all(np.isfinite(under_fault["safe_m"]))
-    assert np.mean(under_fault["safe_m"] >= under_fault["true_m"]) >= config.confidence
+    assert np.mean(under_fault["safe_m"] >= under_fault["true_stopping_m"]) >= config.confidence
 
 
 def test_no_fault_is_left_out_by_its_name() -> None:

@@ -4,25 +4,25 @@
 """`study tune-ekf`: the search behind the tuned EKF of the tables: a grid over its two standard deviations.
 
 Every pair runs through both scenarios from all starts, on the simulator seeds 5000, 5001, ... that no table uses;
-the pair with the least mean relative error wins.
+the pair with the least mean relative error wins. The filter does not know the track.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from dataclasses import asdict
-from functools import cache
 from itertools import product
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...command.options import DONE, report
-from ..trial.accuracy import errors
-from ..trial.running import add_running_options, run_all, running
-from ..trial.runs import simulate
-from ..trial.tasks import EVERY_SOURCE, Arrays
-from ..xie.methods import PAPER, STARTS, Lane, ekf
+from ..trial.running import add_running_options, running
+from ..trial.score import score
+from ..trial.text import Column, lines
+from ..trial.trials import Trials, grouped
+from ..xie.methods import CHUNK, METHODS, trials
 from ..xie.published import TABLES
 from .ekf import TUNED, Tuning
 
@@ -31,34 +31,12 @@ FIRST_SEED = 5000
 MU_STDS = (0.003, 0.005, 0.01, 0.02, 0.03, 0.05)
 MU_NOISES = (2e-4, 3e-4, 4e-4, 5e-4, 6e-4, 8e-4, 1e-3, 2e-3)
 
-SIGMA_M = 0.5
-
-
-class Trial(NamedTuple):
-    """A tuning on runs of both scenarios from all starts."""
-
-    tuning: Tuning
-    runs: int
-
-    @property
-    def name(self) -> str:
-        """Readable beginning of its file's name."""
-        return "tune-ekf"
-
-    @property
-    def weight(self) -> float:
-        """All are alike."""
-        return 1.0
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        """Where its numbers come from."""
-        return EVERY_SOURCE
-
-    def compute(self) -> Arrays:
-        """Mean relative error, %."""
-        found = errors(ekf(self.tuning)(PAPER, _lanes(self.runs)).rows)
-        return {"percent": np.array(np.mean(found.relative_percent))}
+COLUMNS = (
+    Column("mu_std", 8, "g", "mu_std"),
+    Column("mu_noise", 9, "g", "mu_noise"),
+    Column("error, %", 9, ".3f", "mean_relative_error_percent"),
+    Column("", 6, "", lambda row: "in use" if Tuning(row["mu_std"], row["mu_noise"]) == TUNED else ""),
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -67,33 +45,24 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_running_options(parser)
 
 
+def grid(runs: int) -> Iterator[tuple[tuple[Tuning, str], Trials]]:
+    """Yield every pair of standard deviations with each scenario, and its trials."""
+    for scenario in TABLES:
+        for tuning in (Tuning(*values) for values in product(MU_STDS, MU_NOISES)):
+            estimator = METHODS["ekf_tuned"]._replace(tuning=tuning, knows_track=False)
+            yield (tuning, scenario), trials(scenario, estimator, runs)._replace(first_seed=FIRST_SEED)
+
+
 def run(options: argparse.Namespace) -> int:
     """Search the grid and print it, best first."""
-    if options.runs < 1:
-        raise ValueError(f"runs = {options.runs}: give at least 1")
-    trials = [Trial(Tuning(*values), options.runs) for values in product(MU_STDS, MU_NOISES)]
-    percents = [float(result["percent"]) for result in run_all(trials, running(options))]
-    table = [
-        {**asdict(trial.tuning), "runs": trial.runs, "mean_relative_error_percent": percent}
-        for percent, trial in sorted(zip(percents, trials, strict=True), key=lambda pair: pair[0])
+    found = grouped(grid(options.runs), CHUNK, running(options))
+    errors: dict[Tuning, list[float]] = {}
+    for (tuning, _), results in found.items():
+        errors.setdefault(tuning, []).append(score(results)["mean_relative_error_percent"])
+    table: list[dict[str, Any]] = [
+        {**asdict(tuning), "runs": options.runs, "mean_relative_error_percent": float(np.mean(of_scenarios))}
+        for tuning, of_scenarios in errors.items()
     ]
-    lines = [f"{'mu_std':>8} {'mu_noise':>9} {'error, %':>9}"]
-    lines += [
-        f"{row['mu_std']:8g} {row['mu_noise']:9g} {row['mean_relative_error_percent']:9.3f}"
-        + ("  in use" if Tuning(row["mu_std"], row["mu_noise"]) == TUNED else "")
-        for row in table
-    ]
-    report(options.json, table, "\n".join(lines))
+    table.sort(key=lambda row: float(row["mean_relative_error_percent"]))
+    report(options.json, table, "\n".join(lines(COLUMNS, table)))
     return DONE
-
-
-@cache
-def _lanes(runs: int) -> list[Lane]:
-    """The same for every tuning, so a process simulates them once."""
-    return [
-        Lane(seed, start, simulated)
-        for scenario in TABLES
-        for seed in range(FIRST_SEED, FIRST_SEED + runs)
-        for simulated in (simulate(scenario, seed, SIGMA_M),)
-        for start in STARTS
-    ]

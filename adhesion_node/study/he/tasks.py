@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core.creep.config import CreepConfig
 from ...core.physics.train import Array
-from ..trial.tasks import EVERY_SOURCE, Arrays
+from ..trial.tasks import Arrays
 from . import beyond as creep_beyond
 from .runs import ONE, RISE, one_surface, rise, swings, switched
 
@@ -44,11 +44,6 @@ class Experiment(NamedTuple):
     def weight(self) -> float:
         """How much work it is: the samples."""
         return float(self.samples if self.movement is None else 2 * self.samples_of_surface)
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        """Where its numbers come from."""
-        return EVERY_SOURCE
 
     @property
     def samples_of_surface(self) -> int:
@@ -90,11 +85,6 @@ class Beyond(NamedTuple):
     def weight(self) -> float:
         """How much work it is beside the samples of an experiment."""
         return 8000.0
-
-    @property
-    def sources(self) -> tuple[str, ...]:
-        """Where its numbers come from."""
-        return EVERY_SOURCE
 
     def compute(self) -> Arrays:
         """The values as JSON in one text."""

@@ -1,64 +1,135 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The second table of `study robust`: faults of sensors, messages, clock and train, each beside the run without it."""
+"""The second table of `study robust`: faults of sensors, messages, clock and train, each beside the run without it.
+
+Figures count from the beginning of the fault on; B's errors are those at the same times. Differences to B are in
+standard deviations, the larger of both, while adhesion limits.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..trial.running import Running, run_all
-from ..trial.runs import FIRST_SEED
-from ..trial.tasks import Arrays
-from .fault_cases import CASES, Case
-from .fault_rows import figures
-from .fault_runs import Runs
+from ..trial.running import Running
+from ..trial.score import of, score
+from ..trial.text import Column
+from ..trial.trials import Results, Rows, each_trial, grouped
+from .cases import FAULTS, Case
 
 CHUNK = 10
 """Seeds in a task."""
 
+NEAR = 3.0
+"""Standard deviations within which an estimate counts as that of B."""
 
-def table(runs: int, where: Running) -> list[dict[str, Any]]:
+ESTIMATE = ["seed", "t_ns", "mu", "std", "lower", "safe_m"]
+"""What must agree, to the bit, for two estimates to be the same."""
+
+
+def _dropped(row: Mapping[str, Any]) -> str:
+    told = row["told_s"]
+    return ", ".join(f"{reason} {count:.0f} ({told[reason]:.1f})" for reason, count in row["dropped"].items()) or "-"
+
+
+COLUMNS = (
+    Column("fault", 32, "", "case"),
+    Column("error %", 7, ".2f", "mean_relative_error_percent"),
+    Column("B", 5, ".2f", "b_mean_relative_error_percent"),
+    Column("ratio", 5, ".2f", "ratio_to_b"),
+    Column("cover", 5, ".2f", "coverage90"),
+    Column("bound", 6, ".3f", "lower_bound_holds"),
+    Column("safe curve", 10, ".3f", "safe_curve_holds"),
+    Column("to B, std", 9, ".1f", "largest_difference_std"),
+    Column("rail", 4, "", "rail_changes"),
+    Column("again s", 7, ".1f", "full_window_again_s"),
+    Column(" dropped in a run, from s on", 0, "", lambda row: f" {_dropped(row)}"),
+)
+
+
+def rows(runs: int, where: Running) -> list[dict[str, Any]]:
     """Run what is missing; a row per fault."""
-    wanted = {case: _tasks(case, runs) for case in dict.fromkeys((*(case.without for case in CASES), *CASES))}
-    results = run_all([task for tasks in wanted.values() for task in tasks], where)
-    found = {case: _together([next(results) for _ in tasks]) for case, tasks in wanted.items()}
-    return [figures(case, found[case], found[case.without]) for case in CASES]
+    cases = dict.fromkeys((*(case.without for case in FAULTS), *FAULTS))
+    found = grouped(((case, case.trials(runs)) for case in cases), CHUNK, where)
+    return [row(case, found[case], found[case.without]) for case in FAULTS]
 
 
-def _tasks(case: Case, runs: int) -> list[Runs]:
-    return [Runs(case, FIRST_SEED + first, min(CHUNK, runs - first)) for first in range(0, runs, CHUNK)]
+def row(case: Case, found: Results, b: Results) -> dict[str, Any]:
+    """Figures of a case; None where it has nothing to say of one."""
+    start_s = case.world.plan.fault_start_s
+    found = found.where(found.rows["t_ns"] * 1e-9 >= start_s)
+    known = found.rows[~found.rows["withheld"]]
+    against = beside(known, b.rows)
+    own, of_b = score(found), score(found._replace(rows=against))
+    error, b_error = own["mean_relative_error_percent"], of_b["mean_relative_error_percent"]
+    return {
+        "table": "faults",
+        **case.head,
+        "fault": case.world.plan.fault,
+        "from_s": start_s,
+        "lasts_s": case.world.lasts_s if case.passes else None,
+        **own,
+        "rail_changes": own["changes_told"],
+        "b_mean_relative_error_percent": b_error,
+        "ratio_to_b": None if error is None else error / b_error,
+        "shift": None if error is None else own["mean_error"] - of_b["mean_error"],
+        **_differences(case.estimator.config.window, known, against),
+        **_recovery(case, found),
+        **_told(start_s, found),
+        "resets": float(np.mean(found.runs["resets"])),
+        "finite": bool(np.all(found.runs["finite"])),
+        "identical": of(np.mean, np.isin(known[ESTIMATE], b.rows[ESTIMATE])),
+    }
 
 
-def _together(parts: Sequence[Arrays]) -> Arrays:
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+def beside(rows: Rows, b: Rows) -> Rows:
+    """Copy rows with the error and the standard deviation that B has at their times."""
+    against = rows.copy()
+    for own in each_trial(against):  # parts of `against`, not copies
+        of_b = b[b["seed"] == own["seed"][0]]
+        error, std = (np.interp(own["t_ns"], of_b["t_ns"], of) for of in (of_b["mu"] - of_b["true_mu"], of_b["std"]))
+        own["mu"], own["std"] = own["true_mu"] + error, std
+    return against
 
 
-def lines(rows: Sequence[dict[str, Any]]) -> Iterator[str]:
-    """The table for people."""
-    yield (
-        f"{'fault':>32} {'error %':>7} {'B':>5} {'ratio':>5} {'cover':>5} {'bound':>6}"
-        f" {'safe curve':>10} {'to B, std':>9} {'rail':>4} {'again s':>7}  dropped in a run, from s on"
-    )
-    for row in rows:
-        cells = (
-            _text(row["mean_relative_error_percent"], "7.2f"),
-            _text(row["b_mean_relative_error_percent"], "5.2f"),
-            _text(row["ratio_to_b"], "5.2f"),
-            _text(row["coverage90"], "5.2f"),
-            _text(row["lower_bound_holds"], "6.3f"),
-            _text(row["safe_curve_holds"], "10.3f"),
-            _text(row["largest_difference_std"], "9.1f"),
-            f"{row['rail_changes']:4}",
-            _text(row["full_window_again_s"], "7.1f"),
-        )
-        told = row["told_s"]
-        dropped = [f"{reason} {count:.0f} ({told[reason]:.1f})" for reason, count in row["dropped"].items()]
-        yield f"{row['case']:>32} {' '.join(cells)}  {', '.join(dropped) or '-'}"
+def _differences(window: int, known: Rows, against: Rows) -> dict[str, float | None]:
+    difference = (known["mu"] - against["mu"]) / np.maximum(known["std"], against["std"])
+    settled = np.abs(difference[_settled(known, window)])
+    return {
+        "largest_difference_std": of(np.max, settled),
+        "within_3_std": of(np.mean, settled <= NEAR),
+        "lowest_difference_std": of(np.min, difference[known["limited"]]),
+    }
 
 
-def _text(value: float | None, form: str) -> str:
-    return f"{'-':>{form.partition('.')[0]}}" if value is None else f"{value:{form}}"
+def _settled(known: Rows, window: int) -> NDArray[np.bool_]:
+    """Which estimates come after a full window of measurements since the fault is over."""
+    full = [(own["fresh"] >= window) & (own["window"] >= window) for own in each_trial(known)]
+    since = np.concatenate([np.zeros(0, np.bool_), *map(np.logical_or.accumulate, full)])
+    return np.asarray(since & known["limited"])
+
+
+def _recovery(case: Case, found: Results) -> dict[str, float | None]:
+    """Longest time from the end of a fault that passes to an estimate, and to one of a full window; None: never."""
+    over_s, seeds = case.world.over_s, found.runs["seed"]
+    after = found.rows[~found.rows["withheld"] & (found.rows["t_ns"] * 1e-9 >= over_s)]
+    longest = dict[str, float | None]()
+    for name, window in (("estimate_again_s", 2), ("full_window_again_s", case.estimator.config.window)):
+        times = [after["out_s"][(after["seed"] == seed) & (after["window"] >= window)] for seed in seeds]
+        seen = case.passes and all(map(np.size, times))
+        longest[name] = max(float(of_run[0]) for of_run in times) - over_s if seen else None
+    return longest
+
+
+def _told(start_s: float, found: Results) -> dict[str, dict[str, float]]:
+    """Messages dropped in a run by reason, and how long after the beginning of the fault at the latest."""
+    reasons = found.drops["reason"]
+    by_reason = {str(reason): found.drops[reasons == reason] for reason in np.unique(reasons)}
+    return {
+        "dropped": {reason: float(np.sum(some["count"]) / len(found.runs)) for reason, some in by_reason.items()},
+        "told_s": {reason: float(np.max(some["first_s"]) - start_s) for reason, some in by_reason.items()},
+    }

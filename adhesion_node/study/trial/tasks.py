@@ -25,8 +25,8 @@ Arrays = Mapping[str, NDArray[Any]]
 PACKAGES = Path(__file__).parents[3]
 """The folder that holds the packages."""
 
-EVERY_SOURCE = ("adhesion_node/**/*.py", "sim_node/**/*.py")
-"""Where the numbers of a task come from that runs the estimator."""
+SOURCES = ("adhesion_node/**/*.py", "sim_node/**/*.py")
+"""Where the numbers of a task come from, below `PACKAGES`."""
 
 
 class Task(Protocol):
@@ -40,17 +40,13 @@ class Task(Protocol):
     def weight(self) -> float:
         """How much work it is beside the other tasks of its study."""
 
-    @property
-    def sources(self) -> tuple[str, ...]:
-        """Patterns of the source files, below `PACKAGES`, that its numbers come from."""
-
     def compute(self) -> Arrays:
         """Do the work."""
 
 
 def file_name(task: Task) -> str:
     """Name of the task's file in the cache."""
-    text = f"{task!r} {np.__version__} {_code(task.sources)}"
+    text = f"{task!r} {np.__version__} {_code(PACKAGES)}"
     return f"{task.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
 
@@ -71,7 +67,7 @@ def save(task: Task, result: Arrays, cache: Path) -> None:
 
 
 @once
-def _code(patterns: tuple[str, ...]) -> str:
+def _code(packages: Path) -> str:
     """Digest of the sources."""
-    sources = [source for pattern in patterns for source in sorted(PACKAGES.glob(pattern))]
+    sources = [source for pattern in SOURCES for source in sorted(packages.glob(pattern))]
     return hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()

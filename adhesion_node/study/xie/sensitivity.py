@@ -16,11 +16,11 @@ from dataclasses import replace
 from typing import Any
 
 from ...command.options import DONE, report
-from ..trial.accuracy import figures
 from ..trial.running import add_running_options, running
-from ..trial.runs import FIRST_SEED
-from .methods import STARTS
-from .montecarlo import Chunk, Result, results
+from ..trial.score import score
+from ..trial.text import Column, lines
+from ..trial.trials import Trials, grouped
+from .methods import CHUNK, METHODS, STARTS, trials
 from .published import START_OF_MEAN, TABLES
 
 SCENARIO = "tunnel_entry"
@@ -34,6 +34,17 @@ VARIED: dict[str, tuple[int, ...] | tuple[float, ...]] = {
 }
 """Values of each setting, the nominal one among them."""
 
+COLUMNS = (
+    Column("setting", 10, "", "setting"),
+    Column("value", 6, "g", "value"),
+    Column("method", 12, "", "method"),
+    Column("error", 6, ".2f", "mean_relative_error_percent"),
+    Column("std", 5, ".2f", "std_relative_error_percent"),
+)
+
+Line = tuple[str, float, str]
+"""Setting, value and method of a line of the table."""
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study sensitivity`."""
@@ -41,45 +52,40 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_running_options(parser)
 
 
-def variations(runs: int) -> Iterator[tuple[str, float, Chunk]]:
-    """Setting, value and chunk of every line of the table."""
+def variations(runs: int) -> Iterator[tuple[Line, Trials]]:
+    """Yield every line of the table and its trials."""
     for setting, values in VARIED.items():
         for method in ("particle_em", "ekf_tuned") if setting == "sigma_m" else ("particle_em",):
             for value in values:
-                yield setting, value, _changed(Chunk(SCENARIO, method, 0.5, FIRST_SEED, runs), {setting: value})
+                yield (setting, value, method), _changed(method, runs, setting, value)
 
 
-def _changed(chunk: Chunk, change: dict[str, Any]) -> Chunk:
-    """Change a field of the chunk or a setting of its estimator."""
-    if change.keys() <= set(Chunk._fields):
-        return chunk._replace(**change)
-    return chunk._replace(config=replace(chunk.config, **change))
+def _changed(method: str, runs: int, setting: str, value: Any) -> Trials:
+    """Change the noise of the positions, the estimator's seeds or a setting of it."""
+    estimator = METHODS[method]
+    if setting == "sigma_m":
+        return trials(SCENARIO, estimator, runs, value)
+    if setting == "seed_shift":
+        return trials(SCENARIO, estimator._replace(seed_shift=value), runs)
+    return trials(SCENARIO, estimator._replace(config=replace(estimator.config, **{setting: value})), runs)
 
 
 def run(options: argparse.Namespace) -> int:
     """Run what is missing and print a line per setting and value."""
-    if options.runs < 1:
-        raise ValueError(f"runs = {options.runs}: give at least 1")
-    wanted = list(variations(options.runs))
-    found = results([chunk for _, _, chunk in wanted], running(options))
-    table = [_row(setting, value, result) for (setting, value, _), result in zip(wanted, found, strict=True)]
-    report(options.json, table, "\n".join(_lines(table)))
+    found = grouped(variations(options.runs), CHUNK, running(options))
+    table = [_row(*line, score(of_line)) for line, of_line in found.items()]
+    report(options.json, table, "\n".join(_text(table)))
     return DONE
 
 
-def _row(setting: str, value: float, result: Result) -> dict[str, Any]:
-    of_starts = [result.rows[start :: len(STARTS)] for start in range(len(STARTS))]
-    return {"setting": setting, "value": value, "method": result.chunk.method, **figures(of_starts)}
+def _row(setting: str, value: float, method: str, of_line: dict[str, Any]) -> dict[str, Any]:
+    holds = of_line["lower_bound_holds_scored"]
+    return {"setting": setting, "value": value, "method": method, **of_line, "lower_bound_holds": holds}
 
 
-def _lines(table: list[dict[str, Any]]) -> Iterator[str]:
+def _text(table: list[dict[str, Any]]) -> Iterator[str]:
     yield f"mean relative error of mu, %, {SCENARIO}, mean over {len(STARTS)} starts; spread over the runs"
-    yield f"{'setting':>10} {'value':>6} {'method':>12} {'error':>6} {'std':>5}"
-    for row in table:
-        yield (
-            f"{row['setting']:>10} {row['value']:6g} {row['method']:>12} {row['mean_relative_error_percent']:6.2f}"
-            f" {row['std_relative_error_percent']:5.2f}"
-        )
+    yield from lines(COLUMNS, table)
     paper = TABLES[SCENARIO][START_OF_MEAN].of("particle_em")[1]
     met = [
         row["value"]

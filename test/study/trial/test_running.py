@@ -17,14 +17,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pytest
 
-from adhesion_node.core import Config
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.he.runs import VARYING_ETA
 from adhesion_node.study.he.tasks import Experiment
 from adhesion_node.study.trial import engines, running, tasks
+from adhesion_node.study.trial.estimators import Estimator
 from adhesion_node.study.trial.running import Running, run_all
 from adhesion_node.study.trial.tasks import Arrays, Task, file_name, load, save
-from adhesion_node.study.xie.montecarlo import Chunk
+from adhesion_node.study.trial.trials import Trials
+from adhesion_node.study.trial.world import World
 
 if TYPE_CHECKING:
     from distributed import LocalCluster
@@ -32,8 +33,7 @@ if TYPE_CHECKING:
 TIMEOUT_S = 60.0
 
 
-CHUNK = Chunk("tunnel_exit", "particle_em", 0.5, 1000, 1, Config(window=20, particles=5, iterations=2))
-"""A chunk of the paper's method in little time."""
+TRIALS = Trials(World("tunnel_exit"), Estimator(way="ekf"))
 
 TIMES = ("seconds", "window_ms")
 
@@ -44,7 +44,6 @@ class Square(NamedTuple):
     number: float
     folder: str = ""
     kind: str = "square"
-    sources: tuple[str, ...] = ()
     weight: float = 1.0
 
     @property
@@ -62,7 +61,6 @@ class Killed(NamedTuple):
     """Is killed as the kernel kills what takes too much memory."""
 
     name: str = "killed"
-    sources: tuple[str, ...] = ()
     weight: float = 1.0
 
     def compute(self) -> Arrays:
@@ -95,12 +93,12 @@ def test_a_result_comes_back_from_the_cache_whole(tmp_path: Path) -> None:
 
 
 def test_a_file_is_that_of_the_fields_and_the_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tasks, "PACKAGES", tmp_path)
-    names = {file_name(task) for task in (CHUNK, Square(1.0), Square(2.0), Square(1.0, kind="other"), Killed())}
-    for code in ("a = 1", "a = 2"):
-        (tmp_path / "numbers.py").write_text(code)
-        tasks._code.cache_clear()
-        names.add(file_name(Square(1.0, sources=("n*.py",))))
+    names = {file_name(task) for task in (TRIALS, Square(1.0), Square(2.0), Square(1.0, kind="other"), Killed())}
+    for folder, code in (("one", "a = 1"), ("other", "a = 2")):
+        (tmp_path / folder / "sim_node").mkdir(parents=True)
+        (tmp_path / folder / "sim_node" / "numbers.py").write_text(code)
+        monkeypatch.setattr(tasks, "PACKAGES", tmp_path / folder)
+        names.add(file_name(Square(1.0)))
     assert len(names) == 7
 
 
@@ -122,7 +120,8 @@ def test_a_cluster_takes_the_place_of_the_workers(tmp_path: Path, dask: LocalClu
 
 
 def test_a_cluster_gives_the_numbers_of_the_processes(tmp_path: Path, dask: LocalCluster) -> None:
-    wanted: list[Task] = [CHUNK, CHUNK._replace(method="ekf_tuned"), CHUNK._replace(first_seed=1001)]
+    pipeline = TRIALS._replace(estimator=Estimator())
+    wanted: list[Task] = [TRIALS, pipeline, TRIALS._replace(first_seed=1001)]
     wanted += [Experiment(2, 1), Experiment(2, 1, VARYING_ETA, 50, "swings")]
     ours = list(run_all(wanted, Running(tmp_path / "processes", workers=2)))
     theirs = list(run_all(wanted, Running(tmp_path / "cluster", scheduler=dask.scheduler_address)))
@@ -183,16 +182,13 @@ import socket, sys
 from pathlib import Path
 from typing import NamedTuple
 from adhesion_node.command.options import run_tool
-from adhesion_node.study.he.runs import VARYING_ETA
-from adhesion_node.study.he.tasks import Experiment
-from adhesion_node.study.xie.montecarlo import Chunk
 from adhesion_node.study.trial.running import Running, run_all
 import argparse
 
 class Endless(NamedTuple):
     number: int
     port: int
-    name, weight, sources = "endless", 1.0, ()
+    name, weight = "endless", 1.0
 
     def compute(self):
         held = socket.create_connection(("127.0.0.1", self.port))

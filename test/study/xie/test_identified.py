@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,23 +18,29 @@ from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.trial.running import Running
-from adhesion_node.study.trial.runs import ROW
+from adhesion_node.study.trial.trials import DROP, ROW, RUN, Results, Rows, Trials
 from adhesion_node.study.xie import distances, identified, sensitivity, tables
-from adhesion_node.study.xie.methods import STARTS
-from adhesion_node.study.xie.montecarlo import Chunk, Result
+from adhesion_node.study.xie.methods import METHODS, STARTS, trials
+
+Key = tuple[str, ...]
 
 
-def a_run(from_kmh: float, to_kmh: float, scale: float) -> np.ndarray:
+def a_run(from_kmh: float, to_kmh: float, scale: float) -> Rows:
     """A run whose estimates are the wet law times `scale`, and nonsense during the first 30 km/h."""
     speeds = np.linspace(from_kmh, to_kmh, 200) * KMH
-    mu = np.where(speeds > (from_kmh - 30.0) * KMH, 0.001, scale * WET(speeds))
-    rows = zip(speeds, WET(speeds), mu, strict=True)
-    return np.array([(i, speed, true, mu, 0.01, 0.0, True, True) for i, (speed, true, mu) in enumerate(rows)], ROW)
+    rows = np.zeros(speeds.size, dtype=ROW)
+    rows["t_ns"], rows["true_speed_mps"], rows["true_mu"] = np.arange(speeds.size), speeds, WET(speeds)
+    rows["mu"] = np.where(speeds > (from_kmh - 30.0) * KMH, 0.001, scale * WET(speeds))
+    rows["std"], rows["limited"], rows["scored"] = 0.01, True, True
+    return rows
 
 
-def result(scenario: str, runs: Sequence[np.ndarray], method: str = "particle_em") -> Result:
-    chunk = Chunk(scenario, method, 0.5, 1000, len(runs) // len(STARTS))
-    return Result(chunk, list(runs), 0.0, np.zeros(1))
+def results(runs: Sequence[Rows]) -> Results:
+    """Runs from one start each."""
+    for rows, start in zip(runs, STARTS, strict=True):
+        rows["start"] = start
+    table = np.array([(0, start, 0, True) for start in STARTS], dtype=RUN)
+    return Results(np.concatenate(runs), table, np.array([], dtype=DROP), np.zeros(1), np.zeros(1))
 
 
 def test_the_true_law_gives_its_own_distance_save_for_the_first_30_kmh() -> None:
@@ -52,11 +58,11 @@ def test_a_run_without_converged_estimates_is_refused() -> None:
 
 
 def test_rows_tell_mean_band_and_saving() -> None:
-    results = [
-        result(name, [a_run(*speeds, scale) for scale in (0.9, 0.95, 1.0, 1.05, 1.1)])
+    cells = {
+        (name, "particle_em"): results([a_run(*speeds, scale) for scale in (0.9, 0.95, 1.0, 1.05, 1.1)])
         for name, speeds in identified.BRAKINGS.items()
-    ]
-    entry, leaving = identified.rows(results)
+    }
+    entry, leaving = identified.rows(cells)
     assert (entry["from_kmh"], entry["runs"], leaving["to_kmh"]) == (300.0, 1, 50.0)
     for row in (entry, leaving):
         assert row["distance_m_p5"] < row["distance_m"] < row["distance_m_p95"]
@@ -65,21 +71,22 @@ def test_rows_tell_mean_band_and_saving() -> None:
         assert row["time_s_saved_percent"] == pytest.approx(100 - 100 * row["time_s"] / fixed.time_s[-1])
 
 
-def test_both_methods_stand_beside_each_other_on_the_chunks_of_the_tables(
+def test_both_methods_stand_beside_each_other_on_the_trials_of_the_tables(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[Chunk] = []
+    asked: list[Trials] = []
 
-    def computed(wanted: Sequence[Chunk], _where: Running) -> list[Result]:
+    def computed(wanted: Iterable[tuple[Key, Trials]], _chunk: int, _where: Running) -> dict[Key, Results]:
         """Where the paper's method reads mu 10 % too low, and the default one is right."""
-        asked.extend(wanted)
-        found = []
-        for chunk in wanted:
-            run = a_run(*identified.BRAKINGS[chunk.scenario], 0.9 if chunk.method == "particle_em" else 1.0)
-            found.append(result(chunk.scenario, [run] * len(STARTS), chunk.method))
+        found = {}
+        for key, some in wanted:
+            asked.append(some)
+            scale = 0.9 if some.estimator.way == "lockstep" else 1.0
+            run = a_run(*identified.BRAKINGS[some.world.scenario], scale)
+            found[key] = results([run.copy() for _ in STARTS])
         return found
 
-    monkeypatch.setattr(distances, "results", computed)
+    monkeypatch.setattr(distances, "grouped", computed)
     assert main(["distances", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
     table = [row for row in json.loads((tmp_path / "table.json").read_text()) if row["case"] == "identified"]
     assert [(row["from_kmh"], row["method"]) for row in table] == [
@@ -93,35 +100,43 @@ def test_both_methods_stand_beside_each_other_on_the_chunks_of_the_tables(
     assert [line.split()[3] for line in lines] == ["particle_em", "rail_condition"] * 2
     assert [float(line.split()[4]) for line in lines] == pytest.approx([row["distance_m"] for row in table], abs=0.05)
 
-    by_distances = set(map(repr, asked))
+    by_distances = set(asked)
     asked.clear()
-    monkeypatch.setattr(tables, "results", computed)
-    monkeypatch.setattr(tables, "rows", lambda _cell: ())
+    monkeypatch.setattr(tables, "grouped", computed)
+    monkeypatch.setattr(tables, "rows", lambda _cell, _found: ())
+    monkeypatch.setattr(tables, "_digest_lines", lambda _table: ())
     assert main(["tables", "--runs", "1"]) == 0
-    assert by_distances <= set(map(repr, asked))
+    assert by_distances <= set(asked)
 
 
 def test_one_setting_at_a_time_leaves_the_nominal_ones() -> None:
-    nominal = Chunk("tunnel_entry", "particle_em", 0.5, 1000, 3)
-    for setting, value, chunk in sensitivity.variations(3):
-        varied = chunk if setting in Chunk._fields else chunk.config
-        assert getattr(varied, setting) == value
-        config = replace(chunk.config, window=50, step=10, particles=20)
-        assert chunk._replace(method="particle_em", sigma_m=0.5, config=config, seed_shift=0) == nominal
-        changed = (chunk.sigma_m != 0.5, chunk.config != nominal.config, chunk.seed_shift != 0)
+    nominal = {method: trials("tunnel_entry", METHODS[method], 3) for method in ("particle_em", "ekf_tuned")}
+    for (setting, value, method), varied in sensitivity.variations(3):
+        world, (config, *_) = varied.world, varied.estimator
+        shown = {"sigma_m": world.sensors.position_std_m, "seed_shift": varied.estimator.seed_shift}
+        assert value == (shown[setting] if setting in shown else getattr(config, setting))
+        sensors = replace(world.sensors, position_std_m=0.5)
+        config = replace(config, window=50, step=10, particles=20)
+        like_nominal = varied._replace(
+            world=world._replace(sensors=sensors), estimator=varied.estimator._replace(config=config, seed_shift=0)
+        )
+        assert like_nominal == nominal[method]
+        changed = [world.sensors != sensors, varied.estimator.config != config, varied.estimator.seed_shift != 0]
         assert changed.count(True) <= 1
 
 
 def test_the_sensitivity_table_says_where_the_papers_figure_is_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def computed(wanted: Sequence[Chunk], _where: Running) -> list[Result]:
+    def computed(wanted: Iterable[tuple[Key, Trials]], _chunk: int, _where: Running) -> dict[Key, Results]:
         """Errors of 1, 1.5, 10 ... %: rising with the noise."""
         scales = {0.05: 1.01, 0.1: 1.015}
-        runs = [[a_run(300.0, 100.0, scales.get(chunk.sigma_m, 1.1))[40:]] * len(STARTS) for chunk in wanted]
-        return [Result(chunk, some, 0.0, np.zeros(1)) for chunk, some in zip(wanted, runs, strict=True)]
+        return {
+            key: results([a_run(300.0, 100.0, scales.get(some.world.sensors.position_std_m, 1.1))[40:] for _ in STARTS])
+            for key, some in wanted
+        }
 
-    monkeypatch.setattr(sensitivity, "results", computed)
+    monkeypatch.setattr(sensitivity, "grouped", computed)
     assert main(["sensitivity", "--runs", "1", "--json", str(tmp_path / "table.json")]) == 0
     assert "the paper's 1.87 % is met up to sigma = 0.1 m" in capsys.readouterr().out
     first = json.loads((tmp_path / "table.json").read_text())[0]

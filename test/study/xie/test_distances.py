@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""`study`: the published braking distances and times, as a table and as JSON."""
+"""`study distances`: the published braking distances and times, as a table and as JSON."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from pathlib import Path
 import pytest
 
 from adhesion_node.study.__main__ import main
-from adhesion_node.study.xie import braking_figures
+from adhesion_node.study.xie import braking_figures, distances
+from adhesion_node.study.xie.published import SAVINGS
 
 PUBLISHED = {
     (300, 100, "0.1542"): (3060.7, 56.1),
@@ -88,6 +89,16 @@ def test_the_figures_of_the_brakings(tmp_path: Path) -> None:
     files = sorted(tmp_path.glob("new/figures/*.png"))
     assert [int(file.name[3:5]) for file in files] == [2, 3, 10, 11, 12, 13, 20, 21]
     assert all(file.stat().st_size > 10_000 for file in files)
+
+
+def test_savings_beside_the_papers() -> None:
+    found = list(distances.savings(list(distances.rows())))
+    assert [(row["from_kmh"], row["to_kmh"]) for row in found] == [(300, 100), (250, 50)]
+    for row in found:
+        assert row["distance_percent"] == pytest.approx(row["paper_distance_percent"], abs=4.0)
+        assert row["time_percent"] == pytest.approx(row["paper_time_percent"], abs=4.0)
+    printed = [100 * (1 - 3481.1 / 3946.7), 100 * (1 - 2614.4 / 2958.9)]
+    assert printed == pytest.approx([saving.distance_percent for saving in SAVINGS], abs=0.01)
 
 
 @pytest.mark.parametrize("scene", braking_figures.SCENES)

@@ -1,0 +1,158 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a trial tries: an estimator's settings, and the ways in which it runs through simulated runs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
+from typing import NamedTuple
+
+from ...core import Config, Estimate, Outcome, finish, init, step
+from ...core.prediction import Prediction
+from ...run.pipeline import Pipeline
+from ..baselines.ekf import TUNED, EkfConfig, Tuning, ekf_init, ekf_step
+from ..xie import lockstep
+from .world import Refusal, Run
+
+
+class Lane(NamedTuple):
+    """A simulated run from one start of mu."""
+
+    run: Run
+    start_mu: float
+
+
+class Seen(NamedTuple):
+    """A prediction, when it came out, how much had been accepted by then, and whether the end of the data gave it."""
+
+    prediction: Prediction
+    out_s: float
+    accepted: int = 0
+    at_end: bool = False
+
+
+class Course(NamedTuple):
+    """What came out of a lane."""
+
+    seen: list[Seen]
+    resets: int = 0
+    accepted_before: int = 0
+    """Measurements accepted before the fault was over."""
+    dropped: Mapping[str, int] = MappingProxyType({})
+    """Messages that were not used, by reason."""
+    dropped_s: Mapping[str, float] = MappingProxyType({})
+    """When the first one was."""
+
+
+class Tried(NamedTuple):
+    """The courses of all lanes."""
+
+    courses: list[Course]
+    window_ms: list[float]
+    """Time per window, all included: of each lane, or of each moment's windows together."""
+
+
+class Estimator(NamedTuple):
+    """A way to run and its settings."""
+
+    config: Config = Config()
+    """The start of mu is that of the lane."""
+    way: str = "pipeline"
+    """One of `WAYS`."""
+    tuning: Tuning = TUNED
+    """Of the way "ekf"."""
+    knows_track: bool = True
+    seed_shift: int = 0
+    """Added to a run's seed it gives that of its estimator."""
+
+    def config_in(self, lane: Lane) -> Config:
+        """Settings for a lane."""
+        track = lane.run.world.known.track if self.knows_track else self.config.track
+        return replace(self.config, track=track, start_mu=lane.start_mu)
+
+    def seed_in(self, lane: Lane) -> int:
+        """Seed for a lane."""
+        return lane.run.seed + self.seed_shift
+
+    def run(self, lanes: Sequence[Lane]) -> Tried:
+        """Run through all lanes."""
+        return WAYS[self.way](self, lanes)
+
+
+def _by_pipeline(estimator: Estimator, lane: Lane) -> Course:
+    """Sample by sample through the pipeline, as the live node and the replay run."""
+    pipeline = Pipeline(estimator.config_in(lane), estimator.seed_in(lane))
+    seen, first_s = list[Seen](), dict[str, float]()
+    now_s, before = 0.0, 0
+    for now_s, received in lane.run.sent:
+        for sample in received:
+            if isinstance(sample, Refusal):
+                pipeline.refuse(*sample)
+            else:
+                seen += [Seen(prediction, now_s, pipeline.accepted) for prediction in pipeline.push(sample)]
+        if received:
+            first_s = dict.fromkeys(pipeline.dropped, now_s) | first_s
+        before = pipeline.accepted if now_s < lane.run.world.over_s else before
+    seen += [Seen(prediction, now_s, pipeline.accepted, at_end=True) for prediction in pipeline.finish()]
+    dropped = pipeline.dropped
+    dropped_s = {reason: first_s.get(reason, now_s) for reason in dropped}
+    return Course(seen, pipeline.state.counts[Outcome.RESET], before, dropped, dropped_s)
+
+
+def _by_core(estimator: Estimator, lane: Lane) -> Course:
+    """Measurement by measurement through the core alone: no curves."""
+    config = estimator.config_in(lane)
+    state, estimates = init(config, estimator.seed_in(lane)), list[Estimate]()
+    for measurement in lane.run.measurements:
+        state, estimate = step(config, state, measurement)
+        estimates += [] if estimate is None else [estimate]
+    return _estimated([*estimates, *finish(config, state)[1]])
+
+
+def _by_ekf(estimator: Estimator, lane: Lane) -> Course:
+    """Measurement by measurement through the extended Kalman filter."""
+    config = EkfConfig(estimator.config_in(lane), estimator.tuning)
+    state, estimates = ekf_init(config, estimator.seed_in(lane)), list[Estimate]()
+    for measurement in lane.run.measurements:
+        state, estimate = ekf_step(config, state, measurement)
+        estimates += [] if estimate is None else [estimate]
+    return _estimated(estimates)
+
+
+def _estimated(estimates: Iterable[Estimate]) -> Course:
+    """What came out where nothing is known but the estimates."""
+    return Course([Seen(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
+
+
+def _one_by_one(run: Callable[[Estimator, Lane], Course]) -> Callable[[Estimator, Sequence[Lane]], Tried]:
+    def tried(estimator: Estimator, lanes: Sequence[Lane]) -> Tried:
+        courses, window_ms = list[Course](), list[float]()
+        for lane in lanes:
+            started = time.perf_counter()
+            courses.append(run(estimator, lane))
+            window_ms.append(1e3 * (time.perf_counter() - started) / max(len(courses[-1].seen), 1))
+        return Tried(courses, window_ms)
+
+    return tried
+
+
+def _in_lockstep(estimator: Estimator, lanes: Sequence[Lane]) -> Tried:
+    """All lanes side by side through the core, their windows evaluated together."""
+    window_ms = list[float]()
+    runs = [lockstep.Run(estimator.config_in(lane), estimator.seed_in(lane), lane.run.measurements) for lane in lanes]
+    return Tried([_estimated(estimates) for estimates in lockstep.drive(runs, window_ms)], window_ms)
+
+
+WAYS: Mapping[str, Callable[[Estimator, Sequence[Lane]], Tried]] = MappingProxyType(
+    {
+        "pipeline": _one_by_one(_by_pipeline),
+        "core": _one_by_one(_by_core),
+        "ekf": _one_by_one(_by_ekf),
+        "lockstep": _in_lockstep,
+    }
+)
+"""By name: how an estimator runs through its lanes."""

@@ -1,0 +1,176 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The trials of all studies: seeds and starts of one world with one estimator, their rows, and groups of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Hashable, Iterable, Sequence
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_node.train.plant import ADHESION_LIMITED
+
+from ...core import Config, Regime
+from ...core.prediction import Prediction
+from ...run.score import CONVERGED_AFTER_MPS
+from .estimators import Course, Estimator, Lane
+from .running import Running, run_all
+from .tasks import Arrays
+from .world import PLANTS, World, simulate
+
+FIRST_SEED = 1000
+"""Run r of a table has simulator and estimator seed FIRST_SEED + r."""
+
+ROW = np.dtype(
+    [
+        *(("seed", np.int64), ("start", np.float64), ("t_ns", np.int64), ("out_s", np.float64)),
+        *((f"true_{name}", np.float64) for name in ("position_m", "speed_mps", "mu", "stopping_m")),
+        *((name, np.float64) for name in ("mu", "std", "lower", "position_m", "speed_mps", "safe_m")),
+        *((name, np.bool_) for name in ("limited", "scored", "claimed", "withheld", "at_end")),
+        *((name, np.int64) for name in ("window", "fresh", "changes")),
+    ]
+)
+"""An estimate under the brake. Run and start; true times of its measurement and of its publication; the truth, with
+the distance to a standstill; the estimate, with the length of its safe curve (NaN: none); whether adhesion truly
+limits, whether it does after the first 30 km/h of braking, whether the estimate claims it, whether mu is withheld,
+whether the end of the data gave it; measurements in its window, those accepted since the fault is over, changes of the
+rail told so far."""
+
+RUN = np.dtype([("seed", np.int64), ("start", np.float64), ("resets", np.int64), ("finite", np.bool_)])
+"""A trial: how often the estimation started anew, and whether every number of the estimates was finite."""
+
+DROP = np.dtype([("seed", np.int64), ("reason", "U32"), ("count", np.int64), ("first_s", np.float64)])
+"""Messages of a trial that were dropped for one reason; when the first one was."""
+
+Rows = NDArray[np.void]
+Key = TypeVar("Key", bound=Hashable)
+
+
+class Trials(NamedTuple):
+    """Trials of one world with one estimator, which differ in seed and start: the task of all studies."""
+
+    world: World
+    estimator: Estimator = Estimator()
+    first_seed: int = FIRST_SEED
+    seeds: int = 1
+    starts: tuple[float, ...] = (Config().start_mu,)
+
+    @property
+    def name(self) -> str:
+        """Readable beginning of its file's name."""
+        return f"{self.world.scenario}-{self.world.plan.fault}-{self.estimator.way}-{self.first_seed}"
+
+    @property
+    def weight(self) -> float:
+        """How much work it is, in that of a Kalman filter, about."""
+        particles = self.estimator.config.method == "particle_em"
+        each = {"ekf": 1.0, "core": 6.0, "lockstep": 12.0, "pipeline": 80.0 if particles else 8.0}
+        return self.seeds * len(self.starts) * each[self.estimator.way]
+
+    def compute(self) -> Arrays:
+        """Simulate and estimate every trial."""
+        started = time.perf_counter()
+        runs = [simulate(self.world, seed) for seed in range(self.first_seed, self.first_seed + self.seeds)]
+        lanes = [Lane(run, start) for run in runs for start in self.starts]
+        tried = self.estimator.run(lanes)
+        parts = [_arrays(lane, course) for lane, course in zip(lanes, tried.courses, strict=True)]
+        arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+        seconds = np.array([time.perf_counter() - started])
+        return {**arrays, "window_ms": np.array(tried.window_ms), "seconds": seconds}
+
+    def split(self, chunk: int) -> list[Trials]:
+        """Divide the seeds into tasks of at most `chunk`."""
+        return [
+            self._replace(first_seed=self.first_seed + first, seeds=min(chunk, self.seeds - first))
+            for first in range(0, self.seeds, chunk)
+        ]
+
+
+class Results(NamedTuple):
+    """What trials gave: a table of estimates (`ROW`) and what stands beside it."""
+
+    rows: Rows
+    runs: NDArray[np.void]
+    """Array of `RUN`."""
+    drops: NDArray[np.void]
+    """Array of `DROP`."""
+    window_ms: NDArray[np.float64]
+    seconds: NDArray[np.float64]
+    """Computing time of each task."""
+
+    def of_start(self, start: float) -> Results:
+        """Those from one start."""
+        return self._replace(rows=self.rows[self.rows["start"] == start], runs=self.runs[self.runs["start"] == start])
+
+    def where(self, which: NDArray[np.bool_]) -> Results:
+        """With a choice of the rows only."""
+        return self._replace(rows=self.rows[which])
+
+
+def grouped(wanted: Iterable[tuple[Key, Trials]], chunk: int, where: Running) -> dict[Key, Results]:
+    """Run what the cache lacks, and put together what has the same key."""
+    tasks = [(key, task) for key, trials in wanted for task in trials.split(chunk)]
+    parts: dict[Key, list[Arrays]] = {}
+    for (key, _), found in zip(tasks, run_all([task for _, task in tasks], where), strict=True):
+        parts.setdefault(key, []).append(found)
+    return {key: _together(some) for key, some in parts.items()}
+
+
+def each_trial(rows: Rows) -> list[Rows]:
+    """Divide rows by their trials."""
+    ends = np.flatnonzero((np.diff(rows["seed"]) != 0) | (np.diff(rows["start"]) != 0)) + 1
+    return np.split(rows, ends) if rows.size else []
+
+
+def _together(parts: Sequence[Arrays]) -> Results:
+    return Results(*(np.concatenate([part[name] for part in parts]) for name in Results._fields))
+
+
+def _arrays(lane: Lane, course: Course) -> Arrays:
+    """Arrays of `ROW`, `RUN` and `DROP`."""
+    seed, start = lane.run.seed, lane.start_mu
+    numbers = (value for seen in course.seen for value in seen.prediction.estimate if isinstance(value, float))
+    drops = [(seed, reason, count, course.dropped_s[reason]) for reason, count in course.dropped.items()]
+    return {
+        "rows": _rows(lane, course),
+        "runs": np.array([(seed, start, course.resets, all(map(math.isfinite, numbers)))], dtype=RUN),
+        "drops": np.array(drops, dtype=DROP),
+    }
+
+
+def _rows(lane: Lane, course: Course) -> Rows:
+    """Estimates under the brake, an array of `ROW`."""
+    born = lane.run.born
+    braked = [(seen, born[seen.prediction.estimate.t_ns]) for seen in course.seen]
+    braked = [(seen, truth) for seen, truth in braked if truth.pressure_pa > 0.0]
+    onset = next((truth.speed_mps for truth in born.values() if truth.pressure_pa > 0.0), 0.0)
+    rows = np.array(
+        [
+            (
+                *(lane.run.seed, lane.start_mu, truth.t_ns, seen.out_s),
+                *(truth.position_m, truth.speed_mps, truth.mu, math.nan),
+                *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, _length(seen.prediction)),
+                *(truth.regime == ADHESION_LIMITED, False, e.regime is Regime.ADHESION_LIMITED),
+                *(seen.prediction.withheld, seen.at_end),
+                *(e.window, seen.accepted - course.accepted_before, e.changes),
+            )
+            for seen, truth in braked
+            for e in (seen.prediction.estimate,)
+        ],
+        dtype=ROW,
+    )
+    rows["scored"] = rows["limited"] & (rows["true_speed_mps"] < onset - CONVERGED_AFTER_MPS)
+    if not np.isnan(rows["safe_m"]).all():
+        plant = PLANTS[lane.run.world.plant]
+        rows["true_stopping_m"] = plant.stopping_m(lane.run.world, rows["true_position_m"], rows["true_speed_mps"])
+    return rows
+
+
+def _length(prediction: Prediction) -> float:
+    """Length, m, of the safe curve; NaN where there is none."""
+    return math.nan if prediction.safe is None else float(prediction.safe.distance_m[-1])

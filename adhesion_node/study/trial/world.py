@@ -1,0 +1,140 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What a trial takes place in: a plant on its track, its sensors and what goes wrong with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import lru_cache
+from types import MappingProxyType
+from typing import NamedTuple
+
+from sim_node.faults.plan import FAULTS, NONE, Plan, faulty_run
+from sim_node.train.messages import SensorMessage, Tick
+from sim_node.train.plant import Truth
+from sim_node.train.scenario import Scenario, find
+from sim_node.train.sensors import SensorSettings
+
+from ...core import Config, Measurement
+from ...core.intake.inbox import Aligner, Sample
+from ...core.physics.train import Array
+from ...run.offline import READERS
+from ...wire.codecs import Rejected
+from ...wire.topics import FRAME
+from ..robust.plain import plain
+from .stopping import stopping_distances
+
+PERIOD_S = 0.1
+"""Of every published figure."""
+
+
+class Refusal(NamedTuple):
+    """A message that the codecs refuse."""
+
+    topic: str
+    reason: str
+
+
+class World(NamedTuple):
+    """A scenario as it is believed, and all that the estimator is not told. With a seed it is a run."""
+
+    scenario: str
+    sensors: SensorSettings = SensorSettings()
+    plan: Plan = Plan(NONE, 0.0)
+    lasts_s: float = math.inf
+    """How long the fault of the plan lasts; infinite: to the end of the run."""
+    period_s: float = PERIOD_S
+    """Of the simulated run; the messages of a run without a fault come every `PERIOD_S` all the same."""
+    plant: str = "point_mass"
+    """One of `PLANTS`."""
+
+    @property
+    def known(self) -> Scenario:
+        """What the estimator believes."""
+        return find(self.scenario)
+
+    @property
+    def over_s(self) -> float:
+        """When the fault has passed; where it lasts, when it begins."""
+        return self.plan.fault_start_s + (self.lasts_s if math.isfinite(self.lasts_s) else 0.0)
+
+    @property
+    def without_fault(self) -> World:
+        """The same run, one for all worlds that differ in their faults alone."""
+        return self._replace(plan=Plan(NONE, 0.0), lasts_s=math.inf)
+
+
+class Plant(NamedTuple):
+    """A simulated train: all that a trial asks of it."""
+
+    ticks: Callable[[World, int], Iterator[Tick]]
+    """Truth and messages of every sample of a run, from world and seed."""
+    stopping_m: Callable[[World, Array, Array], Array]
+    """True distances, m, from places, m, and speeds, m/s, to a standstill; shape (N,)."""
+
+
+def _point_mass(world: World, seed: int) -> Iterator[Tick]:
+    run = faulty_run(world.plan, world.known, world.period_s, seed, world.sensors)
+    if world.plan.fault != NONE:
+        return run
+    every = round(PERIOD_S / world.period_s)
+    return ((truth, sent if index % every == 0 else ()) for index, (truth, sent) in enumerate(run))
+
+
+def _stopping(world: World, position_m: Array, speed_mps: Array) -> Array:
+    true = FAULTS[world.plan.fault].scenario(world.known, world.plan.dose)
+    return stopping_distances(true, position_m, speed_mps)
+
+
+PLANTS: Mapping[str, Plant] = MappingProxyType({"point_mass": Plant(_point_mass, _stopping)})
+"""By name: a further train is one line here."""
+
+
+class Sent(NamedTuple):
+    """What the estimator receives at a true time, s: samples, and messages that the codecs refuse."""
+
+    t_s: float
+    received: tuple[Sample | Refusal, ...]
+
+
+class Run(NamedTuple):
+    """A simulated run."""
+
+    world: World
+    seed: int
+    sent: tuple[Sent, ...]
+    measurements: tuple[Measurement, ...]
+    """The samples paired as the pipeline does at its nominal settings."""
+    born: Mapping[int, Truth]
+    """Truth by stamp, ns; a stamp that is no time of the run stands for the time when its message was born."""
+
+
+@lru_cache(maxsize=10)  # a small study takes the same few runs with every estimator
+def simulate(world: World, seed: int) -> Run:
+    """Simulate a run of `world`."""
+    born, sent = dict[int, Truth](), list[Sent]()
+    for truth, messages in PLANTS[world.plant].ticks(world, seed):
+        born.setdefault(truth.t_ns, truth)
+        for message in messages:
+            born.setdefault(message.t_ns, truth)
+        sent.append(Sent(truth.t_ns * 1e-9, tuple(map(_received, messages))))
+    return Run(world, seed, tuple(sent), tuple(_paired(sent)), MappingProxyType(born))
+
+
+def _received(message: SensorMessage) -> Sample | Refusal:
+    try:
+        return READERS[message.topic.name](plain(message), FRAME)
+    except Rejected as refusal:
+        return Refusal(message.topic.name, refusal.reason)
+
+
+def _paired(sent: Iterable[Sent]) -> Iterator[Measurement]:
+    nominal = Config()
+    aligner = Aligner(nominal.pressure_wait_s, nominal.pressure_age_s)
+    for _, received in sent:
+        for sample in received:
+            if not isinstance(sample, Refusal):
+                yield from aligner.push(sample)
+    yield from aligner.flush()
