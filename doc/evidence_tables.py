@@ -40,6 +40,7 @@ def parts() -> dict[str, str]:
         **{f"intervention {scenario}": ("intervention", _intervention(files, scenario)) for scenario in SCENARIOS},
         "creep experiments": ("creep", _creep(files["creep"])),
         "creep noise": ("creep", _creep_noise(files["creep"])),
+        "creep coverage": ("creep", _coverage(files["creep"])),
         "creep withheld": ("creep", _withheld(files["creep"])),
     }
     return {name: f"{shown}\n\n{_source(file)}" for name, (file, shown) in made.items()}
@@ -191,6 +192,13 @@ def _creep_noise(rows: Sequence[Row]) -> str:
 
 def _peak(row: Row) -> str:
     return f"{row['peak_estimated_mean']:.3f} ± {row['peak_estimated_std']:.3f}"
+
+
+def _coverage(rows: Sequence[Row]) -> str:
+    """Of experiment 1: a row for each number, a column for each kind of noise."""
+    of = {tuple(name.split(", ")): share for name, share in rows[0]["coverage95"].items()}
+    names, kinds = (tuple(dict.fromkeys(key[index] for key in of)) for index in (0, 1))
+    return table(("", *kinds), ((f"`{name}`", *(_percent(of[name, kind]) for kind in kinds)) for name in names))
 
 
 def _withheld(rows: Sequence[Row]) -> str:

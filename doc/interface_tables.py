@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import groupby
 from pathlib import Path
 
 import adhesion_node
@@ -77,7 +76,10 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 def _groups(specs: Sequence[Spec]) -> Iterator[str]:
     """Yield a table for each group of settings, in the order of their declaration, under its name."""
     head = ("parameter", "default", "unit", "range", "meaning")
-    for group, members in groupby(specs, key=lambda spec: getattr(spec, "group", "")):
+    groups: dict[str, list[Spec]] = {}
+    for spec in specs:
+        groups.setdefault(getattr(spec, "group", ""), []).append(spec)
+    for group, members in groups.items():
         if group:
             yield f"### {group[0].upper()}{group[1:]}"
         yield table(head, map(_parameter, members))
