@@ -23,6 +23,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 from rclpy.subscription import Subscription
+from test_package import console_scripts
 
 from adhesion_node.bag import BagReader, select
 from adhesion_node.live.node import Live
@@ -31,6 +32,7 @@ from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.study.__main__ import main as study
 from sim_node.nodes import simulator, slip_simulator
+from sim_node.train.scenario import SCENARIOS
 
 DOC = ROOT / "doc"
 PAGES = [ROOT / "README.md", *sorted(DOC.glob("*.md"))]
@@ -111,6 +113,12 @@ def test_the_contents_name_every_page_and_picture() -> None:
     assert listed == {page.name for page in DOC.glob("*.md")} - {"index.md"}
     shown = {name for page in PAGES for name in re.findall(r"pictures/(\w+\.png)\)", text_of(page))}
     assert shown == {picture.name for picture in (DOC / "pictures").iterdir()}
+
+
+def test_every_program_and_every_scenario_is_named() -> None:
+    named = set(re.findall(r"`(\w+)`", text_of(ROOT / "README.md")))
+    assert console_scripts().keys() <= named
+    assert set(SCENARIOS) <= set(re.findall(r"^\| `(\w+)` \|", text_of(DOC / "demo.md"), re.MULTILINE))
 
 
 def test_every_measured_file_says_how_it_was_made() -> None:
