@@ -9,12 +9,11 @@ import argparse
 from collections.abc import Sequence
 
 from ..command.options import help_texts, json_option, run_tool
-from .baselines import tune_ekf
 from .bound import study as bound
 from .he import study as creep
 from .intervention import study as intervention
 from .robust import study as robust
-from .xie import distances, sensitivity, tables
+from .xie import distances, sensitivity, tables, tune_ekf
 
 PURPOSE = "Reproduces the figures of the papers, and shows what follows from them."
 

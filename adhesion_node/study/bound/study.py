@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,6 +25,7 @@ from ...core.physics.adhesion import WET
 from ...core.physics.motion import Motion
 from ...core.physics.train import KMH
 from ...run.score import CONVERGED_AFTER_MPS
+from ..trial.text import Column, lines
 from .cramer_rao import MEAN_OF_STD, Bound, Path, Start, bound, speed_lost, std_that_stays_within
 
 PERIOD_S = 0.1
@@ -115,20 +115,29 @@ def row(case: Case) -> dict[str, Any]:
 def run(options: argparse.Namespace) -> int:
     """Print the table."""
     table = [row(case) for case in CASES]
-    report(options.json, table, "\n".join(_lines(table)))
+    report(options.json, table, "\n".join([HEAD, *lines(COLUMNS, table)]))
     return DONE
 
 
-def _lines(table: list[dict[str, Any]]) -> Iterator[str]:
-    yield "least standard deviation of mu, %, after so many km/h of braking; mean |error|, %, after 30 km/h;"
-    yield f"km/h lost until |error| is below {ERROR_PERCENT:g} %: on average, for good in half and in 95 % of the runs"
-    columns = " ".join(f"{kmh:5}" for kmh in LOST_KMH)
-    yield f"{'scenario':>12} {'sigma m':>7} {'speed known':>11}  {columns}  error  mean  half  95 %"
-    for entry in table:
-        known = "20 s" if entry["speed_std_kmh"] is None else f"{entry['speed_std_kmh']:g} km/h"
-        stds = " ".join(f"{value:5.2f}" for value in entry["std_percent"].values())
-        reached = " ".join("never" if kmh is None else f"{kmh:5.1f}" for kmh in entry["lost_kmh"].values())
-        yield (
-            f"{entry['scenario']:>12} {entry['sigma_m']:7g} {known:>11}  {stds}  "
-            f"{entry['mean_error_percent']:5.2f} {reached}"
-        )
+HEAD = (
+    "least standard deviation of mu, %, after so many km/h of braking; mean |error|, %, after 30 km/h;\n"
+    f"km/h lost until |error| is below {ERROR_PERCENT:g} %: on average, for good in half and in 95 % of the runs"
+)
+
+
+def _std_after(kmh: int) -> Column:
+    return Column(f"{kmh}", 5, ".2f", lambda row: row["std_percent"][str(kmh)])
+
+
+def _lost(head: str, share: str) -> Column:
+    return Column(head, 5, ".1f", lambda row: row["lost_kmh"][share])
+
+
+COLUMNS = (
+    Column("scenario", 12, "", "scenario"),
+    Column("sigma m", 7, "g", "sigma_m"),
+    Column("speed to km/h", 13, "g", "speed_std_kmh"),
+    *map(_std_after, LOST_KMH),
+    Column("error", 5, ".2f", "mean_error_percent"),
+    *(_lost(*named) for named in (("mean", "mean"), ("half", "half"), ("95 %", "most"))),
+)

@@ -5,9 +5,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import json
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from ...core.creep import fit as creep_fit
 from ...core.creep.curve import noise_products, peak
 from ...core.creep.recursion import Recursion, full_covariance
 from ...core.physics.train import Array
+from ..trial.tasks import Arrays
 from . import errors_in_variables as creep_eiv
 from .runs import (
     DRY,
@@ -153,3 +156,41 @@ def dfp_difference(runs: int, seed: int) -> float:
     data = measure(creeps, on_one(creeps), runs, seed)
     exact, iterated = (identify(replace(ONE, solver=solver), data).theta[50:] for solver in ("exact", "dfp"))
     return float(np.max(np.abs(iterated - exact) / np.maximum(np.abs(exact), 1.0)))
+
+
+BEYOND: Mapping[str, Callable[[int, int], Any]] = MappingProxyType(
+    {
+        **{f"noise{std:g}": with_creep_noise(std) for std in CREEP_STDS},
+        "coverage": lambda _runs, seed: coverage(seed),
+        "withholding": lambda _runs, seed: withholding(seed),
+        "dfp": dfp_difference,
+    }
+)
+"""What the paper leaves out, by name: plain values of runs and seed."""
+
+
+class Beyond(NamedTuple):
+    """One of `BEYOND`."""
+
+    what: str
+    runs: int
+    seed: int
+
+    @property
+    def name(self) -> str:
+        """Readable beginning of its file's name."""
+        return f"creep-{self.what}"
+
+    @property
+    def weight(self) -> float:
+        """How much work it is beside the samples of an experiment."""
+        return 8000.0
+
+    def compute(self) -> Arrays:
+        """The values as JSON in one text."""
+        return {"json": np.array(json.dumps(BEYOND[self.what](self.runs, self.seed)))}
+
+
+def value_of(found: Arrays) -> Any:
+    """Read what `Beyond.compute` wrote."""
+    return json.loads(str(found["json"]))

@@ -1,7 +1,12 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The counterparts of Figs. 5-11 of He et al. 2017: p1, p2 and the peak, on one surface and over a switch."""
+"""The counterparts of the figures of He et al. 2017.
+
+Figs. 1-3: adhesion over creep as measured, Burckhardt's model, Kiencke's curve beside it. The paper prints no
+coefficients: Burckhardt's are those he gives for roads; Kiencke's curve has the same initial slope and the p1, p2 of
+least squares. Figs. 5-11: p1, p2 and the peak, on one surface and over a switch.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +15,64 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from scipy.optimize import curve_fit
 
+from ...core.creep.curve import adhesion
 from ...core.physics.train import Array
 from ...report.picture import BLACK, BLUE, GREY, ORANGE
-from ..trial.drawing import picture
-from .runs import BAND, DRY, DRY_PEAK, ENOUGH, WET, WET_PEAK, peaks, rise, swings
+from ..trial.drawing import draw_lines, picture
+from .runs import (
+    BAND,
+    DRY,
+    DRY_PEAK,
+    ENOUGH,
+    NOISE_STD,
+    SLOPE,
+    WET,
+    WET_PEAK,
+    measure,
+    on_one,
+    peaks,
+    rise,
+    swings,
+)
+
+CREEPS = np.linspace(0.0, 0.3, 301)
+
+
+class Burckhardt(NamedTuple):
+    """mu = c1 (1 - exp(-c2 l)) - c3 l."""
+
+    c1: float
+    c2: float
+    c3: float
+
+    def __call__(self, creep: Array) -> Array:
+        """Adhesion at each creep."""
+        return self.c1 * -np.expm1(-self.c2 * creep) - self.c3 * creep
+
+    @property
+    def slope(self) -> float:
+        """Initial slope.
+
+        >>> round(DRY_ROAD.slope, 2)
+        30.19
+        """
+        return self.c1 * self.c2 - self.c3
+
+
+DRY_ROAD = Burckhardt(1.2801, 23.99, 0.52)
+ROADS = {"dry": DRY_ROAD, "wet": Burckhardt(0.857, 33.822, 0.347), "snow": Burckhardt(0.1946, 94.129, 0.0646)}
+
+
+def like(model: Burckhardt) -> Array:
+    """p1 and p2 of the Kiencke curve that comes nearest to a model, with the same initial slope."""
+
+    def curve(creep: Array, p1: float, p2: float) -> Array:
+        return adhesion(creep, model.slope, np.array([p1, p2]))
+
+    return np.asarray(curve_fit(curve, CREEPS, model(CREEPS), p0=(10.0, 10.0))[0])
+
 
 POINTS = 1500
 """Points of a curve at most."""
@@ -43,8 +101,9 @@ PANELS = (
 
 
 def draw(thetas: Mapping[str, Array], folder: Path) -> None:
-    """Draw fig05.png to fig11.png into `folder`, made when missing; thetas (samples, runs, 2) by experiment."""
+    """Draw figNN.png into `folder`, made when missing; thetas (samples, runs, 2) by experiment."""
     folder.mkdir(parents=True, exist_ok=True)
+    _draw_models(folder)
     for panel in PANELS:
         title = f"Fig. {panel.number}: {panel.quantity}, {panel.title}"
         with picture(folder / f"fig{panel.number:02d}.png", title) as axis:
@@ -86,3 +145,24 @@ def _places(panel: Panel) -> Array:
         return rise()
     samples = swings().size
     return np.arange(1, 2 * samples + 1) / samples
+
+
+def _draw_models(folder: Path) -> None:
+    with picture(folder / "fig01.png", "Fig. 1: adhesion as measured, simulated") as axis:
+        truth = adhesion(CREEPS, SLOPE, DRY)
+        measured = measure(CREEPS, on_one(CREEPS), 1, 1, in_mu=True).adhesion[:, 0]
+        axis.plot(CREEPS, measured, color="0.0", marker="+", ls="", label="measured")
+        for sign, label in ((1, "within two standard deviations"), (-1, None)):
+            axis.plot(CREEPS, truth + sign * 2.0 * NOISE_STD, color=BLUE, ls="--", label=label)
+        axis.set(xlabel="creep", ylabel="adhesion coefficient")
+        axis.legend(loc="lower right")
+    with picture(folder / "fig02.png", "Fig. 2: Burckhardt's model, roads") as axis:
+        draw_lines(axis, CREEPS, {name: model(CREEPS) for name, model in ROADS.items()})
+        axis.set(xlabel="creep", ylabel="adhesion coefficient")
+        axis.legend(loc="center right")
+    with picture(folder / "fig03.png", "Fig. 3: Kiencke's curve beside Burckhardt's model, dry road") as axis:
+        curves = {"Burckhardt": DRY_ROAD(CREEPS), "Kiencke": adhesion(CREEPS, DRY_ROAD.slope, like(DRY_ROAD))}
+        peaked = (f"{name}: peak {mu.max():.3f} at {CREEPS[mu.argmax()]:.3f}" for name, mu in curves.items())
+        draw_lines(axis, CREEPS, dict(zip(peaked, curves.values(), strict=True)))
+        axis.set(xlabel="creep", ylabel="adhesion coefficient")
+        axis.legend(loc="lower right")

@@ -11,6 +11,8 @@ v/(1 + p1 l + p2 l^2). A rise of the creep from 0 to 0.1 has `RISE` samples.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,6 +22,7 @@ from ...core.creep.config import FIXED, VARYING, CreepConfig
 from ...core.creep.curve import adhesion, parameters, peak
 from ...core.creep.recursion import Recursion, advance, begin
 from ...core.physics.train import Array
+from ..trial.tasks import Arrays
 
 SLOPE, LAMBDA_M = 20.0, 0.1
 DRY_PEAK, WET_PEAK = 0.35, 0.20
@@ -112,18 +115,6 @@ def identify(config: CreepConfig, data: Data, noise: Array | None = None) -> Tra
     return Trace(thetas, recursion)
 
 
-def one_surface(runs: int, seed: int, *, in_mu: bool = False) -> Trace:
-    """Experiment 1: one dry rise."""
-    creeps = rise()
-    return identify(ONE, measure(creeps, on_one(creeps), runs, seed, in_mu=in_mu))
-
-
-def switched(config: CreepConfig, creeps: Array, runs: int, seed: int) -> Trace:
-    """Experiments 2 and 3: `creeps` on the dry and then again on the wet surface."""
-    surfaces = np.concatenate([on_one(creeps, DRY), on_one(creeps, WET)])
-    return identify(config, measure(np.tile(creeps, 2), surfaces, runs, seed))
-
-
 def used_fraction(found: Array, truth: float) -> Array:
     """Share of the samples, per run, after which the estimate stays within `BAND` of the truth to the last one.
 
@@ -147,3 +138,47 @@ def first_fraction(found: Array, truth: float) -> Array:
 
 def _share(count: NDArray[np.int_], wrong: NDArray[np.bool_]) -> Array:
     return np.asarray(np.where(wrong.any(axis=0), count, 0) / wrong.shape[0])
+
+
+MOVEMENTS: Mapping[str, Callable[[int], Array]] = MappingProxyType({"swings": swings, "rise": rise})
+"""How the creep moves on each of two surfaces, by the samples of a rise."""
+
+
+class Experiment(NamedTuple):
+    """A course of p1 and p2: one rise on one surface, or a movement on the dry and then on the wet one."""
+
+    runs: int
+    seed: int
+    config: CreepConfig = ONE
+    samples: int = RISE
+    """Of a rise."""
+    movement: str | None = None
+    """None: one surface."""
+    in_mu: bool = False
+    """Noise of mu itself."""
+
+    @property
+    def name(self) -> str:
+        """Readable beginning of its file's name."""
+        return f"creep-{self.movement or 'one'}"
+
+    @property
+    def surfaces(self) -> tuple[Array, ...]:
+        """Theta of one surface after the other."""
+        return (DRY,) if self.movement is None else (DRY, WET)
+
+    @property
+    def creeps(self) -> Array:
+        """Creep on each surface."""
+        return rise(self.samples) if self.movement is None else MOVEMENTS[self.movement](self.samples)
+
+    @property
+    def weight(self) -> float:
+        """How much work it is: the samples."""
+        return float(len(self.surfaces) * self.creeps.size)
+
+    def compute(self) -> Arrays:
+        """Theta after every sample, shape (samples, runs, 2)."""
+        surfaces = np.concatenate([on_one(self.creeps, theta) for theta in self.surfaces])
+        creeps = np.tile(self.creeps, len(self.surfaces))
+        return {"theta": identify(self.config, measure(creeps, surfaces, self.runs, self.seed, in_mu=self.in_mu)).theta}

@@ -20,6 +20,8 @@ import numpy as np
 from ...command.options import DONE, report
 from ...core.physics.train import Array
 from ..trial.running import add_running_options, run_all, running
+from ..trial.text import Column, lines
+from .beyond import BEYOND, Beyond, value_of
 from .runs import (
     BAND,
     DRY_PEAK,
@@ -29,11 +31,11 @@ from .runs import (
     RAMP,
     VARYING_ETA,
     WET_PEAK,
+    Experiment,
     first_fraction,
     peaks,
     used_fraction,
 )
-from .tasks import BEYOND, Beyond, Experiment, value_of
 
 RUNS, SEED = 20, 1
 
@@ -45,6 +47,23 @@ SCAN_GAINS = (0.3, 1.0)
 
 SWITCHES = {"2": FIXED_ETA, "3": VARYING_ETA}
 """The experiments on two surfaces."""
+
+COLUMNS = (
+    Column("experiment", 44, "<44", "experiment"),
+    Column("true", 6, ".2f", "peak_true"),
+    Column("estimated", 9, ".4f", "peak_estimated_mean"),
+    Column("std", 6, ".4f", "peak_estimated_std"),
+    Column("used", 6, ".3f", "used_fraction"),
+    Column("first", 6, ".3f", "first_fraction"),
+    Column("std before", 10, ".5f", "std_before_switch"),
+)
+
+WITHHELD = (
+    Column("creep reached", 13, ".3f", "creep_reached"),
+    Column("published", 11, ".3f", "published"),
+    Column("wrong of these", 16, ".3f", "wrong_of_published"),
+    Column("wrong if all were published", 28, ".3f", "wrong_of_all"),
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -71,11 +90,9 @@ def run(options: argparse.Namespace) -> int:
     rows[0] |= {"dfp_difference": difference, "coverage95": covered, "withholding": withheld}
     noise = [row for rows_of_std in noises for row in rows_of_std]
     if options.figures:
-        from . import figures as creep_figures
-        from . import models as creep_models
+        from .figures import draw
 
-        creep_figures.draw(thetas, options.figures)
-        creep_models.draw(options.figures)
+        draw(thetas, options.figures)
     report(options.json, rows + noise, text(rows, noise, covered, withheld, difference))
     return DONE
 
@@ -111,7 +128,7 @@ def sensitivity(runs: int, seed: int) -> dict[str, Experiment]:
 
 def row_of(name: str, experiment: Experiment, theta: Array) -> dict[str, Any]:
     """Row of an experiment: on one surface the estimate at a creep of 0.03, after a switch that at the end."""
-    found, samples = peaks(theta), experiment.samples_of_surface
+    found, samples = peaks(theta), experiment.creeps.size
     if experiment.movement is None:
         share = ENOUGH / LAMBDA_M
         row = _row(name, DRY_PEAK, found[round(samples * share) - 1], share)
@@ -134,24 +151,20 @@ def text(
     difference: float,
 ) -> str:
     """Return the tables for people."""
-    lines = [f"{'experiment':<44} {'true':>6} {'estimated':>18} {'used':>6} {'first':>6} {'std before':>10}"]
-    for row in rows + noise:
-        spread = f"{row['peak_estimated_mean']:.4f} +- {row['peak_estimated_std']:.4f}"
-        first = f"{row['first_fraction']:6.3f} {row['std_before_switch']:10.5f}" if "first_fraction" in row else ""
-        lines.append(
-            f"{row['experiment']:<44} {row['peak_true']:6.2f} {spread:>18} {row['used_fraction']:6.3f} {first}"
-        )
-    lines += ["", f"used: share of the new surface's samples after which the peak stays within {BAND:.0%} of the truth"]
     shares = ", ".join(f"{name} {share:.3f}" for name, share in covered.items())
-    lines += ["", f"share of 95 % intervals that hold the truth: {shares}"]
-    lines += ["", f"iteration against exact minimum: {difference:.1e} of p1, p2 at most", ""]
-    lines += ["creep reached   published   wrong of these   wrong if all were published"]
-    lines += [
-        f"{row['creep_reached']:13.3f} {row['published']:11.3f} "
-        f"{row['wrong_of_published']:16.3f} {row['wrong_of_all']:28.3f}"
-        for row in withheld
-    ]
-    return "\n".join(lines)
+    return "\n".join(
+        [
+            *lines(COLUMNS, rows + noise),
+            "",
+            f"used: share of the new surface's samples after which the peak stays within {BAND:.0%} of the truth",
+            "",
+            f"share of 95 % intervals that hold the truth: {shares}",
+            "",
+            f"iteration against exact minimum: {difference:.1e} of p1, p2 at most",
+            "",
+            *lines(WITHHELD, withheld),
+        ]
+    )
 
 
 def _row(name: str, truth: float, peaks: Array, used: float) -> dict[str, Any]:

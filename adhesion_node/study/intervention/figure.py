@@ -9,14 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
 from ...core.physics.braking import BrakingCurve
 from ...core.physics.train import KMH
 from ...report.picture import BLACK, BLUE, GREY, ORANGE
+from ..trial.drawing import picture
 
 NAMES = {
     "ebi": ("emergency brake intervention (EBI)", "#b00020", "-"),
@@ -36,18 +35,14 @@ def draw(config: SupervisionConfig, safe: BrakingCurve, fixed: BrakingCurve, tit
     config = replace(config, line_speed_kmh=float(safe.speed_mps[0]) / KMH)
     reach = float(etcs.distances(config, safe, safe.speed_mps[:1]).indication[0])
     ahead = np.linspace(1.1 * reach, -0.1 * reach, 600)
-    figure = Figure(figsize=(9, 4.8), layout="constrained")
-    FigureCanvasAgg(figure)
-    axis = figure.subplots()
-    for name, limit in etcs.speeds(config, safe, ahead)._asdict().items():
-        label, color, style = NAMES[name]
-        axis.plot(ahead, limit / KMH, color=color, ls=style, label=label)
-    by_fixed = etcs.speeds(config, fixed, ahead).ebi
-    axis.plot(ahead, by_fixed / KMH, color=BLUE, ls=":", label="EBI by the fixed worst case")
-    axis.axvline(0.0, color=GREY, lw=0.8)
-    axis.annotate(" target", (0.0, 0.02), xycoords=("data", "axes fraction"), color="0.25")
-    axis.set(xlabel="distance to the target, m", ylabel="speed, km/h", title=title, xlim=(ahead[0], ahead[-1]))
-    axis.set_ylim(bottom=0.0)
-    axis.grid(alpha=0.3)
-    axis.legend(loc="lower left", fontsize="small")
-    figure.savefig(path, dpi=110)
+    with picture(path, title, (9.0, 4.3)) as axis:
+        for name, limit in etcs.speeds(config, safe, ahead)._asdict().items():
+            label, color, style = NAMES[name]
+            axis.plot(ahead, limit / KMH, color=color, ls=style, label=label)
+        by_fixed = etcs.speeds(config, fixed, ahead).ebi
+        axis.plot(ahead, by_fixed / KMH, color=BLUE, ls=":", label="EBI by the fixed worst case")
+        axis.axvline(0.0, color=GREY, lw=0.8)
+        axis.annotate(" target", (0.0, 0.02), xycoords=("data", "axes fraction"), color="0.25")
+        axis.set(xlabel="distance to the target, m", ylabel="speed, km/h", xlim=(ahead[0], ahead[-1]))
+        axis.set_ylim(bottom=0.0)
+        axis.legend(loc="lower left", fontsize="small")

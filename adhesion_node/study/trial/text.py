@@ -18,8 +18,8 @@ class Column(NamedTuple):
     value: str | Callable[[Mapping[str, Any]], Any]
 
     def cell(self, row: Mapping[str, Any]) -> str:
-        """A row's value; "-" for None."""
-        value = row[self.value] if isinstance(self.value, str) else self.value(row)
+        """A row's value; "-" where it has none."""
+        value = row.get(self.value) if isinstance(self.value, str) else self.value(row)
         return f"{'-' if value is None else format(value, self.form):>{self.width}}"
 
 

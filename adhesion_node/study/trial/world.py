@@ -16,6 +16,7 @@ from sim_node.train.messages import SensorMessage, Tick
 from sim_node.train.plant import Truth
 from sim_node.train.scenario import Scenario, find
 from sim_node.train.sensors import SensorSettings
+from sim_node.train.stopping import stopping_distances
 
 from ...core import Config, Measurement
 from ...core.intake.inbox import Aligner, Sample
@@ -24,7 +25,6 @@ from ...run.offline import READERS
 from ...wire.codecs import Rejected
 from ...wire.topics import FRAME
 from ..robust.plain import plain
-from .stopping import stopping_distances
 
 PERIOD_S = 0.1
 """Of every published figure."""

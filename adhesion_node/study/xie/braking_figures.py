@@ -13,7 +13,7 @@ import numpy as np
 from ...core.physics import braking
 from ...core.physics.adhesion import DRY, WET
 from ...core.physics.train import CRH3, KMH, Array
-from ..trial.drawing import STYLES, picture
+from ..trial.drawing import STYLES, draw_lines, picture
 from .published import BRAKING_CASES
 
 
@@ -66,10 +66,9 @@ def _draw_rail(scene: Scene, folder: Path) -> None:
 def _draw_forces(scene: Scene, folder: Path) -> None:
     speeds, adhesion = rail(scene)
     brake = np.full_like(speeds, CRH3.brake_force(CRH3.full_pressure_pa))
-    forces = {"air brake": brake, "adhesion": CRH3.adhesion_force(adhesion)}
+    forces = {"air brake": 1e-3 * brake, "adhesion": 1e-3 * CRH3.adhesion_force(adhesion)}
     with picture(*_named(scene, scene.rail_figure + 1, "forces", folder)) as axis:
-        for (color, dashes), (label, force) in zip(STYLES, forces.items(), strict=False):
-            axis.plot(speeds, 1e-3 * force, color=color, ls=dashes, lw=1.8, label=label)
+        draw_lines(axis, speeds, forces)
         axis.set(xlabel="speed, km/h", ylabel="force, kN", ylim=(0.0, 1000.0))
         axis.invert_xaxis()
         axis.legend(loc="upper right")

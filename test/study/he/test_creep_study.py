@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from adhesion_node.study.__main__ import main
-from adhesion_node.study.he import models as creep_models
+from adhesion_node.study.he import figures as creep_models
 from adhesion_node.study.he import runs as creep_runs
 from adhesion_node.study.he import study as creep
 from adhesion_node.study.trial import engines
@@ -116,7 +116,7 @@ def test_the_same_study_again_computes_nothing(
 
 
 def test_a_run_does_not_depend_on_how_many_there_are() -> None:
-    few, many = (creep_runs.one_surface(runs, 7).theta[-1] for runs in (2, 5))
+    few, many = (creep_runs.Experiment(runs, 7).compute()["theta"][-1] for runs in (2, 5))
     assert np.array_equal(few, many[:2])
 
 

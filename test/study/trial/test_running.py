@@ -18,8 +18,7 @@ import numpy as np
 import pytest
 
 from adhesion_node.study.__main__ import main
-from adhesion_node.study.he.runs import VARYING_ETA
-from adhesion_node.study.he.tasks import Experiment
+from adhesion_node.study.he.runs import VARYING_ETA, Experiment
 from adhesion_node.study.trial import engines, running, tasks
 from adhesion_node.study.trial.estimators import Estimator
 from adhesion_node.study.trial.running import Running, run_all

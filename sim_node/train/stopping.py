@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim_node.train.scenario import Rail, Scenario
+from adhesion_node.core.physics.train import Array
 
-from ...core.physics.train import Array
+from .scenario import Rail, Scenario
 
 STEPS = 500
 """Equal steps of speed to a standstill: 1 cm off the simulated way on one rail, 0.2 % where a patch lies ahead."""

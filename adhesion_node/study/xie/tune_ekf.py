@@ -18,13 +18,13 @@ from typing import Any
 import numpy as np
 
 from ...command.options import DONE, report
+from ..baselines.ekf import TUNED, Tuning
 from ..trial.running import add_running_options, running
 from ..trial.score import score
 from ..trial.text import Column, lines
 from ..trial.trials import Trials, grouped
-from ..xie.methods import CHUNK, METHODS, trials
-from ..xie.published import TABLES
-from .ekf import TUNED, Tuning
+from .methods import CHUNK, METHODS, trials
+from .published import TABLES
 
 FIRST_SEED = 5000
 
