@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from adhesion_node.core import Config, Estimate
-from adhesion_node.core.intake.inbox import Sample
+from adhesion_node.core.intake.samples import Sample
 from adhesion_node.core.physics.train import Array
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline

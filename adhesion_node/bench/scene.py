@@ -17,7 +17,7 @@ import numpy as np
 from ..core.belief.gaussian import Gaussian
 from ..core.belief.window import Window
 from ..core.config import Config
-from ..core.intake.inbox import PositionSample, PressureSample
+from ..core.intake.samples import PositionSample, PressureSample
 from ..core.physics.adhesion import WET
 from ..core.physics.motion import Motion
 from ..core.physics.train import GRAVITY, KMH, Array, Train

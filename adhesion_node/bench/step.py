@@ -16,7 +16,7 @@ import numpy as np
 
 from ..command.options import progress
 from ..core.config import Config
-from ..core.intake.inbox import PositionSample, PressureSample
+from ..core.intake.samples import PositionSample, PressureSample
 from ..run.pipeline import Pipeline
 from .scene import journey
 from .timing import figures

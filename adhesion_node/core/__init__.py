@@ -1,13 +1,47 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The estimator as pure functions of arrays: no ROS, no files, no clock, no logging."""
+"""The estimator as pure functions of arrays: no ROS, no files, no clock, no logging.
 
-from .belief.outcome import Outcome
+The names here are public: they stay when modules move.
+"""
+
 from .belief.regime import Regime
 from .config import Config
 from .estimate import Estimate
-from .estimator import State, finish, init, step
-from .intake.samples import Measurement
+from .estimator import State, advance, finish, init, step
+from .intake.outcome import Event, Outcome
+from .intake.samples import (
+    ForceSample,
+    Measurement,
+    PositionSample,
+    PressureSample,
+    Sample,
+    SpeedSample,
+    WheelSample,
+)
+from .physics import braking
+from .prediction import Prediction, predict
 
-__all__ = ["Config", "Estimate", "Measurement", "Outcome", "Regime", "State", "finish", "init", "step"]
+__all__ = [
+    "Config",
+    "Estimate",
+    "Event",
+    "ForceSample",
+    "Measurement",
+    "Outcome",
+    "PositionSample",
+    "Prediction",
+    "PressureSample",
+    "Regime",
+    "Sample",
+    "SpeedSample",
+    "State",
+    "WheelSample",
+    "advance",
+    "braking",
+    "finish",
+    "init",
+    "predict",
+    "step",
+]

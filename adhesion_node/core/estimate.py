@@ -13,6 +13,7 @@ from .belief.gaussian import Gaussian
 from .belief.rail import Rail, age, ignorance
 from .belief.regime import Regime
 from .config import Config
+from .intake.plausibility import STRONGEST_MPS2
 from .intake.samples import Measurement
 from .methods.protocol import AnyMethod, Context, MethodWindow, Verdict
 from .physics.adhesion import SpeedLaw
@@ -43,6 +44,8 @@ class Estimate(NamedTuple):
     log_likelihood: float = 0.0
     ess: float = 0.0
     shape: SpeedLaw | None = None
+    withheld: bool = False
+    """Nothing is known of mu, not even by its age: it is the low-adhesion law's."""
 
 
 class Knowledge(NamedTuple):
@@ -120,4 +123,23 @@ def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
         speed_std_mps=belief.speed_std,
         changes=changes,
         **verdict.fit._asdict(),
+    )
+
+
+def blind_estimate(config: Config, before: Estimate, t_ns: int) -> Estimate:
+    """What a consumer may count on without positions since `before`: the low-adhesion law, and a speed not yet lost."""
+    unseen_s = (t_ns - before.t_ns) * 1e-9
+    low = float(config.low_law(np.asarray(before.speed_mps)))
+    return before._replace(
+        t_ns=t_ns,
+        mu=low,
+        mu_std=config.unknown_std,
+        mu_lower=low,
+        regime=Regime.COASTING,
+        position_m=before.position_m + before.speed_mps * unseen_s,
+        position_std_m=before.position_std_m + STRONGEST_MPS2 * unseen_s**2 / 2,
+        speed_std_mps=before.speed_std_mps + STRONGEST_MPS2 * unseen_s,
+        window=0,
+        iterations=0,
+        withheld=True,
     )

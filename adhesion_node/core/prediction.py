@@ -26,9 +26,7 @@ class Prediction(NamedTuple):
     safe: BrakingCurve | None
     """Built on mu_lower; None where the train would not slow down with so little adhesion."""
     nominal: BrakingCurve | None
-    """Built on mu."""
-    withheld: bool = False
-    """Nothing is known of mu, not even by its age: the safe curve stands on the low-adhesion law."""
+    """Built on mu; None also where mu is withheld."""
 
 
 def predict(config: Config, estimate: Estimate) -> Prediction:
@@ -43,7 +41,7 @@ def predict(config: Config, estimate: Estimate) -> Prediction:
     return Prediction(
         estimate,
         _curve(cautious, estimate.speed_mps, estimate.mu_lower, resistance),
-        _curve(config.train, estimate.speed_mps, _expected(estimate), resistance),
+        None if estimate.withheld else _curve(config.train, estimate.speed_mps, _expected(estimate), resistance),
     )
 
 

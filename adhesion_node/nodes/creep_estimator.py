@@ -19,8 +19,8 @@ from typing import Any
 
 from rclpy.node import Node
 
+from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
-from adhesion_node.core.creep.config import CreepOutcome
 from adhesion_node.core.creep.estimator import CreepEstimate
 from adhesion_node.run.creep_pipeline import READERS, SETTINGS, CreepPipeline, setup_of
 from adhesion_node.wire import codecs as reading
@@ -51,7 +51,7 @@ class CreepEstimator(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("creep_estimator", automatically_declare_parameters_from_overrides=True, **kwargs)
         setup = setup_of(declare(self, PARAMETERS))
-        self._pipeline = CreepPipeline(setup.config, setup.vehicle)
+        self._pipeline = CreepPipeline(setup.config)
         self._reported_ns = 0
         self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/peak"
         self.published: Counter[Topic] = Counter()
@@ -81,15 +81,20 @@ class CreepEstimator(Node):
             f"{self._pipeline.accepted} samples, dropped {self._pipeline.dropped or 'none'}, digest {self.digest}"
         )
 
-    def take(self, topic: Topic, sample: Any) -> None:
+    def take(self, sample: Any) -> tuple[Event, ...]:
         """Use a sample and publish what it completes."""
-        del topic
-        self._publish(self._pipeline.push(sample))
+        estimates = self._pipeline.push(sample)
+        events = self._pipeline.events
+        self._publish(estimates)
+        return events
+
+    def settle(self) -> None:
+        """Silence: publish what has waited for others of its time."""
+        self._publish(self._pipeline.settle())
 
     def refuse(self, topic: Topic, refusal: reading.Rejected) -> None:
         """Count a refused message."""
-        del topic
-        self._pipeline.refuse(refusal.reason)
+        self._pipeline.refuse(topic.name, refusal.reason)
 
     def report(self) -> None:
         """Publish the state of affairs in /diagnostics."""
@@ -124,7 +129,7 @@ def _values(pipeline: CreepPipeline) -> dict[str, str]:
     if last is not None:
         items = last._asdict().items()
         numbers |= {name: f"{value:.6g}" for name, value in items if isinstance(value, float)}
-    counts = {"samples": str(pipeline.accepted), "resets": str(pipeline.state.counts[CreepOutcome.RESET])}
+    counts = {"samples": str(pipeline.accepted), "resets": str(pipeline.resets)}
     drops = {f"dropped.{reason}": str(count) for reason, count in pipeline.dropped.items()}
     return {**numbers, **counts, **drops, "digest": pipeline.digest}
 

@@ -21,7 +21,7 @@ from typing import Any
 from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
-from adhesion_node.core import Config, Estimate
+from adhesion_node.core import Config, Estimate, Event
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import codecs as reading
@@ -111,12 +111,16 @@ class Estimator(Node):
             f"dropped {self._pipeline.dropped or 'none'}, digest {self.digest}"
         )
 
-    def take(self, topic: Topic, sample: Any) -> None:
+    def take(self, sample: Any) -> tuple[Event, ...]:
         """Use a sample and publish what it completes."""
         predictions = self._pipeline.push(sample)
-        if self._pipeline.refusal is not None:
-            self._intake.note(topic, self._pipeline.refusal)
+        events = self._pipeline.events
         self._publish(predictions)
+        return events
+
+    def settle(self) -> None:
+        """Silence: publish what has waited for others of its time."""
+        self._publish(self._pipeline.settle())
 
     def refuse(self, topic: Topic, refusal: reading.Rejected) -> None:
         """Count a refused message."""
@@ -163,7 +167,7 @@ def messages_of(prediction: Prediction) -> list[tuple[Topic, Any]]:
     estimate = prediction.estimate
     t_ns, place = estimate.t_ns, estimate.position_m
     found: list[tuple[Topic, Any]] = []
-    if not prediction.withheld:
+    if not estimate.withheld:
         found += [
             (topics.MU, convert.mu_message(estimate.mu)),
             (topics.MU_LOWER, convert.mu_message(estimate.mu_lower)),

@@ -8,7 +8,6 @@ from __future__ import annotations
 from adhesion_node.core import Estimate, Outcome, Regime
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire.codecs import Reason
 
 from .ros.diagnostics import Finding
 
@@ -17,8 +16,8 @@ UNMEASURED = "no brake pressure: a full brake is assumed"
 
 def findings(pipeline: Pipeline) -> list[Finding]:
     """Return what is wrong, and in which regime the train is."""
-    if pipeline.stuck:
-        return [Finding(Severity.ERROR, f"position: {Reason.STUCK.value}; mu is withheld, the curve on the low law")]
+    if pipeline.state.stuck:
+        return [Finding(Severity.ERROR, f"position: {Outcome.STUCK.value}; mu is withheld, the curve on the low law")]
     if pipeline.last is None:
         return [Finding(Severity.WARN, "no estimate yet")]
     found = [Finding(Severity.OK, pipeline.last.regime.value)]
@@ -34,7 +33,7 @@ def values(pipeline: Pipeline) -> dict[str, str]:
     counts = {
         "measurements": str(pipeline.measurements),
         "accepted": str(pipeline.accepted),
-        "resets": str(pipeline.state.counts[Outcome.RESET]),
+        "resets": str(pipeline.resets),
         "windows": str(pipeline.windows),
     }
     told = {"confidence": f"{pipeline.config.confidence:g}", "digest": pipeline.digest}

@@ -32,7 +32,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     if WHEEL_SPEED.name not in selection.values():
         raise ValueError(f"bag = {reader.path}: holds no {WHEEL_SPEED.name}, without which there is no creep")
     setup = setup_of(parameter_file.given(options, NODE, SETTINGS))
-    pipeline = CreepPipeline(setup.config, setup.vehicle)
+    pipeline = CreepPipeline(setup.config)
     replay(pipeline, progress(messages(reader, selection), "messages"), setup.frame)
     result = summary(pipeline)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
@@ -46,7 +46,7 @@ def replay(pipeline: CreepPipeline, recorded: Iterable[tuple[str, Any, int]], fr
             try:
                 sample = READERS[name](message, frame)
             except reading.Rejected as refusal:
-                pipeline.refuse(refusal.reason)
+                pipeline.refuse(name, refusal.reason)
             else:
                 pipeline.push(sample)
     pipeline.finish()

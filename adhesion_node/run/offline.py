@@ -14,7 +14,7 @@ import numpy as np
 
 from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
-from ..core.intake.inbox import PressureSample, Sample
+from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
 from ..wire import codecs as reading
 from ..wire import parameter_file

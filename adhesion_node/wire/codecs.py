@@ -13,9 +13,17 @@ import math
 from enum import Enum
 from typing import Any
 
-from ..core.creep.inbox import ForceSample
-from ..core.intake.inbox import PositionSample, PressureSample, SpeedSample, WheelSample
-from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MAX_VARIANCE_M2, MIN_VARIANCE_M2
+from ..core.intake.samples import (
+    MAX_POSITION_M,
+    MAX_SPEED_MPS,
+    MAX_VARIANCE_M2,
+    MIN_VARIANCE_M2,
+    ForceSample,
+    PositionSample,
+    PressureSample,
+    SpeedSample,
+    WheelSample,
+)
 from .topics import FRAME, TRAIN
 
 ATMOSPHERE_PA = 101_325.0

@@ -19,11 +19,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.creep.config import CreepConfig, Peak
-from adhesion_node.core.creep.inbox import ForceSample
-from adhesion_node.core.intake.inbox import SpeedSample, WheelSample
+from adhesion_node.core.intake.samples import ForceSample, SpeedSample, WheelSample
 from adhesion_node.nodes.creep_estimator import OUTPUTS, PARAMETERS, CreepEstimator
 from adhesion_node.nodes.ros import qos
-from adhesion_node.run.creep_pipeline import CreepPipeline, Vehicle
+from adhesion_node.run.creep_pipeline import CreepPipeline
 from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
 from sim_node.nodes import messages
@@ -91,7 +90,7 @@ def readings() -> list[slip.SlipReading]:
 
 
 def offline(readings: list[slip.SlipReading]) -> CreepPipeline:
-    pipeline = CreepPipeline(CreepConfig(), Vehicle())
+    pipeline = CreepPipeline(CreepConfig())
     for measured in readings:
         for sample in (
             SpeedSample(measured.t_ns, measured.speed_mps),
@@ -99,6 +98,7 @@ def offline(readings: list[slip.SlipReading]) -> CreepPipeline:
             WheelSample(measured.t_ns, measured.wheel_radps),
         ):
             pipeline.push(sample)
+    pipeline.finish()
     pipeline.finish()
     return pipeline
 
@@ -187,7 +187,7 @@ def test_a_pair_that_gives_no_creep_is_counted(changed: dict[str, Any], reason: 
 
 
 def test_wheel_speeds_alone_are_counted_as_unpaired() -> None:
-    pipeline = CreepPipeline(CreepConfig(), Vehicle())
+    pipeline = CreepPipeline(CreepConfig())
     pipeline.push(WheelSample(10**9, (12.8,) * 6))
     assert pipeline.finish() == []
     assert pipeline.dropped == {"UNPAIRED": 1}
@@ -197,7 +197,7 @@ def test_the_surface_switch_is_followed() -> None:
     """Dry, then wet, at 50 Hz: either peak within 3 % at the end of its surface."""
     scenario = SlipScenario("short", ((0.0, DRY), (180.0, WET)), 38.0)
     known: dict[float, float] = {}
-    pipeline = CreepPipeline(CreepConfig(), Vehicle())
+    pipeline = CreepPipeline(CreepConfig())
     for truth, measured in slip.run(scenario, 0.02, 1):
         samples = (
             SpeedSample(measured.t_ns, measured.speed_mps),

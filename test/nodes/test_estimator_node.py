@@ -18,7 +18,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from adhesion_node.core.intake.inbox import PositionSample, PressureSample
+from adhesion_node.core.intake.samples import PositionSample, PressureSample
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET, AdhesionLaw
 from adhesion_node.core.physics.train import CRH3, GRAVITY

@@ -23,8 +23,8 @@ from hypothesis import strategies as st
 from oracles import ride
 
 from adhesion_node.core import Config, Measurement, Outcome
-from adhesion_node.core.intake import inbox as align
-from adhesion_node.core.intake.inbox import PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core.intake import stream
+from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.methods.particle_em.em import Search
 from adhesion_node.core.methods.particle_em.method import Evaluation, ParticleEm, ParticleWindow, evaluate
 from adhesion_node.core.methods.protocol import MethodWindow
@@ -127,7 +127,7 @@ class Watched:
     def push(self, sample: Sample) -> None:
         self.positions += isinstance(sample, PositionSample)
         self._check(self.pipeline.push(sample))
-        self.refused_positions += isinstance(sample, PositionSample) and self.pipeline.refusal is not None
+        self._note()
         pipeline, config = self.pipeline, self.pipeline.config
         window = pipeline.state.window
         if window is not None and len(window.samples) >= config.window + config.step:
@@ -141,10 +141,14 @@ class Watched:
 
     def finish(self) -> None:
         self._check(self.pipeline.finish())
-        counts = self.pipeline.state.counts
-        judged = (Outcome.ACCEPTED, Outcome.LATE, Outcome.DUPLICATE, Outcome.INVALID, Outcome.OUTLIER)
-        taken = sum(counts[outcome] for outcome in judged)
-        assert taken + self.refused_positions == self.positions == self.pipeline.measurements
+        self._note()
+        assert self.pipeline.accepted + self.refused_positions == self.positions == self.pipeline.measurements
+
+    def _note(self) -> None:
+        """Count the positions among what was not used."""
+        for event in self.pipeline.events:
+            of_positions = event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.STUCK)
+            self.refused_positions += of_positions or event.detail.startswith("PositionSample")
 
     def _check(self, predictions: list[Prediction]) -> None:
         resets = self.pipeline.state.counts[Outcome.RESET]
@@ -268,7 +272,7 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
         evaluations["done"] += 1
         return evaluate(config, window, search, rng)
 
-    monkeypatch.setattr(align, "MOST", 500)
+    monkeypatch.setattr(stream, "MOST", 500)
     pipeline = Pipeline(Config(method="particle_em", iterations=1, particles=2, window=30, step=20), 1)
     pipeline.state = pipeline.state._replace(method=ParticleEm(counted))
     rng = np.random.default_rng(1)
@@ -280,7 +284,9 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
         place = 70.0 * after_ns * 1e-9 + 0.5 * rng.standard_normal()
         pipeline.push(PositionSample(START_NS + after_ns, place, 0.25))
         if number % 2_000 == 1_999:
-            sizes.append(len(pickle.dumps((pipeline.state.pending, pipeline.state.window, vars(pipeline._aligner)))))
+            inbox = pipeline.state.inbox
+            kept = (pipeline.state.window, inbox.anchors, [*inbox.others.values()], inbox.suspect)
+            sizes.append(len(pickle.dumps(kept)))
     steps = pipeline.accepted / pipeline.config.step
     assert evaluations["done"] <= steps + pipeline.state.counts[Outcome.RESET] + 1
     assert sizes[-1] < 1.5 * sizes[0], sizes

@@ -16,7 +16,7 @@ import pytest
 from oracles import ride
 
 from adhesion_node.core import Config, Estimate, Measurement, Regime, finish, init, step
-from adhesion_node.core.intake.inbox import PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction, predict
 from adhesion_node.run import pipeline as pipeline_module
@@ -121,6 +121,7 @@ def test_refused_messages_are_counted_by_reason() -> None:
     for topic, reason in (("position", "WRONG_FRAME"), ("position", "NOT_FINITE"), ("brake_pressure", "WRONG_FRAME")):
         pipeline.refuse(topic, reason)
     feed(pipeline, list(pair(clean()[0])))
+    pipeline.finish()
     assert pipeline.dropped == {"NOT_FINITE": 1, "WRONG_FRAME": 2}
     assert (pipeline.measurements, pipeline.accepted) == (3, 1)  # a pressure is no measurement
 
@@ -272,8 +273,9 @@ def digest_of(prediction: Prediction, monkeypatch: pytest.MonkeyPatch) -> str:
     return pipeline.digest
 
 
-@pytest.mark.parametrize("field", [field for field in Estimate._fields if field != "shape"])  # in the nominal curve
+@pytest.mark.parametrize("field", [each for each in Estimate._fields if each not in ("shape", "withheld")])
 def test_the_digest_holds_every_number_of_an_estimate(field: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Shape and what is withheld show in the curves."""
     changed = BASE.estimate._replace(**{field: flipped(getattr(BASE.estimate, field))})
     digests = {digest_of(prediction, monkeypatch) for prediction in (BASE, BASE._replace(estimate=changed), BASE)}
     assert len(digests) == 2

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from adhesion_node.bag import BagReader
-from adhesion_node.core.intake.inbox import PositionSample
+from adhesion_node.core.intake.samples import PositionSample
 from adhesion_node.tools import csv_rows, import_csv
 from adhesion_node.wire import codecs as reading
 

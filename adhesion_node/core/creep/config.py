@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Settings of the creep identification, and what becomes of samples and peaks."""
+"""Settings of the creep identification, and what becomes of peaks."""
 
 from __future__ import annotations
 
@@ -11,21 +11,10 @@ from enum import Enum
 from ..physics.train import Array
 from ..setting import check_settings, setting
 from .curve import parameters
+from .vehicle import LOCOMOTIVE, Vehicle
 
 VARYING, FIXED = "varying", "fixed"
 EXACT, DFP = "exact", "dfp"
-
-
-class CreepOutcome(Enum):
-    """What the identification did with a sample; the value says it in words."""
-
-    ACCEPTED = "accepted"
-    LATE = "older than the newest one: dropped"
-    DUPLICATE = "a second sample with the same stamp: dropped"
-    INVALID = "not finite or beyond max_creep: dropped"
-    IDLE = "creep below min_creep: says nothing of the curve, nothing is forgotten"
-    RESET = "stamp jumped: the identification starts anew"
-    CHANGED = "the newest samples lie on one side of the curve: the surface changed, what was known is forgotten"
 
 
 class Peak(Enum):
@@ -42,6 +31,7 @@ class Peak(Enum):
 class CreepConfig:
     """Settings of the identification; the defaults are the paper's. Raises ValueError naming setting and range."""
 
+    vehicle: Vehicle = LOCOMOTIVE
     slope: float = setting(
         20.0, "Initial slope of the curve, mu_0; known, about the same on every surface", "", 0.1, 1e3
     )
@@ -62,7 +52,7 @@ class CreepConfig:
     )
     restart: bool = setting(True, "Forget everything when the surface changes, sooner than (13) does; not in the paper")
     confidence: float = setting(0.95, "One-sided confidence of the bounds of mu_max", low=0.5, high=0.9999)
-    reset_s: float = setting(60.0, "Jump of the stamps back by which the identification starts anew", "s", 1.0, 1e6)
+    reset_s: float = setting(60.0, "Jump of the stamps, either way, that starts the identification anew", "s", 1.0, 1e6)
 
     def __post_init__(self) -> None:
         check_settings(self, "")

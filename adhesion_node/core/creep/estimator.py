@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Identification of the creep curve, sample by sample, live and offline: `init` and `creep_step`, He et al. 2017.
+"""Identification of the creep curve, sample by sample, live and offline: `init`, `advance`, `finish`, He et al. 2017.
 
 Every accepted sample updates the sums (12) with the forgetting factor (13); every `every` of them give an estimate
 of the peak with its spread, or the reason why the data cannot tell it.
@@ -10,30 +10,29 @@ of the peak with its spread, or the reason why the data cannot tell it.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from types import MappingProxyType
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
+from ..intake import inbox as gate
+from ..intake.outcome import NO_COUNTS, Event, Outcome, counted
+from ..intake.pairing import Gate, Inbox, Matched, S, Source
+from ..intake.samples import ForceSample, Sample, SpeedSample, WheelSample
 from ..physics.train import Array
-from . import fit as creep_fit
-from .config import CreepConfig, CreepOutcome, Peak
+from . import fit
+from .config import CreepConfig, Peak
 from .curve import noise_products, peak
-from .recursion import Recursion, advance, begin, full_covariance, is_changing, judge
+from .recursion import Recursion, begin, full_covariance, is_changing, judge
+from .recursion import advance as advanced
+from .vehicle import CreepSample
 
+FAR_NS = 2 * S
+"""A stamp further ahead of all others is set aside until a second one agrees."""
 
-class CreepSample(NamedTuple):
-    """Creep and adhesion in use at a time."""
-
-    t_ns: int
-    creep: float
-    adhesion: float
-    creep_var: float = 0.0
-    adhesion_var: float = 0.0
-    """Variances of their noise, the bias of which is taken off; 0 is the paper's plain least squares."""
+LATE_RUN = 20
+"""So many late wheel speeds in a row show that the time has gone back."""
 
 
 class CreepEstimate(NamedTuple):
@@ -65,39 +64,97 @@ class CreepEstimate(NamedTuple):
         return self.status is Peak.KNOWN
 
 
-@dataclass(frozen=True, slots=True)
-class CreepState:
-    """Everything the identification remembers. Immutable: `creep_step` returns a new one."""
+class CreepState(NamedTuple):
+    """Everything the identification remembers. Immutable: `advance` returns a new one."""
 
+    gate: Gate
     recursion: Recursion
-    counts: Mapping[CreepOutcome, int] = field(default_factory=lambda: MappingProxyType(dict.fromkeys(CreepOutcome, 0)))
-    outcome: CreepOutcome = CreepOutcome.ACCEPTED
-    """What became of the sample that came last."""
-    newest_ns: int | None = None
+    counts: Mapping[Outcome, int] = NO_COUNTS
+    events: tuple[Event, ...] = ()
+    """What the sample that came last brought about, other than that it was accepted."""
+    inbox: Inbox = Inbox()
     since_estimate: int = 0
 
 
 def init(config: CreepConfig) -> CreepState:
     """State before the first sample."""
-    return CreepState(begin(config))
+    return CreepState(gate_of(config), begin(config))
+
+
+def gate_of(config: CreepConfig) -> Gate:
+    """How the sensors are paired."""
+    wait, age = round(config.vehicle.pairing_wait_s * 1e9), round(config.vehicle.pairing_age_s * 1e9)
+    return Gate(
+        anchor=WheelSample,
+        sources=(Source(SpeedSample, wait, age), Source(ForceSample, wait, age)),
+        max_lag_ns=0,
+        far_ns=FAR_NS,
+        reset_ns=round(config.reset_s * 1e9),
+        late_run=LATE_RUN,
+    )
+
+
+def advance(config: CreepConfig, state: CreepState, sample: Sample) -> tuple[CreepState, tuple[CreepEstimate, ...]]:
+    """Take one sample of any sensor; every `config.every` accepted creeps give an estimate."""
+    state = state._replace(events=())
+    if not sample.is_valid():
+        return _told(state, Event(Outcome.INVALID, repr(sample))), ()
+    return _passed(config, state, gate.push(state.gate, state.inbox, sample))
+
+
+def settle(config: CreepConfig, state: CreepState) -> tuple[CreepState, tuple[CreepEstimate, ...]]:
+    """Silence: what waits for others of its time waits no longer."""
+    return _passed(config, state._replace(events=()), gate.settle(state.gate, state.inbox))
+
+
+def finish(config: CreepConfig, state: CreepState) -> tuple[CreepState, tuple[CreepEstimate, ...]]:
+    """End of the data: take what still waits."""
+    return _passed(config, state._replace(events=()), gate.drain(state.gate, state.inbox))
+
+
+def _passed(
+    config: CreepConfig, state: CreepState, pushed: gate.Pushed
+) -> tuple[CreepState, tuple[CreepEstimate, ...]]:
+    """Use what the gate has let through."""
+    state, before = _take_all(config, state, pushed.ended)
+    if any(event.outcome is Outcome.RESET for event in pushed.events):
+        state = state._replace(recursion=begin(config), since_estimate=0)
+    state = _told(state._replace(inbox=pushed.inbox), *pushed.events)
+    state, estimates = _take_all(config, state, pushed.matched)
+    return state, before + estimates
+
+
+def _take_all(
+    config: CreepConfig, state: CreepState, matched: Iterable[Matched]
+) -> tuple[CreepState, tuple[CreepEstimate, ...]]:
+    estimates = []
+    for wheels, (speed, force) in matched:
+        if speed is None or force is None:
+            state = _told(state, Event(Outcome.UNPAIRED, f"wheel speed of {wheels.t_ns / 1e9:.12g} s"))
+            continue
+        formed = config.vehicle.sample(wheels.t_ns, wheels.speeds_radps, speed.speed_mps, force.force_n)
+        if isinstance(formed, Event):
+            state = _told(state, formed)
+            continue
+        state, estimate = creep_step(config, state, formed)
+        estimates += [] if estimate is None else [estimate]
+    return state, tuple(estimates)
 
 
 def creep_step(config: CreepConfig, state: CreepState, sample: CreepSample) -> tuple[CreepState, CreepEstimate | None]:
-    """Take one sample; every `config.every` accepted ones return an estimate."""
+    """Take the next creep in time; every `config.every` accepted ones return an estimate."""
     if not (math.isfinite(sample.creep) and math.isfinite(sample.adhesion)) or abs(sample.creep) > config.max_creep:
-        return _counted(state, CreepOutcome.INVALID), None
-    if state.newest_ns is not None and sample.t_ns <= state.newest_ns:
-        if state.newest_ns - sample.t_ns <= config.reset_s * 1e9:
-            same = sample.t_ns == state.newest_ns
-            return _counted(state, CreepOutcome.DUPLICATE if same else CreepOutcome.LATE), None
-        state = _counted(CreepState(begin(config), counts=state.counts), CreepOutcome.RESET)
-    state = replace(state, newest_ns=sample.t_ns)
+        return _told(state, Event(Outcome.INVALID, repr(sample))), None
     if sample.creep < config.min_creep:
-        return _counted(state, CreepOutcome.IDLE), None
+        return _told(state, Event(Outcome.IDLE)), None
     state = _accept(config, state, *(np.asarray(value) for value in sample[1:]))
     if state.since_estimate < config.every:
         return state, None
-    return replace(state, since_estimate=0), _estimate(config, state, sample.t_ns)
+    return state._replace(since_estimate=0), _estimate(config, state, sample.t_ns)
+
+
+def _told(state: CreepState, *events: Event) -> CreepState:
+    return state._replace(counts=counted(state.counts, *events), events=state.events + events)
 
 
 def _accept(
@@ -105,18 +162,19 @@ def _accept(
 ) -> CreepState:
     """Let an accepted sample into the sums; begin anew with it where it shows that the surface has changed."""
     noise = noise_products(creep, adhesions, config.slope, creep_var, adhesion_var)
-    recursion = advance(config, state.recursion, creep, adhesions, noise)
+    recursion = advanced(config, state.recursion, creep, adhesions, noise)
     if config.restart and recursion.sums.weight >= config.min_samples and is_changing(config, recursion):
-        state = _counted(state, CreepOutcome.CHANGED)
-        recursion = advance(config, begin(config), creep, adhesions, noise)
-    return replace(_counted(state, CreepOutcome.ACCEPTED), recursion=recursion, since_estimate=state.since_estimate + 1)
+        state = _told(state, Event(Outcome.CHANGED))
+        recursion = advanced(config, begin(config), creep, adhesions, noise)
+    counts = counted(state.counts, Event(Outcome.ACCEPTED))
+    return state._replace(counts=counts, recursion=recursion, since_estimate=state.since_estimate + 1)
 
 
 def _estimate(config: CreepConfig, state: CreepState, t_ns: int) -> CreepEstimate:
     recursion = state.recursion
     theta = recursion.theta
     mu_max, lambda_m = (float(value) for value in peak(config.slope, theta))
-    spread = creep_fit.covariance(recursion.sums, theta)
+    spread = fit.covariance(recursion.sums, theta)
     stds = _stds(config.slope, theta, spread)
     margin = float(ndtri(config.confidence)) * stds[2]
     return CreepEstimate(
@@ -130,7 +188,7 @@ def _estimate(config: CreepConfig, state: CreepState, t_ns: int) -> CreepEstimat
         mu_max_upper=mu_max + margin,
         eta=float(recursion.eta),
         remembered=float(recursion.sums.weight),
-        samples=state.counts[CreepOutcome.ACCEPTED],
+        samples=state.counts[Outcome.ACCEPTED],
         status=judge(config, recursion, stds[2] / mu_max),
     )
 
@@ -141,8 +199,3 @@ def _stds(slope: float, theta: Array, spread: Array) -> tuple[float, float, floa
         return math.inf, math.inf, math.inf, math.inf
     p1, p2, mu_max, lambda_m = np.sqrt(np.diagonal(full_covariance(slope, theta, spread))).tolist()
     return p1, p2, mu_max, lambda_m
-
-
-def _counted(state: CreepState, outcome: CreepOutcome) -> CreepState:
-    counts = MappingProxyType({**state.counts, outcome: state.counts[outcome] + 1})
-    return replace(state, counts=counts, outcome=outcome)

@@ -1,145 +1,142 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Pairs the position, brake-pressure, speed and wheel-speed streams by their stamps, whatever order they arrive in.
+"""The one gate for time: puts the samples of all sensors in order, pairs them, tells when time has jumped.
 
-A position waits until the pressure of its own time is known, that is, until a pressure with the same or a later
-stamp has come, or until the positions have moved on by `max_wait_s` (no pressure sensor, or a lost message). Only
-stamps decide, never the clock: a live node and an offline replay pair alike.
+One sensor is the anchor: its samples are released in order, each with what the others measured at its time
+(`pairing`). A stamp far from all others is set aside until a second one agrees with it: a single wrong stamp stops
+nothing. Only stamps decide, never a clock: a live node and an offline replay pair alike.
 """
 
 from __future__ import annotations
 
-from bisect import bisect_right, insort
-from statistics import median
-from typing import NamedTuple, TypeVar
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
-from .samples import Measurement
-
-
-class PositionSample(NamedTuple):
-    """A measured along-track position."""
-
-    t_ns: int
-    position_m: float
-    variance_m2: float
+from .outcome import Event, Outcome
+from .pairing import Gate, Inbox, Matched, S, due, release
+from .samples import Measurement, Sample
 
 
-class PressureSample(NamedTuple):
-    """A measured brake-cylinder pressure, gauge."""
+class Pushed(NamedTuple):
+    """Result of a push."""
 
-    t_ns: int
-    pressure_pa: float
-
-
-class SpeedSample(NamedTuple):
-    """A measured speed."""
-
-    t_ns: int
-    speed_mps: float
+    inbox: Inbox
+    matched: tuple[Matched, ...] = ()
+    events: tuple[Event, ...] = ()
+    """What became of samples other than that they were taken in; RESET where time has jumped."""
+    ended: tuple[Matched, ...] = ()
+    """With RESET: what still waited of the time before."""
 
 
-class WheelSample(NamedTuple):
-    """Measured angular speeds of the axles."""
-
-    t_ns: int
-    speeds_radps: tuple[float, ...]
-
-
-Sample = PositionSample | PressureSample | SpeedSample | WheelSample
-
-Timed = TypeVar("Timed", PressureSample, SpeedSample, WheelSample)
-
-HORIZON_NS = 60_000_000_000
-"""Samples further apart than this belong to different times: the older ones are spent, or the clock has jumped."""
-
-MOST = 6_000
-"""Samples of a stream that are kept at most, 60 s of 100 Hz: no flood and no standing stamps fill the memory."""
+def push(gate: Gate, inbox: Inbox, sample: Sample) -> Pushed:
+    """Take one sample; return what is complete now."""
+    t_ns, now_ns, suspect = sample.t_ns, inbox.now_ns, inbox.suspect
+    if now_ns is None or now_ns - gate.reset_ns <= t_ns <= now_ns + gate.far_ns:
+        return _with(_stray(inbox), _take(gate, inbox._replace(suspect=None), sample))
+    if suspect is None:
+        return Pushed(inbox._replace(suspect=sample))
+    if t_ns == suspect.t_ns and type(sample) is type(suspect):
+        return Pushed(inbox, events=(_doubled(sample),))
+    if abs(t_ns - suspect.t_ns) >= abs(t_ns - now_ns):
+        return Pushed(inbox._replace(suspect=sample), events=_stray(inbox))
+    return _jump(gate, inbox._replace(suspect=None), *sorted((suspect, sample), key=lambda each: each.t_ns))
 
 
-class Aligner:
-    """Merges the streams into measurements. Mutable: it is the inbox of one node or one replay."""
-
-    def __init__(self, max_wait_s: float, max_pressure_age_s: float) -> None:
-        self._max_wait_ns = round(max_wait_s * 1e9)
-        self._max_pressure_age_ns = round(max_pressure_age_s * 1e9)
-        self._newest_ns: int | None = None
-        self._positions: list[PositionSample] = []
-        self._pressures: list[PressureSample] = []
-        self._speeds: list[SpeedSample] = []
-        self._wheels: list[WheelSample] = []
-
-    def push(self, sample: Sample) -> list[Measurement]:
-        """Take one sample; return the measurements that are complete now, in the order of their arrival."""
-        before: list[Measurement] = []
-        if isinstance(sample, PressureSample):
-            _insert(self._pressures, sample)
-        elif isinstance(sample, SpeedSample):
-            _insert(self._speeds, sample)
-        elif isinstance(sample, WheelSample):
-            _insert(self._wheels, sample)
-        else:
-            if self._newest_ns is not None and abs(sample.t_ns - self._newest_ns) > HORIZON_NS:
-                before = self.flush()
-                self._start_anew(sample.t_ns)
-            self._newest_ns = sample.t_ns if self._newest_ns is None else max(self._newest_ns, sample.t_ns)
-            self._positions.append(sample)
-        return before + self._release()
-
-    def flush(self) -> list[Measurement]:
-        """Return what still waits, with the pressures known so far (end of the data)."""
-        return self._take(len(self._positions))
-
-    def _release(self) -> list[Measurement]:
-        if self._newest_ns is None:
-            return []
-        known_until = self._newest_ns - self._max_wait_ns
-        if self._pressures:
-            known_until = max(known_until, self._pressures[-1].t_ns)
-        ready = max(len(self._positions) - MOST, 0)
-        while ready < len(self._positions) and self._positions[ready].t_ns <= known_until:
-            ready += 1
-        return self._take(ready)
-
-    def _take(self, count: int) -> list[Measurement]:
-        taken, self._positions = self._positions[:count], self._positions[count:]
-        return [
-            Measurement(
-                *position, self._pressure(position.t_ns), self._speed(position.t_ns), self._wheel(position.t_ns)
-            )
-            for position in taken
-        ]
-
-    def _pressure(self, t_ns: int) -> float | None:
-        newest = bisect_right(self._pressures, t_ns, key=lambda sample: sample.t_ns) - 1
-        if newest < 0 or t_ns - self._pressures[newest].t_ns > self._max_pressure_age_ns:
-            return None
-        return self._pressures[newest].pressure_pa
-
-    def _speed(self, t_ns: int) -> float | None:
-        newest = bisect_right(self._speeds, t_ns, key=lambda sample: sample.t_ns) - 1
-        if newest < 0 or t_ns - self._speeds[newest].t_ns > self._max_wait_ns:
-            return None
-        return self._speeds.pop(newest).speed_mps  # one observation: it must not count twice
-
-    def _wheel(self, t_ns: int) -> float | None:
-        newest = bisect_right(self._wheels, t_ns, key=lambda sample: sample.t_ns) - 1
-        if newest < 0 or t_ns - self._wheels[newest].t_ns > self._max_wait_ns:
-            return None
-        return median(self._wheels[newest].speeds_radps)
-
-    def _start_anew(self, t_ns: int) -> None:
-        """Keep of pressures and speeds only those of the new time, which may have come before its first position."""
-        self._newest_ns = None
-        self._pressures = [sample for sample in self._pressures if abs(sample.t_ns - t_ns) <= HORIZON_NS]
-        self._speeds = [sample for sample in self._speeds if abs(sample.t_ns - t_ns) <= HORIZON_NS]
-        self._wheels = [sample for sample in self._wheels if abs(sample.t_ns - t_ns) <= HORIZON_NS]
+def drain(gate: Gate, inbox: Inbox) -> Pushed:
+    """End of the data: all that waits, with what is known so far; what is set aside was stray."""
+    return _with(_stray(inbox), settle(gate, inbox._replace(suspect=None)))
 
 
-def _insert(samples: list[Timed], sample: Timed) -> None:
-    """Insert in order of stamps; drop what is spent, or everything when the stamps have jumped."""
-    if samples and abs(sample.t_ns - samples[-1].t_ns) > HORIZON_NS:
-        samples.clear()
-    insort(samples, sample)
-    while samples[-1].t_ns - samples[0].t_ns > HORIZON_NS or len(samples) > MOST:
-        samples.pop(0)
+def settle(gate: Gate, inbox: Inbox) -> Pushed:
+    """End of the waits in silence: all anchors that wait, with what is known so far."""
+    return Pushed(*release(gate, inbox, len(inbox.anchors.samples)))
+
+
+def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
+    """Let a sample in whose stamp is believed."""
+    if isinstance(sample, gate.anchor | Measurement):
+        return _take_anchor(gate, inbox, sample)
+    stream = inbox.stream(type(sample))
+    refused = stream.refusal(sample.t_ns)
+    if refused is not None:
+        of_others = Outcome.REPEATED if refused is Outcome.DUPLICATE else refused
+        return Pushed(inbox, events=(Event(of_others, _named(sample)),))
+    in_order, stream = not stream.has_reached(sample.t_ns), stream.added(sample)
+    passed_ns = (inbox.released_ns or 0) - gate.kept_ns
+    # what comes out of order may belong to a time that is about to begin anew
+    stream = stream.since(passed_ns if in_order else stream.samples[0].t_ns)
+    inbox = inbox._replace(now_ns=_newest(inbox.now_ns, sample)).with_stream(type(sample), stream)
+    return Pushed(*release(gate, inbox, due(gate, inbox)))
+
+
+def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
+    t_ns, newest_ns, released_ns = anchor.t_ns, inbox.anchors.newest_ns, inbox.released_ns
+    if t_ns == released_ns:
+        return Pushed(inbox, events=(_doubled(anchor),))
+    if newest_ns is not None and t_ns < max(newest_ns - gate.max_lag_ns, released_ns or t_ns):
+        return _late(gate, inbox, anchor, newest_ns)
+    refused = inbox.anchors.refusal(t_ns)
+    if refused is not None:
+        return Pushed(inbox, events=(Event(refused, _named(anchor)),))
+    begins = newest_ns is None or t_ns > newest_ns + gate.far_ns
+    inbox = inbox._replace(
+        now_ns=_newest(inbox.now_ns, anchor),
+        anchors=inbox.anchors.added(anchor),
+        begun_ns=t_ns if begins else inbox.begun_ns,
+        late=(0, 0),
+    )
+    return Pushed(*release(gate, inbox, due(gate, inbox)))
+
+
+def _late(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> Pushed:
+    """Drop a late anchor; after enough of them in a row, each after the other, begin anew with it."""
+    count, before_ns = inbox.late
+    count = count + 1 if anchor.t_ns > before_ns else 1
+    if count >= gate.late_run:
+        return _anew(gate, inbox, anchor)
+    event = Event(Outcome.LATE, f"{_named(anchor)}, {(newest_ns - anchor.t_ns) / S:g} s behind the newest")
+    return Pushed(inbox._replace(late=(count, anchor.t_ns)), events=(event,))
+
+
+def _jump(gate: Gate, inbox: Inbox, first: Any, second: Any) -> Pushed:
+    """Two stamps agree that time has jumped: a gap, or where it is long or back, another time."""
+    now_ns = inbox.now_ns or 0
+    gap = now_ns <= first.t_ns <= now_ns + gate.reset_ns
+    one = _take(gate, inbox, first) if gap else _anew(gate, inbox, first)
+    two = _take(gate, one.inbox, second)
+    return Pushed(two.inbox, one.matched + two.matched, one.events + two.events, one.ended + two.ended)
+
+
+def _anew(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
+    """Begin anew at the time of a sample, with what the other sensors have measured of it."""
+    low, high = sample.t_ns - gate.reset_ns, sample.t_ns + gate.far_ns
+    others = {kind: stream.between(low, high) for kind, stream in inbox.others.items()}
+    newest = [stream.newest_ns for stream in others.values() if stream.newest_ns is not None]
+    fresh = Inbox(max(newest, default=None), others=MappingProxyType(others))
+    event = Event(Outcome.RESET, f"stamps went from {(inbox.now_ns or 0) / S:.12g} to {sample.t_ns / S:.12g} s")
+    return _with((event,), _take(gate, fresh, sample))._replace(ended=settle(gate, inbox).matched)
+
+
+def _newest(now_ns: int | None, sample: Any) -> int:
+    return int(sample.t_ns) if now_ns is None else max(now_ns, sample.t_ns)
+
+
+def _named(sample: Any) -> str:
+    return f"{type(sample).__name__} of {sample.t_ns / S:.12g} s"
+
+
+def _doubled(sample: Any) -> Event:
+    return Event(Outcome.DUPLICATE, _named(sample))
+
+
+def _stray(inbox: Inbox) -> tuple[Event, ...]:
+    """What becomes of a sample set aside with which none agrees."""
+    if inbox.suspect is None:
+        return ()
+    apart_s = (inbox.suspect.t_ns - (inbox.now_ns or 0)) / S
+    return (Event(Outcome.STRAY, f"{_named(inbox.suspect)}, {apart_s:+g} s from all others"),)
+
+
+def _with(events: tuple[Event, ...], pushed: Pushed) -> Pushed:
+    return pushed._replace(events=events + pushed.events)

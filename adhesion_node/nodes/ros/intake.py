@@ -6,12 +6,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Protocol
 
 from rclpy.clock import ROSClock
 from rclpy.node import Node
 
+from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import NS, Reason, Rejected
@@ -28,11 +29,14 @@ Read = Callable[[Any, str], Any]
 class Listener(Protocol):
     """What a node does with what comes in."""
 
-    def take(self, topic: Topic, sample: Any) -> None:
-        """Use a sample."""
+    def take(self, sample: Any) -> Iterable[Event]:
+        """Use a sample; return what it brought about other than that it was used."""
 
     def refuse(self, topic: Topic, refusal: Rejected) -> None:
         """Count a message that was refused."""
+
+    def settle(self) -> None:
+        """Use what waits for others of its time: the sensor has fallen silent."""
 
     def report(self) -> None:
         """Publish the state of affairs in /diagnostics."""
@@ -56,7 +60,7 @@ class Intake:
         self._events: dict[str, str] = {}
         self._watched = list(readers)[-1]
         self._watched_name = node.resolve_topic_name(self._watched.name)
-        self._silence = Silence(node, timeout_s, listener.report)
+        self._silence = Silence(node, timeout_s, self._on_silence)
         for topic, read in readers.items():
             qos.subscribe(node, topic, self._receiver(topic, read), qos.SENSOR_SUBSCRIPTION, tell=self.tell)
         node.get_logger().info(f"ready: waiting for {self._watched_name}")
@@ -66,13 +70,13 @@ class Intake:
         """The newest stamp, moved on by the silence since."""
         return self._newest_ns + round((self._silence.for_s or 0.0) * NS)
 
-    def note(self, topic: Topic, refusal: Rejected) -> None:
-        """Keep a refusal for the next report; the 1st, 2nd, 4th, 8th ... of a reason is logged and reported at once."""
-        self._counts[refusal.reason] += 1
-        count = self._counts[refusal.reason]
-        self._refusals[refusal.reason] = f"{topic.name}: message refused: {refusal} ({count} so far)"
+    def note(self, reason: str, text: str) -> None:
+        """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of a reason is told at once."""
+        self._counts[reason] += 1
+        count = self._counts[reason]
+        self._refusals[reason] = f"{text} ({count} so far)"
         if count & (count - 1) == 0:
-            self._node.get_logger().warning(self._refusals[refusal.reason])
+            self._node.get_logger().warning(self._refusals[reason])
             self._listener.report()
 
     def tell(self, event: str) -> None:
@@ -105,6 +109,10 @@ class Intake:
         publishers = self._node.count_publishers(name)
         return f"{name}: nothing received yet, publishers: {publishers}: is the sensor running, its topic remapped?"
 
+    def _on_silence(self) -> None:
+        self._listener.settle()
+        self._listener.report()
+
     def _clocks(self) -> int:
         clock = self._node.get_clock()
         simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
@@ -120,10 +128,12 @@ class Intake:
                 sample = self._sample(read, message)
             except Rejected as refusal:
                 self._listener.refuse(topic, refusal)
-                self.note(topic, refusal)
+                self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
             else:
                 self._newest_ns = sample.t_ns
-                self._listener.take(topic, sample)
+                for event in self._listener.take(sample):
+                    if event.is_told:
+                        self.note(event.outcome.name, str(event))
 
         return receive
 

@@ -11,7 +11,7 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
-from ...core import Config, Estimate, Outcome, finish, init, step
+from ...core import Config, Estimate, finish, init, step
 from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
 from ..baselines.ekf import TUNED, EkfConfig, Tuning, ekf_init, ekf_step
@@ -100,7 +100,7 @@ def _by_pipeline(estimator: Estimator, lane: Lane) -> Course:
     seen += [Seen(prediction, now_s, pipeline.accepted, at_end=True) for prediction in pipeline.finish()]
     dropped = pipeline.dropped
     dropped_s = {reason: first_s.get(reason, now_s) for reason in dropped}
-    return Course(seen, pipeline.state.counts[Outcome.RESET], before, dropped, dropped_s)
+    return Course(seen, pipeline.resets, before, dropped, dropped_s)
 
 
 def _by_core(estimator: Estimator, lane: Lane) -> Course:

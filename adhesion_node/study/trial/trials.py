@@ -156,7 +156,7 @@ def _rows(lane: Lane, course: Course) -> Rows:
                 *(truth.position_m, truth.speed_mps, truth.mu, math.nan),
                 *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, _length(seen.prediction)),
                 *(truth.regime == ADHESION_LIMITED, False, e.regime is Regime.ADHESION_LIMITED),
-                *(seen.prediction.withheld, seen.at_end),
+                *(e.withheld, seen.at_end),
                 *(e.window, seen.accepted - course.accepted_before, e.changes),
             )
             for seen, truth in braked

@@ -18,8 +18,8 @@ from sim_node.train.scenario import Scenario, find
 from sim_node.train.sensors import SensorSettings
 from sim_node.train.stopping import stopping_distances
 
-from ...core import Config, Measurement
-from ...core.intake.inbox import Aligner, Sample
+from ...core import Config, Measurement, Sample
+from ...core.estimator import paired
 from ...core.physics.train import Array
 from ...run.offline import READERS
 from ...wire.codecs import Rejected
@@ -131,10 +131,5 @@ def _received(message: SensorMessage) -> Sample | Refusal:
 
 
 def _paired(sent: Iterable[Sent]) -> Iterator[Measurement]:
-    nominal = Config()
-    aligner = Aligner(nominal.pressure_wait_s, nominal.pressure_age_s)
-    for _, received in sent:
-        for sample in received:
-            if not isinstance(sample, Refusal):
-                yield from aligner.push(sample)
-    yield from aligner.flush()
+    samples = (sample for _, received in sent for sample in received if not isinstance(sample, Refusal))
+    return paired(Config(), samples)

@@ -13,10 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adhesion_node.core.creep.config import FIXED, CreepConfig, CreepOutcome, Peak
+from adhesion_node.core import ForceSample, Sample, SpeedSample, WheelSample
+from adhesion_node.core.creep.config import FIXED, CreepConfig, Peak
 from adhesion_node.core.creep.curve import adhesion, parameters, peak
-from adhesion_node.core.creep.estimator import CreepEstimate, CreepSample, CreepState, creep_step, init
-from adhesion_node.core.creep.recursion import advance, begin, full_covariance
+from adhesion_node.core.creep.estimator import CreepEstimate, CreepState, advance, creep_step, init
+from adhesion_node.core.creep.recursion import advance as advance_recursion
+from adhesion_node.core.creep.recursion import begin, full_covariance
+from adhesion_node.core.creep.vehicle import CreepSample
+from adhesion_node.core.intake.outcome import Outcome
 from adhesion_node.core.physics.train import Array
 
 DRY, WET = parameters(20.0, 0.35, 0.1), parameters(20.0, 0.20, 0.1)
@@ -50,7 +54,7 @@ def test_the_peak_is_found_with_its_spread() -> None:
     assert [last.p1, last.p2] == pytest.approx(DRY, rel=0.05)
     assert last.mu_max_lower == pytest.approx(last.mu_max - 1.6449 * last.mu_max_std, rel=1e-4)
     assert last.mu_max_upper == pytest.approx(last.mu_max + 1.6449 * last.mu_max_std, rel=1e-4)
-    assert (last.samples, state.counts[CreepOutcome.ACCEPTED], state.counts[CreepOutcome.IDLE]) == (990, 991, 9)
+    assert (last.samples, state.counts[Outcome.ACCEPTED], state.counts[Outcome.IDLE]) == (990, 991, 9)
     assert 0.971 <= last.eta <= 1.0
 
 
@@ -90,7 +94,7 @@ def test_many_runs_at_once_are_those_one_by_one() -> None:
     many = begin(plain, (3,))
     for column in zip(*data, strict=True):
         creeps, mus = (np.array([getattr(sample, name) for sample in column]) for name in ("creep", "adhesion"))
-        many = advance(plain, many, creeps, mus)
+        many = advance_recursion(plain, many, creeps, mus)
     for run, own in enumerate(data):
         state = feed(plain, init(plain), iter([sample._replace(adhesion_var=0.0) for sample in own]))[0]
         assert many.theta[run] == pytest.approx(state.recursion.theta, rel=1e-9)
@@ -107,7 +111,7 @@ def test_a_fixed_factor_stays() -> None:
 def test_a_new_surface_is_noticed_and_learnt() -> None:
     state, _ = feed(NOMINAL, init(NOMINAL), samples(DRY, 0.1, 1000))
     state, estimates = feed(NOMINAL, state, samples(WET, 0.1, 1000, 2, 10**11))
-    assert state.counts[CreepOutcome.CHANGED] >= 1
+    assert state.counts[Outcome.CHANGED] >= 1
     assert estimates[-1].status is Peak.KNOWN
     assert estimates[-1].mu_max == pytest.approx(0.20, rel=0.02)
 
@@ -117,13 +121,13 @@ def test_without_restarting_the_change_is_at_least_said() -> None:
     state, _ = feed(config, init(config), samples(DRY, 0.1, 1000))
     state, estimates = feed(config, state, samples(WET, 0.1, 300, 2, 10**11))
     assert Peak.CHANGING in {estimate.status for estimate in estimates}
-    assert state.counts[CreepOutcome.CHANGED] == 0
+    assert state.counts[Outcome.CHANGED] == 0
 
 
 def test_one_surface_is_not_taken_for_another() -> None:
     for seed in range(4):
         state, _ = feed(NOMINAL, init(NOMINAL), samples(DRY, 0.1, 1000, seed))
-        assert state.counts[CreepOutcome.CHANGED] == 0
+        assert state.counts[Outcome.CHANGED] == 0
 
 
 def test_the_spread_of_the_peak_is_that_of_many_draws() -> None:
@@ -137,28 +141,60 @@ def test_the_spread_of_the_peak_is_that_of_many_draws() -> None:
 @pytest.mark.parametrize(
     ("sample", "outcome"),
     [
-        (CreepSample(10**9, math.nan, 0.1), CreepOutcome.INVALID),
-        (CreepSample(10**9, 0.02, math.inf), CreepOutcome.INVALID),
-        (CreepSample(10**9, 1.5, 0.1), CreepOutcome.INVALID),
-        (CreepSample(10**9, 0.0005, 0.01), CreepOutcome.IDLE),
-        (CreepSample(10**9, -0.02, -0.2), CreepOutcome.IDLE),
-        (CreepSample(50 * 10_000_000, 0.02, 0.2), CreepOutcome.DUPLICATE),
-        (CreepSample(49 * 10_000_000, 0.02, 0.2), CreepOutcome.LATE),
+        (CreepSample(10**9, math.nan, 0.1), Outcome.INVALID),
+        (CreepSample(10**9, 0.02, math.inf), Outcome.INVALID),
+        (CreepSample(10**9, 1.5, 0.1), Outcome.INVALID),
+        (CreepSample(10**9, 0.0005, 0.01), Outcome.IDLE),
+        (CreepSample(10**9, -0.02, -0.2), Outcome.IDLE),
     ],
 )
-def test_what_cannot_be_used_is_counted_and_changes_nothing(sample: CreepSample, outcome: CreepOutcome) -> None:
+def test_what_cannot_be_used_is_counted_and_changes_nothing(sample: CreepSample, outcome: Outcome) -> None:
     before, _ = feed(NOMINAL, init(NOMINAL), samples(DRY, 0.05, 50))
     after, estimate = creep_step(NOMINAL, before, sample)
     assert estimate is None
-    assert (after.outcome, after.counts[outcome]) == (outcome, before.counts[outcome] + 1)
+    assert (after.events[-1].outcome, after.counts[outcome]) == (outcome, before.counts[outcome] + 1)
     assert after.recursion is before.recursion
 
 
-def test_a_jump_back_begins_anew() -> None:
-    before, _ = feed(NOMINAL, init(NOMINAL), samples(DRY, 0.05, 50, start_ns=10**12))
-    after, _ = creep_step(NOMINAL, before, CreepSample(10**9, 0.02, 0.2))
-    assert after.counts[CreepOutcome.RESET] == 1
-    assert after.recursion.sums.weight == 1.0
+def pull(start_ns: int, count: int) -> Iterator[Sample]:
+    """Sensor samples of a pull of a few seconds, 100 Hz, a creep of 0.02 at 10 m/s."""
+    for index in range(count):
+        t_ns = start_ns + index * 10_000_000
+        yield from (SpeedSample(t_ns, 10.0), ForceSample(t_ns, 3e5), WheelSample(t_ns, (16.32,) * 6))
+
+
+def drive(state: CreepState, data: Iterator[Sample]) -> CreepState:
+    for sample in data:
+        state, _ = advance(NOMINAL, state, sample)
+    return state
+
+
+@pytest.mark.parametrize("to_ns", [10**9, 10**12 - 10**10])
+def test_a_step_back_in_time_begins_anew(to_ns: int) -> None:
+    before = drive(init(NOMINAL), pull(10**12, 100))
+    after = drive(before, pull(to_ns, 60))
+    assert after.counts[Outcome.RESET] == 1
+    late = after.counts[Outcome.LATE]
+    assert after.recursion.sums.weight == pytest.approx(60 - late, abs=1.0)
+    assert after.counts[Outcome.ACCEPTED] == 160 - late
+
+
+def test_one_stray_stamp_loses_nothing() -> None:
+    plain = drive(init(NOMINAL), pull(10**12, 100))
+    data = list(pull(10**12, 100))
+    hit = drive(init(NOMINAL), iter([*data[:150], WheelSample(10**12 + 30 * 10**9, (16.3,) * 6), *data[150:]]))
+    assert (hit.recursion.theta == plain.recursion.theta).all()
+    assert hit.counts[Outcome.STRAY] == 1
+
+
+def test_what_never_becomes_a_creep_says_why() -> None:
+    state = drive(init(NOMINAL), (s for s in pull(10**12, 100) if not isinstance(s, ForceSample)))
+    assert state.counts[Outcome.UNPAIRED] > 90
+    for change, outcome in (((16.32,) * 4, Outcome.AXLES), ((16.32,) * 5 + (17.0,), Outcome.UNEQUAL)):
+        data = (s._replace(speeds_radps=change) if isinstance(s, WheelSample) else s for s in pull(10**12, 50))
+        assert drive(init(NOMINAL), data).counts[outcome] > 20
+    data = (s._replace(speed_mps=0.1) if isinstance(s, SpeedSample) else s for s in pull(10**12, 50))
+    assert drive(init(NOMINAL), data).counts[Outcome.SLOW] > 20
 
 
 @pytest.mark.parametrize(

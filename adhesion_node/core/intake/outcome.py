@@ -1,0 +1,70 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What becomes of a sample, with the words in which an operator is told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+from typing import NamedTuple
+
+
+class Outcome(Enum):
+    """What an estimator did with a sample; the value says it in words, with the remedy."""
+
+    ACCEPTED = "accepted"
+    LATE = "older than the newest one by more than max_lag_s: dropped"
+    DUPLICATE = "a second measurement with the same stamp: dropped"
+    REPEATED = "a second sample of another sensor with the same stamp: dropped"
+    STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
+    TOO_OFTEN = "publish at most 200 messages a second: no more are used"
+    INVALID = "not finite, no positive variance or physically impossible: dropped"
+    STUCK = "the same to the bit although the train must have moved on: check the sensor"
+    SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
+    OUTLIER = "further from the prediction than gate_sigma: dropped"
+    UNPAIRED = "no speed or force of its time: dropped; is that sensor alive, its clock right?"
+    SLOW = "slower than min_speed_mps: the creep is not formed"
+    AXLES = "another number of axles than the setting axles: dropped"
+    UNEQUAL = "the axles creep so differently that their common force belongs to no one creep: dropped"
+    IDLE = "creep below min_creep: says nothing of the curve, nothing is forgotten"
+    CHANGED = "the newest samples lie on one side of the curve: the surface changed, what was known is forgotten"
+    RESET = "stamp or position jumped: the estimation starts anew"
+
+
+DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "CHANGED", "RESET"))
+"""Outcomes of a sample that is not used."""
+
+
+NO_COUNTS: Mapping[Outcome, int] = MappingProxyType(dict.fromkeys(Outcome, 0))
+
+
+TOLD = ("STRAY", "TOO_OFTEN", "INVALID", "STUCK", "SPEED_IN_KMH", "UNPAIRED", "AXLES", "UNEQUAL", "RESET")
+
+
+class Event(NamedTuple):
+    """Something other than that a sample was accepted."""
+
+    outcome: Outcome
+    detail: str = ""
+    """What it was, with its value."""
+
+    def __str__(self) -> str:
+        """Say what = value: outcome, with the remedy."""
+        return f"{self.detail}: {self.outcome.value}" if self.detail else self.outcome.value
+
+    @property
+    def is_told(self) -> bool:
+        """Whether an operator must hear of it, not only see it counted."""
+        return self.outcome.name in TOLD
+
+
+def counted(counts: Mapping[Outcome, int], *events: Event) -> Mapping[Outcome, int]:
+    """The counts with those of the events added."""
+    if not events:
+        return counts
+    added = dict(counts)
+    for event in events:
+        added[event.outcome] += 1
+    return MappingProxyType(added)

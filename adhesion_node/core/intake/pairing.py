@@ -1,0 +1,146 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What waits at the gate, and when it is paired and released.
+
+An anchor waits until every other sensor that is there has come as far as its stamp, at most `wait_ns` by the anchors'
+own stamps, and until late anchors could have come. Whether a sensor is there its earlier stamps tell, never whether it
+happens to have arrived; so what an anchor is paired with does not depend on the order of arrival.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from .samples import Measurement
+from .stream import Stream
+
+S = 1_000_000_000
+NOTHING = Stream()
+
+PRESENT_NS = 3 * S
+"""A sensor that has not been heard for so long is not waited for: three messages of the slowest, of 1 Hz."""
+
+
+class Source(NamedTuple):
+    """A sensor beside the anchor, and how its samples are paired."""
+
+    kind: type[Any]
+    wait_ns: int
+    """How long an anchor waits for it, by the stamps."""
+    age_ns: int
+    """Age up to which its newest sample counts."""
+    once: bool = False
+    """Whether a sample is one observation, which must not count twice; else the last value holds."""
+
+
+class Gate(NamedTuple):
+    """What is paired, and how far stamps may be apart."""
+
+    anchor: type[Any]
+    sources: tuple[Source, ...]
+    max_lag_ns: int
+    """How late an anchor may come and still be sorted in."""
+    far_ns: int
+    """A stamp further ahead of all others is set aside until a second one agrees with it."""
+    reset_ns: int
+    """So is one further back. A jump of the time further than this, or back, begins anew."""
+    late_run: int
+    """So many late anchors in a row, each after the other, show that the time has gone back."""
+
+    @property
+    def kept_ns(self) -> int:
+        """How long before the released anchors another sensor's samples may still be needed."""
+        return max((PRESENT_NS, *(source.age_ns + source.wait_ns for source in self.sources)))
+
+
+class Matched(NamedTuple):
+    """An anchor and the samples of its time, in the order of `Gate.sources`; None where one measured nothing."""
+
+    anchor: Any
+    values: tuple[Any, ...]
+
+
+class Inbox(NamedTuple):
+    """What waits. Immutable: `push` returns a new one."""
+
+    now_ns: int | None = None
+    """Newest stamp of any sensor that is believed."""
+    begun_ns: int = 0
+    """First anchor, of all or after a gap."""
+    released_ns: int | None = None
+    """Newest anchor that was released."""
+    anchors: Stream = Stream()
+    """Anchors that wait."""
+    others: Mapping[type[Any], Stream] = MappingProxyType({})
+    suspect: Any | None = None
+    """A sample stamped far from all others, set aside."""
+    late: tuple[int, int] = (0, 0)
+    """Late anchors in a row, and the stamp of the last one."""
+
+    def stream(self, kind: type[Any]) -> Stream:
+        """What another sensor has measured."""
+        return self.others.get(kind, NOTHING)
+
+    def with_stream(self, kind: type[Any], stream: Stream) -> Inbox:
+        """The inbox with another stream in place of that sensor's."""
+        return self._replace(others=MappingProxyType({**self.others, kind: stream}))
+
+
+def due(gate: Gate, inbox: Inbox) -> int:
+    """Number of anchors that need not wait any longer."""
+    waiting, newest_ns = inbox.anchors.samples, inbox.anchors.newest_ns
+    if not waiting or newest_ns is None:
+        return 0
+    in_order = bisect_right(waiting, newest_ns - gate.max_lag_ns, key=lambda anchor: anchor.t_ns)
+    count = inbox.anchors.excess
+    while count < in_order and not _waits(gate, inbox, waiting[count], newest_ns):
+        count += 1
+    return count
+
+
+def release(gate: Gate, inbox: Inbox, count: int) -> tuple[Inbox, tuple[Matched, ...]]:
+    """Release the first `count` anchors, each with the samples of its time."""
+    matched = []
+    for anchor in inbox.anchors.samples[:count]:
+        sources = () if isinstance(anchor, Measurement) else gate.sources
+        values = tuple(_value(inbox, source, anchor.t_ns) for source in sources)
+        for source, value in zip(sources, values, strict=True):
+            if source.once and value is not None:
+                spent = inbox.others[source.kind]._replace(spent_ns=value.t_ns)
+                inbox = inbox.with_stream(source.kind, spent)
+        matched.append(Matched(anchor, values))
+    if matched:
+        left = inbox.anchors._replace(samples=inbox.anchors.samples[count:])
+        inbox = inbox._replace(anchors=left, released_ns=matched[-1].anchor.t_ns)
+    return inbox, tuple(matched)
+
+
+def _waits(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> bool:
+    if isinstance(anchor, Measurement):  # complete as it is
+        return False
+    return any(
+        anchor.t_ns > newest_ns - source.wait_ns
+        and not inbox.stream(source.kind).has_reached(anchor.t_ns)
+        and _is_present(inbox, source, anchor.t_ns)
+        for source in gate.sources
+    )
+
+
+def _is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
+    """Whether a sensor is there: heard not long before, and so by now, whatever the order of arrival.
+
+    In the beginning each may still come.
+    """
+    begins = inbox.begun_ns <= t_ns <= inbox.begun_ns + source.wait_ns
+    return begins or inbox.stream(source.kind).has_between(t_ns - PRESENT_NS, t_ns - source.wait_ns)
+
+
+def _value(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
+    """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
+    known_ns = t_ns if _is_present(inbox, source, t_ns) else t_ns - source.wait_ns
+    latest = inbox.stream(source.kind).latest(known_ns)
+    return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest

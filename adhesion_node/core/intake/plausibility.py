@@ -1,0 +1,82 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""What is well formed and must not be believed all the same: a position sensor that is stuck, a speed in km/h."""
+
+from __future__ import annotations
+
+import math
+from typing import Generic, NamedTuple, Protocol, TypeVar
+
+from .samples import Measurement
+
+STUCK_STEPS, LEAST_STUCK_M, MOST_STUCK_M = 2.0, 2.0, 10.0
+"""A position that repeats itself to the bit comes in steps, and steps of d alone have the variance d^2/12. A train that
+must have gone so many of the greatest steps that the variance allows, within these bounds, has a stuck sensor."""
+
+STRONGEST_MPS2 = 3.0
+"""No train brakes harder."""
+
+KMH_PER_MPS, KMH_BAND, KMH_FROM_MPS = 3.6, 0.15, 5.0
+"""A speed within this share of 3.6 times the estimate is one in km/h; told from this speed on."""
+
+
+class Motion(Protocol):
+    """What was known of the train's motion at some time: an estimate."""
+
+    @property
+    def t_ns(self) -> int: ...
+
+    @property
+    def speed_mps(self) -> float: ...
+
+    @property
+    def speed_std_mps(self) -> float: ...
+
+
+Known = TypeVar("Known", bound=Motion)
+
+
+class Repeated(NamedTuple, Generic[Known]):
+    """A position, since when it has been the same, and what was known before."""
+
+    position_m: float
+    since_ns: int
+    before: Known | None
+
+    def after(self, measurement: Measurement, known: Known | None) -> Repeated[Known]:
+        """Note the next position; `known` is what is known now."""
+        same = measurement.position_m == self.position_m and measurement.t_ns >= self.since_ns
+        return self if same else Repeated(measurement.position_m, measurement.t_ns, known)
+
+    def is_stuck(self, measurement: Measurement) -> bool:
+        """Whether the train must have moved on from a position that is still the same."""
+        if self.before is None:
+            return False
+        known_s = abs(self.since_ns - self.before.t_ns) * 1e-9
+        slowest = max(self.before.speed_mps - 3.0 * self.before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
+        return least_way(slowest, (measurement.t_ns - self.since_ns) * 1e-9) >= stuck_way(measurement.variance_m2)
+
+
+def stuck_way(variance_m2: float) -> float:
+    """Way, m, over which no working sensor of this variance repeats itself.
+
+    >>> [round(stuck_way(std_m**2), 2) for std_m in (0.1, 0.5, 5.0)]
+    [2.0, 3.46, 10.0]
+    """
+    return min(max(STUCK_STEPS * math.sqrt(12.0 * variance_m2), LEAST_STUCK_M), MOST_STUCK_M)
+
+
+def least_way(speed_mps: float, elapsed_s: float) -> float:
+    """Way, m, that a train has gone at least after it was as fast as this.
+
+    >>> least_way(30.0, 2.0), least_way(30.0, 100.0), least_way(0.0, 5.0)
+    (54.0, 150.0, 0.0)
+    """
+    braking_s = min(elapsed_s, speed_mps / STRONGEST_MPS2)
+    return speed_mps * braking_s - STRONGEST_MPS2 * braking_s**2 / 2
+
+
+def is_kmh(speed_mps: float, known_mps: float) -> bool:
+    """Whether a measured speed is one in km/h, the train's being known."""
+    return known_mps >= KMH_FROM_MPS and abs(speed_mps / (KMH_PER_MPS * known_mps) - 1.0) <= KMH_BAND

@@ -1,0 +1,88 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The samples of one sensor, sorted by their stamps, and the most that may come in a second. Immutable."""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right, insort
+from typing import Any, NamedTuple
+
+from .outcome import Outcome
+
+INTERVAL_NS = 5_000_000
+"""Least mean time between two samples of a sensor: 200 a second are more than an estimate needs."""
+
+BURST_NS = 10 * INTERVAL_NS
+"""By how much samples may run ahead of that mean: the jitter of a sensor of 200 Hz, and no flood."""
+
+MOST = 12_000
+"""Samples kept at most, 60 s of 200 Hz: stamps that scatter about one time let none go."""
+
+
+class Stream(NamedTuple):
+    """Samples of one sensor that may still be needed."""
+
+    samples: tuple[Any, ...] = ()
+    """Sorted by t_ns, each stamp once."""
+    newest_ns: int | None = None
+    """Newest stamp that has come."""
+    allowed_ns: int = 0
+    """When the next sample would come if all had kept the mean (generic cell rate algorithm)."""
+    spent_ns: int | None = None
+    """Stamp up to which the samples have been used up, where each is one observation."""
+
+    def refusal(self, t_ns: int) -> Outcome | None:
+        """Why a sample of that stamp may not be added; None where it may."""
+        if self.newest_ns is not None and t_ns > self.newest_ns and t_ns < self.allowed_ns - BURST_NS:
+            return Outcome.TOO_OFTEN
+        index = bisect_left(self.samples, t_ns, key=_stamp)
+        doubled = index < len(self.samples) and self.samples[index].t_ns == t_ns
+        return Outcome.DUPLICATE if doubled else None
+
+    def added(self, sample: Any) -> Stream:
+        """The stream with one more sample."""
+        t_ns = sample.t_ns
+        if self.newest_ns is None:
+            return Stream((*self.samples, sample), t_ns, t_ns + INTERVAL_NS)
+        if t_ns >= self.newest_ns:
+            allowed_ns = max(t_ns, self.allowed_ns) + INTERVAL_NS
+            return Stream((*self.samples, sample), t_ns, allowed_ns, self.spent_ns)
+        samples = list(self.samples)
+        insort(samples, sample, key=_stamp)
+        return self._replace(samples=tuple(samples))
+
+    def between(self, first_ns: int, last_ns: int) -> Stream:
+        """What is stamped from the first to the last time, as the beginning of a stream."""
+        kept = [sample for sample in self.samples if first_ns <= sample.t_ns <= last_ns]
+        return Stream(tuple(kept), kept[-1].t_ns, kept[-1].t_ns + INTERVAL_NS) if kept else Stream()
+
+    @property
+    def excess(self) -> int:
+        """Samples beyond the most that are kept."""
+        return max(len(self.samples) - MOST, 0)
+
+    def since(self, first_ns: int) -> Stream:
+        """Without what is older than a time or beyond the most that are kept."""
+        first = max(bisect_left(self.samples, first_ns, key=_stamp), self.excess)
+        return self._replace(samples=self.samples[first:]) if first > 0 else self
+
+    def has_between(self, first_ns: int, last_ns: int) -> bool:
+        """Whether a kept sample is stamped from the first to the last time."""
+        index = bisect_left(self.samples, first_ns, key=_stamp)
+        return index < len(self.samples) and self.samples[index].t_ns <= last_ns
+
+    def has_reached(self, t_ns: int) -> bool:
+        """Whether a sample with this or a later stamp has come."""
+        return self.newest_ns is not None and self.newest_ns >= t_ns
+
+    def latest(self, t_ns: int) -> Any | None:
+        """The newest sample that is not later than a time and not used up; None where there is none."""
+        index = bisect_right(self.samples, t_ns, key=_stamp) - 1
+        if index < 0 or (self.spent_ns is not None and self.samples[index].t_ns <= self.spent_ns):
+            return None
+        return self.samples[index]
+
+
+def _stamp(sample: Any) -> int:
+    return int(sample.t_ns)

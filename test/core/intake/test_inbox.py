@@ -1,0 +1,309 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The gate for time: pairing by stamps, whatever the order of arrival; waits, ages, jumps; nothing without bound."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+
+from adhesion_node.core import Config, ForceSample, PositionSample, PressureSample, Sample, SpeedSample, WheelSample
+from adhesion_node.core.creep.config import CreepConfig
+from adhesion_node.core.creep.estimator import gate_of as creep_gate_of
+from adhesion_node.core.estimator import gate_of
+from adhesion_node.core.intake.inbox import drain, push, settle
+from adhesion_node.core.intake.outcome import Outcome
+from adhesion_node.core.intake.pairing import Gate, Inbox, Matched
+from adhesion_node.core.intake.stream import MOST
+
+S = 1_000_000_000
+GATE = gate_of(Config(max_outliers=5))
+CREEP = creep_gate_of(CreepConfig())
+
+
+class Feeder:
+    """Pushes samples and keeps what comes out."""
+
+    def __init__(self, gate: Gate = GATE) -> None:
+        self.gate, self.inbox = gate, Inbox()
+        self.matched: list[Matched] = []
+        self.ended: list[Matched] = []
+        self.outcomes: list[Outcome] = []
+
+    def push(self, *samples: Sample) -> list[Matched]:
+        """Push samples; return what they release."""
+        before = len(self.matched)
+        for sample in samples:
+            self._keep(push(self.gate, self.inbox, sample))
+        return self.matched[before:]
+
+    def drain(self) -> list[Matched]:
+        """End of the data."""
+        before = len(self.matched)
+        self._keep(drain(self.gate, self.inbox))
+        return self.matched[before:]
+
+    def _keep(self, pushed: Any) -> None:
+        self.inbox = pushed.inbox
+        self.ended += pushed.ended
+        self.matched += pushed.matched
+        self.outcomes += [event.outcome for event in pushed.events]
+
+
+def position(t_s: float) -> PositionSample:
+    return PositionSample(round(t_s * S), 10 * t_s, 0.25)
+
+
+def pressure(t_s: float, pressure_pa: float) -> PressureSample:
+    return PressureSample(round(t_s * S), pressure_pa)
+
+
+def speed(t_s: float, speed_mps: float) -> SpeedSample:
+    return SpeedSample(round(t_s * S), speed_mps)
+
+
+def running(until_s: float = 1.0) -> Feeder:
+    """A gate behind its beginning: positions and pressures of 10 Hz up to a time, no other sensor."""
+    feeder = Feeder()
+    for tick in range(round(until_s * 10) + 1):
+        feeder.push(pressure(tick / 10, tick), position(tick / 10))
+    return feeder
+
+
+def pressures(matched: list[Matched]) -> list[float | None]:
+    return [each.values[0] and each.values[0].pressure_pa for each in matched]
+
+
+def test_pairs_equal_stamps_at_once() -> None:
+    feeder = running()
+    assert feeder.push(pressure(1.1, 5.0)) == []
+    ((anchor, values),) = feeder.push(position(1.1))
+    assert (anchor, values) == (position(1.1), (pressure(1.1, 5.0), None, None))
+
+
+def test_in_the_beginning_every_sensor_is_waited_for() -> None:
+    feeder = Feeder()
+    assert feeder.push(pressure(0.0, 5.0), position(0.0)) == []
+    ((_, values),) = feeder.push(speed(0.0, 9.0), WheelSample(0, (20.0,)))
+    assert values == (pressure(0.0, 5.0), speed(0.0, 9.0), WheelSample(0, (20.0,)))
+
+
+def test_the_order_of_arrival_within_a_tick_does_not_matter() -> None:
+    ticks: list[list[Sample]] = [[position(t), pressure(t, 100 * t), speed(t, 80 - t)] for t in (1.0, 1.1, 1.2)]
+    wanted = None
+    for orders in itertools.product(itertools.permutations(range(3)), repeat=3):
+        feeder = Feeder()
+        feeder.push(*(tick[i] for tick, order in zip(ticks, orders, strict=True) for i in order))
+        feeder.drain()
+        wanted = wanted or feeder.matched
+        assert feeder.matched == wanted
+    assert wanted is not None
+    assert [values[:2] for _, values in wanted] == [(tick[1], tick[2]) for tick in ticks]
+
+
+def test_waits_for_the_pressure_of_its_own_time() -> None:
+    feeder = running()
+    assert feeder.push(position(1.1)) == []
+    assert pressures(feeder.push(pressure(1.1, 2.0))) == [2.0]
+
+
+def test_takes_the_newest_pressure_that_is_not_later() -> None:
+    feeder = running()
+    feeder.push(pressure(1.05, 1.0), position(1.1))
+    assert pressures(feeder.push(pressure(1.15, 2.0))) == [1.0]
+
+
+def test_a_sensor_that_has_fallen_silent_is_waited_for_only_as_long_as_allowed() -> None:
+    feeder = running()
+    released = [[each.anchor.t_ns / S for each in feeder.push(position(t))] for t in (1.1, 1.2, 1.35, 1.6)]
+    assert released == [[], [], [1.1], [1.2, 1.35]]
+    assert [each.anchor.t_ns / S for each in feeder.drain()] == [1.6]
+    assert feeder.drain() == []
+
+
+def test_a_sensor_that_is_gone_is_not_waited_for() -> None:
+    feeder = running()
+    for tick in range(11, 60):
+        feeder.push(position(tick / 10))
+    assert len(feeder.push(position(6.0))) == 1
+
+
+def test_an_old_value_counts_as_none() -> None:
+    feeder = running()
+    feeder.push(*(position(1.0 + k / 10) for k in range(1, 15)))
+    known = {each.anchor.t_ns / S: value for each, value in zip(feeder.matched, pressures(feeder.matched), strict=True)}
+    assert known[2.0] == 10.0  # 1 s old
+    assert known[2.1] is None
+
+
+def test_a_speed_counts_once_and_only_fresh() -> None:
+    feeder = running()
+    for k in range(1, 6):
+        feeder.push(pressure(1 + k / 10, 0.0), speed(1 + k / 10, float(k)), position(1 + k / 10))
+    feeder.push(pressure(1.55, 0.0), position(1.55), pressure(2.0, 0.0), position(2.0))
+    feeder.drain()
+    speeds = {each.anchor.t_ns / S: each.values[1] and each.values[1].speed_mps for each in feeder.matched}
+    assert [speeds[t] for t in (1.3, 1.4, 1.5, 1.55, 2.0)] == [3.0, 4.0, 5.0, None, None]
+
+
+def test_late_and_double_anchors_are_told() -> None:
+    feeder = running()
+    feeder.push(position(0.95), position(1.0), position(1.1), position(1.1))
+    assert feeder.outcomes == [Outcome.LATE, Outcome.DUPLICATE, Outcome.DUPLICATE]
+
+
+def test_a_second_pressure_with_the_same_stamp_is_told() -> None:
+    feeder = running()
+    feeder.push(pressure(1.0, 7.0), pressure(0.9, 8.0))
+    assert feeder.outcomes == [Outcome.REPEATED, Outcome.REPEATED]
+
+
+@pytest.mark.parametrize("jump_s", [-500.0, 500.0])
+def test_a_jump_of_the_time_that_two_sensors_agree_on_begins_anew_at_once(jump_s: float) -> None:
+    feeder = running(1000.0)
+    feeder.push(pressure(1000.1 + jump_s, 5.0))
+    assert feeder.outcomes == []
+    feeder.push(position(1000.1 + jump_s))
+    assert feeder.outcomes == [Outcome.RESET]
+    assert pressures(feeder.drain()) == [5.0]
+
+
+@pytest.mark.parametrize("jump_s", [-500.0, 500.0])
+def test_a_jump_brings_no_old_pressure_and_loses_no_position(jump_s: float) -> None:
+    feeder = running(1000.0)
+    feeder.push(position(1000.1), position(1000.1 + jump_s), position(1000.2 + jump_s))
+    assert [each.anchor.t_ns for each in feeder.ended] == [round(1000.1 * S)]
+    assert pressures(feeder.drain()) == [None, None]
+    assert feeder.outcomes == [Outcome.RESET]
+
+
+def test_a_single_stray_stamp_is_set_aside_then_dropped() -> None:
+    feeder = running()
+    feeder.push(position(31.0))
+    assert feeder.inbox.suspect == position(31.0)
+    feeder.push(pressure(1.1, 1.0), position(1.1))
+    assert feeder.outcomes == [Outcome.STRAY]
+    assert feeder.inbox.suspect is None
+
+
+def test_a_stray_stamp_sent_twice_does_not_agree_with_itself() -> None:
+    feeder = running()
+    feeder.push(position(31.0), position(31.0), position(1.1))
+    assert feeder.outcomes == [Outcome.DUPLICATE, Outcome.STRAY]
+
+
+def test_late_anchors_in_a_row_are_a_step_back_in_time() -> None:
+    feeder = running(20.0)
+    feeder.push(*(position(k / 10) for k in range(5)))
+    assert feeder.outcomes == [Outcome.LATE] * 4 + [Outcome.RESET]
+    feeder.push(position(0.5))
+    assert [each.anchor.t_ns for each in feeder.drain()] == [round(0.4 * S), round(0.5 * S)]
+
+
+def test_random_streams_lose_and_double_nothing() -> None:
+    rng = np.random.default_rng(12)
+    for _ in range(50):
+        feeder, samples = Feeder(), list[Sample]()
+        for t in rng.uniform(0, 300, 60):
+            samples.append((position(t), pressure(t, t), speed(t, t))[rng.integers(3)])
+        feeder.push(*samples)
+        feeder.drain()
+        stamps = [each.anchor.t_ns for each in feeder.ended + feeder.matched]
+        positions = [sample.t_ns for sample in samples if isinstance(sample, PositionSample)]
+        assert len(set(stamps)) == len(stamps)
+        assert set(stamps) <= set(positions)
+        drops = sum(outcome is not Outcome.RESET for outcome in feeder.outcomes)
+        assert len(positions) - drops <= len(stamps) <= len(positions)
+        for anchor, (known, *_) in feeder.matched:
+            if known is not None:
+                assert 0 <= anchor.t_ns - known.t_ns <= S
+
+
+def test_what_waits_has_a_bound() -> None:
+    feeder = Feeder(gate_of(Config(max_lag_s=60.0)))
+    feeder.push(position(100.0))
+    for number in range(MOST + 5):
+        feeder.push(PositionSample(100 * S - 1 - number, 0.0, 1.0))
+    assert len(feeder.inbox.anchors.samples) == MOST
+    assert len(feeder.matched) + len(feeder.outcomes) == 6
+
+
+@pytest.mark.parametrize("kind", [SpeedSample, ForceSample])
+def test_one_stream_alone_has_a_bound(kind: type[Any]) -> None:
+    feeder = Feeder(CREEP)
+    for number in range(20_000):
+        feeder.push(kind(number * S // 100, 1.0))
+    (stream,) = feeder.inbox.others.values()
+    assert len(stream.samples) <= MOST
+
+
+def test_streams_stay_short_while_anchors_come() -> None:
+    feeder = Feeder(CREEP)
+    for number in range(5000):
+        t_ns = number * S // 100
+        feeder.push(SpeedSample(t_ns, 1.0), ForceSample(t_ns, 1.0), WheelSample(t_ns, (1.0,)))
+    assert all(len(stream.samples) < 500 for stream in feeder.inbox.others.values())
+
+
+def test_a_flood_is_thinned_to_200_a_second() -> None:
+    feeder = Feeder()
+    feeder.push(*(PressureSample(number * S // 10_000, 1.0) for number in range(10_000)))
+    assert feeder.outcomes.count(Outcome.TOO_OFTEN) == 10_000 - len(feeder.inbox.stream(PressureSample).samples)
+    assert 200 <= len(feeder.inbox.stream(PressureSample).samples) <= 211
+
+
+def test_silence_ends_every_wait_but_that_of_a_stray_stamp() -> None:
+    feeder = running()
+    feeder.push(position(1.1), position(31.0))
+    settled = settle(feeder.gate, feeder.inbox)
+    assert [each.anchor for each in settled.matched] == [position(1.1)]
+    assert settled.inbox.suspect == position(31.0)
+
+
+class TestCreep:
+    """The same gate for the creep estimator: wheel speeds wait for the train's speed and the force."""
+
+    MS = 1_000_000
+    START = 10**12
+
+    def wheel(self, ms: int) -> WheelSample:
+        return WheelSample(self.START + ms * self.MS, (16.0, 16.1))
+
+    def speed(self, ms: int, value: float = 10.0) -> SpeedSample:
+        return SpeedSample(self.START + ms * self.MS, value)
+
+    def force(self, ms: int, value: float = 5e4) -> ForceSample:
+        return ForceSample(self.START + ms * self.MS, value)
+
+    def test_the_order_of_arrival_does_not_matter(self) -> None:
+        samples: tuple[Sample, ...] = (self.wheel(0), self.speed(0), self.force(0))
+        for order in itertools.permutations(samples):
+            assert Feeder(CREEP).push(*order) == [Matched(samples[0], samples[1:])]
+
+    def test_a_wheel_speed_waits_for_both(self) -> None:
+        feeder = Feeder(CREEP)
+        assert feeder.push(self.wheel(10), self.speed(10), self.force(0)) == []
+        ((_, (_, force)),) = feeder.push(self.force(20, 7e4))
+        assert force == self.force(0)
+
+    def test_slower_sensors_serve_several_wheel_speeds(self) -> None:
+        feeder = Feeder(CREEP)
+        for ms in range(0, 100, 10):
+            if ms % 50 == 0:
+                feeder.push(self.speed(ms, float(ms)), self.force(ms))
+            feeder.push(self.wheel(ms))
+        feeder.drain()
+        assert [speed.speed_mps for _, (speed, _) in feeder.matched] == [0.0] * 5 + [50.0] * 5
+
+    def test_a_stray_stamp_makes_no_later_sample_late(self) -> None:
+        feeder = Feeder(CREEP)
+        for ms in range(0, 1000, 10):
+            stray = [self.wheel(30_000)] if ms == 500 else []
+            feeder.push(*stray, self.speed(ms), self.force(ms), self.wheel(ms))
+        feeder.drain()
+        assert len(feeder.matched) == 100
+        assert feeder.outcomes == [Outcome.STRAY]
