@@ -107,19 +107,19 @@ def jacobian(config: Config, mean: Array, dt_s: float, brake: float) -> Array:
     return result
 
 
-def _joined(law: Gaussian, config: EkfConfig) -> tuple[Array, Array]:
-    """A law of (s, v) with the adhesion as at the start of a braking."""
+def _joined(belief: Gaussian, config: EkfConfig) -> tuple[Array, Array]:
+    """A belief in (s, v) with the adhesion as at the start of a braking."""
     covariance = np.zeros((3, 3))
-    covariance[:2, :2], covariance[2, 2] = law.covariance, config.tuning.mu_std**2
-    return np.append(law.mean, config.base.start_mu), covariance
+    covariance[:2, :2], covariance[2, 2] = belief.covariance, config.tuning.mu_std**2
+    return np.append(belief.mean, config.base.start_mu), covariance
 
 
 def _predict(config: EkfConfig, state: EkfState, dt_s: float, newest: Measurement) -> tuple[Array, Array]:
     base = config.base
     brake = base.brake(newest.brake_pressure_pa)
     if brake == 0.0:
-        law = Gaussian(state.mean[:2], state.covariance[:2, :2])
-        return _joined(coast(law, dt_s, base.coasting_noise_mps**2 / 0.1), config)
+        belief = Gaussian(state.mean[:2], state.covariance[:2, :2])
+        return _joined(coast(belief, dt_s, base.coasting_noise_mps**2 / 0.1), config)
     slope = jacobian(base, state.mean, dt_s, brake)
     position, speed = base.motion.advance(state.mean[0], state.mean[1], dt_s, brake, float(state.mean[2]))
     noise = np.diag([*base.motion.noise(dt_s), config.tuning.mu_noise**2 * dt_s / 0.1])

@@ -82,7 +82,7 @@ def _row(name: str, found: Array) -> dict[str, Any]:
 
 
 def _likeliest(data: Data, creep_std: float) -> Array:
-    noise = creep_eiv.Noise(creep_std, NOISE_STD)
+    noise = creep_eiv.NoiseStd(creep_std, NOISE_STD)
     thetas = [
         creep_eiv.fit(creeps, adhesions, SLOPE, START_SHARE * DRY, noise).theta
         for creeps, adhesions in zip(data.creep.T, data.adhesion.T, strict=True)

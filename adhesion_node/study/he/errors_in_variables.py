@@ -25,7 +25,7 @@ NEWTON_STEPS = 8
 """Steps by which a measured creep is moved onto the curve; each gains the square of the last one's accuracy."""
 
 
-class Noise(NamedTuple):
+class NoiseStd(NamedTuple):
     """Standard deviations of the measured creep and adhesion."""
 
     creep: float
@@ -40,7 +40,7 @@ class Fit(NamedTuple):
     converged: bool
 
 
-def fit(creeps: Array, adhesions: Array, slope: float, start: Array, noise: Noise) -> Fit:
+def fit(creeps: Array, adhesions: Array, slope: float, start: Array, noise: NoiseStd) -> Fit:
     """Fit the curve to measured creeps and adhesions of shape (n,), from `start`; p1 and p2 stay positive.
 
     Raises ValueError when a standard deviation is not above 0 or there are fewer than three samples.
@@ -61,7 +61,7 @@ def fit(creeps: Array, adhesions: Array, slope: float, start: Array, noise: Nois
     return Fit(theta, np.linalg.inv(information) * np.outer(theta, theta), bool(solved.success))
 
 
-def true_creeps(creeps: Array, adhesions: Array, slope: float, theta: Array, noise: Noise) -> Array:
+def true_creeps(creeps: Array, adhesions: Array, slope: float, theta: Array, noise: NoiseStd) -> Array:
     """The likeliest true creep of every sample, given the curve: Gauss-Newton steps of (s_mu, s_l) distance."""
     ratio = (noise.creep / noise.adhesion) ** 2
     moved = np.maximum(creeps, 0.0)
@@ -72,14 +72,14 @@ def true_creeps(creeps: Array, adhesions: Array, slope: float, theta: Array, noi
     return moved
 
 
-def _distances(creeps: Array, adhesions: Array, slope: float, theta: Array, noise: Noise) -> Array:
+def _distances(creeps: Array, adhesions: Array, slope: float, theta: Array, noise: NoiseStd) -> Array:
     """Signed distance of every sample to the curve in standard deviations."""
     near = true_creeps(creeps, adhesions, slope, theta, noise)
     away = (adhesions - adhesion(near, slope, theta)) / noise.adhesion
     return np.asarray(np.copysign(np.hypot(away, (creeps - near) / noise.creep), away))
 
 
-def _jacobian(creeps: Array, adhesions: Array, slope: float, theta: Array, noise: Noise) -> Array:
+def _jacobian(creeps: Array, adhesions: Array, slope: float, theta: Array, noise: NoiseStd) -> Array:
     """Derivatives of the distances by the logarithms of p1 and p2; at the nearest point only the curve moves."""
     near = true_creeps(creeps, adhesions, slope, theta, noise)
     spread = np.hypot(noise.adhesion, _steepness(near, slope, theta) * noise.creep)

@@ -16,13 +16,13 @@ from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
 from ..baselines.ekf import TUNED, EkfConfig, Tuning, ekf_init, ekf_step
 from ..xie import lockstep
-from .world import Refusal, Run
+from .world import Refusal, SimulatedRun
 
 
 class Lane(NamedTuple):
     """A simulated run from one start of mu."""
 
-    run: Run
+    run: SimulatedRun
     start_mu: float
 
 
@@ -71,7 +71,8 @@ class Estimator(NamedTuple):
 
     def config_in(self, lane: Lane) -> Config:
         """Settings for a lane."""
-        track = lane.run.world.known.track if self.knows_track else self.config.track
+        world = lane.run.world
+        track = world.of_plant.known_track(world) if self.knows_track else self.config.track
         return replace(self.config, track=track, start_mu=lane.start_mu)
 
     def seed_in(self, lane: Lane) -> int:

@@ -21,7 +21,7 @@ from ...run.score import CONVERGED_AFTER_MPS
 from .estimators import Course, Estimator, Lane
 from .running import Running, run_all
 from .tasks import Arrays
-from .world import PLANTS, World, simulate
+from .world import World, simulate
 
 FIRST_SEED = 1000
 """Run r of a table has simulator and estimator seed FIRST_SEED + r."""
@@ -41,7 +41,7 @@ limits, whether it does after the first 30 km/h of braking, whether the estimate
 whether the end of the data gave it; measurements in its window, those accepted since the fault is over, changes of the
 rail told so far."""
 
-RUN = np.dtype([("seed", np.int64), ("start", np.float64), ("resets", np.int64), ("finite", np.bool_)])
+TRIAL = np.dtype([("seed", np.int64), ("start", np.float64), ("resets", np.int64), ("finite", np.bool_)])
 """A trial: how often the estimation started anew, and whether every number of the estimates was finite."""
 
 DROP = np.dtype([("seed", np.int64), ("reason", "U32"), ("count", np.int64), ("first_s", np.float64)])
@@ -96,7 +96,7 @@ class Results(NamedTuple):
 
     rows: Rows
     runs: NDArray[np.void]
-    """Array of `RUN`."""
+    """Array of `TRIAL`."""
     drops: NDArray[np.void]
     """Array of `DROP`."""
     window_ms: NDArray[np.float64]
@@ -132,13 +132,13 @@ def _together(parts: Sequence[Arrays]) -> Results:
 
 
 def _arrays(lane: Lane, course: Course) -> Arrays:
-    """Arrays of `ROW`, `RUN` and `DROP`."""
+    """Arrays of `ROW`, `TRIAL` and `DROP`."""
     seed, start = lane.run.seed, lane.start_mu
     numbers = (value for seen in course.seen for value in seen.prediction.estimate if isinstance(value, float))
     drops = [(seed, reason, count, course.dropped_s[reason]) for reason, count in course.dropped.items()]
     return {
         "rows": _rows(lane, course),
-        "runs": np.array([(seed, start, course.resets, all(map(math.isfinite, numbers)))], dtype=RUN),
+        "runs": np.array([(seed, start, course.resets, all(map(math.isfinite, numbers)))], dtype=TRIAL),
         "drops": np.array(drops, dtype=DROP),
     }
 
@@ -166,8 +166,8 @@ def _rows(lane: Lane, course: Course) -> Rows:
     )
     rows["scored"] = rows["limited"] & (rows["true_speed_mps"] < onset - CONVERGED_AFTER_MPS)
     if not np.isnan(rows["safe_m"]).all():
-        plant = PLANTS[lane.run.world.plant]
-        rows["true_stopping_m"] = plant.stopping_m(lane.run.world, rows["true_position_m"], rows["true_speed_mps"])
+        world = lane.run.world
+        rows["true_stopping_m"] = world.of_plant.stopping_m(world, rows["true_position_m"], rows["true_speed_mps"])
     return rows
 
 

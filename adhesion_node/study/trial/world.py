@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
@@ -14,12 +14,13 @@ from typing import NamedTuple
 from sim_node.faults.plan import FAULTS, NONE, Plan, faulty_run
 from sim_node.train.messages import SensorMessage, Tick
 from sim_node.train.plant import Truth
-from sim_node.train.scenario import Scenario, find
+from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings
 from sim_node.train.stopping import stopping_distances
 
 from ...core import Config, Measurement, Sample
 from ...core.estimator import paired
+from ...core.physics.track import Track
 from ...core.physics.train import Array
 from ...run.offline import READERS
 from ...wire.codecs import Rejected
@@ -38,7 +39,7 @@ class Refusal(NamedTuple):
 
 
 class World(NamedTuple):
-    """A scenario as it is believed, and all that the estimator is not told. With a seed it is a run."""
+    """A scenario of a plant, and all that the estimator is not told. With a seed it is a run."""
 
     scenario: str
     sensors: SensorSettings = SensorSettings()
@@ -51,9 +52,9 @@ class World(NamedTuple):
     """One of `PLANTS`."""
 
     @property
-    def known(self) -> Scenario:
-        """What the estimator believes."""
-        return find(self.scenario)
+    def of_plant(self) -> Plant:
+        """The train that runs in it."""
+        return PLANTS[self.plant]
 
     @property
     def over_s(self) -> float:
@@ -67,16 +68,18 @@ class World(NamedTuple):
 
 
 class Plant(NamedTuple):
-    """A simulated train: all that a trial asks of it."""
+    """A simulated train: all that a trial asks of it. Its scenarios are its own."""
 
     ticks: Callable[[World, int], Iterator[Tick]]
     """Truth and messages of every sample of a run, from world and seed."""
+    known_track: Callable[[World], Track]
+    """The track as an estimator may know it."""
     stopping_m: Callable[[World, Array, Array], Array]
     """True distances, m, from places, m, and speeds, m/s, to a standstill; shape (N,)."""
 
 
 def _point_mass(world: World, seed: int) -> Iterator[Tick]:
-    run = faulty_run(world.plan, world.known, world.period_s, seed, world.sensors)
+    run = faulty_run(world.plan, find(world.scenario), world.period_s, seed, world.sensors)
     if world.plan.fault != NONE:
         return run
     every = round(PERIOD_S / world.period_s)
@@ -84,11 +87,13 @@ def _point_mass(world: World, seed: int) -> Iterator[Tick]:
 
 
 def _stopping(world: World, position_m: Array, speed_mps: Array) -> Array:
-    true = FAULTS[world.plan.fault].scenario(world.known, world.plan.dose)
+    true = FAULTS[world.plan.fault].scenario(find(world.scenario), world.plan.dose)
     return stopping_distances(true, position_m, speed_mps)
 
 
-PLANTS: Mapping[str, Plant] = MappingProxyType({"point_mass": Plant(_point_mass, _stopping)})
+PLANTS: Mapping[str, Plant] = MappingProxyType(
+    {"point_mass": Plant(_point_mass, lambda world: find(world.scenario).track, _stopping)}
+)
 """By name: a further train is one line here."""
 
 
@@ -99,7 +104,7 @@ class Sent(NamedTuple):
     received: tuple[Sample | Refusal, ...]
 
 
-class Run(NamedTuple):
+class SimulatedRun(NamedTuple):
     """A simulated run."""
 
     world: World
@@ -112,15 +117,16 @@ class Run(NamedTuple):
 
 
 @lru_cache(maxsize=10)  # a small study takes the same few runs with every estimator
-def simulate(world: World, seed: int) -> Run:
+def simulate(world: World, seed: int) -> SimulatedRun:
     """Simulate a run of `world`."""
     born, sent = dict[int, Truth](), list[Sent]()
-    for truth, messages in PLANTS[world.plant].ticks(world, seed):
+    for truth, messages in world.of_plant.ticks(world, seed):
         born.setdefault(truth.t_ns, truth)
         for message in messages:
             born.setdefault(message.t_ns, truth)
         sent.append(Sent(truth.t_ns * 1e-9, tuple(map(_received, messages))))
-    return Run(world, seed, tuple(sent), tuple(_paired(sent)), MappingProxyType(born))
+    samples = (sample for _, received in sent for sample in received if not isinstance(sample, Refusal))
+    return SimulatedRun(world, seed, tuple(sent), tuple(paired(Config(), samples)), MappingProxyType(born))
 
 
 def _received(message: SensorMessage) -> Sample | Refusal:
@@ -128,8 +134,3 @@ def _received(message: SensorMessage) -> Sample | Refusal:
         return READERS[message.topic.name](plain(message), FRAME)
     except Rejected as refusal:
         return Refusal(message.topic.name, refusal.reason)
-
-
-def _paired(sent: Iterable[Sent]) -> Iterator[Measurement]:
-    samples = (sample for _, received in sent for sample in received if not isinstance(sample, Refusal))
-    return paired(Config(), samples)

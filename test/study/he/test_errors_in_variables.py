@@ -12,13 +12,13 @@ from scipy.optimize import curve_fit, least_squares
 from adhesion_node.core.creep.curve import adhesion, peak, regression
 from adhesion_node.core.creep.fit import add, nothing, solve_exact
 from adhesion_node.core.physics.train import Array
-from adhesion_node.study.he.errors_in_variables import Noise, fit, true_creeps
+from adhesion_node.study.he.errors_in_variables import NoiseStd, fit, true_creeps
 
 DRY = np.array([20 / 0.35 - 20, 100.0])
-NOISE = Noise(0.001, 0.01)
+NOISE = NoiseStd(0.001, 0.01)
 
 
-def noisy(seed: int, count: int, top: float = 0.1, noise: Noise = NOISE) -> tuple[Array, Array]:
+def noisy(seed: int, count: int, top: float = 0.1, noise: NoiseStd = NOISE) -> tuple[Array, Array]:
     rng = np.random.default_rng(seed)
     creeps = (np.arange(count) + 1) / count * top
     measured = creeps + noise.creep * rng.standard_normal(count)
@@ -44,7 +44,7 @@ def test_it_is_the_minimum_over_all_unknowns() -> None:
 
 
 def test_with_an_exact_creep_it_is_the_nonlinear_least_squares() -> None:
-    creeps, adhesions = noisy(2, 200, noise=Noise(1e-7, 0.01))
+    creeps, adhesions = noisy(2, 200, noise=NoiseStd(1e-7, 0.01))
     oracle, spread = curve_fit(
         lambda x, a, b: 20.0 * x / (1.0 + a * x + b * x * x),
         creeps,
@@ -53,7 +53,7 @@ def test_with_an_exact_creep_it_is_the_nonlinear_least_squares() -> None:
         sigma=np.full(200, 0.01),
         absolute_sigma=True,
     )
-    ours = fit(creeps, adhesions, 20.0, 0.2 * DRY, Noise(1e-7, 0.01))
+    ours = fit(creeps, adhesions, 20.0, 0.2 * DRY, NoiseStd(1e-7, 0.01))
     assert ours.theta == pytest.approx(oracle, rel=1e-4)
     assert ours.covariance == pytest.approx(spread, rel=1e-3)
 
@@ -92,4 +92,4 @@ def test_its_covariance_covers() -> None:
 
 def test_noise_of_zero_is_refused() -> None:
     with pytest.raises(ValueError, match="give standard deviations above 0, 3 samples"):
-        fit(np.ones(5), np.ones(5), 20.0, DRY, Noise(0.0, 0.01))
+        fit(np.ones(5), np.ones(5), 20.0, DRY, NoiseStd(0.0, 0.01))

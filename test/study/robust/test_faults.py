@@ -19,8 +19,8 @@ from adhesion_node.study.robust.cases import FAULTS as CASES
 from adhesion_node.study.robust.cases import Case
 from adhesion_node.study.robust.faults import row
 from adhesion_node.study.robust.plain import plain
-from adhesion_node.study.trial.trials import DROP, ROW, RUN, Results
-from adhesion_node.study.trial.world import PLANTS, World
+from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results
+from adhesion_node.study.trial.world import World
 from adhesion_node.wire import codecs as reading
 from sim_node.faults.plan import FAULTS, Plan
 from sim_node.nodes.messages import message_of
@@ -42,7 +42,7 @@ def read(sent: SensorMessage, message: Any) -> Any:
 @pytest.mark.parametrize("fault", sorted(set(FAULTS) - {"irregular"}))
 def test_plain_messages_are_read_as_those_of_ros(fault: str) -> None:
     world = World("cruise", ALL_SENSORS, Plan(fault, 1.0))
-    sent = [message for _, messages in PLANTS[world.plant].ticks(world, 1) for message in messages][:400]
+    sent = [message for _, messages in world.of_plant.ticks(world, 1) for message in messages][:400]
     assert {message.topic.name for message in sent} == set(READERS)
     assert [read(m, plain(m)) for m in sent] == [read(m, message_of(m)) for m in sent]
 
@@ -71,7 +71,7 @@ def arrays(errors: list[float], runs: int = 1, **columns: Any) -> Results:
     rows["window"] = 50
     for name, values in columns.items():
         rows[name] = values
-    summary = np.array([(run, 0.0, 1, True) for run in range(runs)], dtype=RUN)
+    summary = np.array([(run, 0.0, 1, True) for run in range(runs)], dtype=TRIAL)
     return Results(rows.ravel(), summary, np.array([], dtype=DROP), np.zeros(1), np.zeros(1))
 
 

@@ -15,7 +15,7 @@ from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.score import Truth, mean_relative_error_percent
 from adhesion_node.study.trial.estimators import Course, Lane, Seen
 from adhesion_node.study.trial.score import Curve, converged_kmh, of_runs, over_speed, relative_percent, score
-from adhesion_node.study.trial.trials import DROP, ROW, RUN, Results, Rows, _arrays, each_trial
+from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results, Rows, _arrays, each_trial
 from adhesion_node.study.trial.world import World, simulate
 
 
@@ -34,7 +34,7 @@ def rows_of(*values: tuple[float, float, float, float, float, bool, bool], seed:
 def results(*rows: Rows) -> Results:
     runs = [(own["seed"][0], own["start"][0], 0, True) for own in rows]
     drops = np.array([], dtype=DROP)
-    return Results(np.concatenate(rows), np.array(runs, dtype=RUN), drops, np.zeros(1), np.zeros(1))
+    return Results(np.concatenate(rows), np.array(runs, dtype=TRIAL), drops, np.zeros(1), np.zeros(1))
 
 
 RUN_OF_FOUR = rows_of(

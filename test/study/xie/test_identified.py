@@ -18,7 +18,7 @@ from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.trial.running import Running
-from adhesion_node.study.trial.trials import DROP, ROW, RUN, Results, Rows, Trials
+from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results, Rows, Trials
 from adhesion_node.study.xie import distances, identified, sensitivity, tables
 from adhesion_node.study.xie.methods import METHODS, STARTS, trials
 
@@ -39,7 +39,7 @@ def results(runs: Sequence[Rows]) -> Results:
     """Runs from one start each."""
     for rows, start in zip(runs, STARTS, strict=True):
         rows["start"] = start
-    table = np.array([(0, start, 0, True) for start in STARTS], dtype=RUN)
+    table = np.array([(0, start, 0, True) for start in STARTS], dtype=TRIAL)
     return Results(np.concatenate(runs), table, np.array([], dtype=DROP), np.zeros(1), np.zeros(1))
 
 

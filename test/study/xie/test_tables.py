@@ -15,7 +15,7 @@ import pytest
 
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.trial.tasks import save
-from adhesion_node.study.trial.trials import DROP, ROW, RUN, Results
+from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results
 from adhesion_node.study.xie.methods import METHODS, STARTS, trials
 from adhesion_node.study.xie.published import START_OF_MEAN, TABLES
 from adhesion_node.study.xie.tables import digest, rows
@@ -30,7 +30,7 @@ def two_runs() -> Results:
     table["mu"] = 0.1 + 0.01 * np.arange(5) * (1 + table["seed"])
     table["limited"] = table["scored"] = True
     table["lower"][:, 0] = 0.2
-    runs = np.array([(seed, start, 0, True) for seed in range(2) for start in STARTS], dtype=RUN)
+    runs = np.array([(seed, start, 0, True) for seed in range(2) for start in STARTS], dtype=TRIAL)
     return Results(table.ravel(), runs, np.array([], dtype=DROP), np.array([1.0, 3.0]), np.array([1.0, 2.5]))
 
 
