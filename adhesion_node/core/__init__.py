@@ -9,7 +9,7 @@ The names here are public: they stay when modules move.
 from .belief.regime import Regime
 from .config import Config
 from .estimate import Estimate
-from .estimator import State, advance, finish, init, step
+from .estimator import advance, finish, init, step
 from .intake.outcome import Event, Outcome
 from .intake.samples import (
     ForceSample,
@@ -22,6 +22,7 @@ from .intake.samples import (
 )
 from .physics import braking
 from .prediction import Prediction, predict
+from .state import State
 
 __all__ = [
     "Config",

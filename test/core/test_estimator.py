@@ -220,10 +220,10 @@ def test_what_the_window_knew_of_the_speed_is_not_lost_on_release() -> None:
         state, estimate = step(QUICK, state, measurement)
         last = estimate or last
     assert last is not None
-    assert state.law is not None
+    assert state.belief is not None
     assert state.window is None
-    assert (state.law.mean[0], state.law.mean[1]) == (last.position_m, last.speed_mps)
-    assert state.law.speed_std == last.speed_std_mps < 0.6  # the tracker's own is 0.7 under the brake
+    assert (state.belief.mean[0], state.belief.mean[1]) == (last.position_m, last.speed_mps)
+    assert state.belief.speed_std == last.speed_std_mps < 0.6  # the tracker's own is 0.7 under the brake
 
 
 @pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])

@@ -1,0 +1,67 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Everything that the estimator remembers from one sample to the next."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from .belief.gaussian import Gaussian
+from .estimate import Estimate, Knowledge
+from .intake.outcome import NO_COUNTS, Event, Outcome, counted
+from .intake.pairing import Gate, Inbox
+from .intake.plausibility import Repeated
+from .intake.samples import Measurement
+from .methods.protocol import AnyMethod, MethodWindow
+
+
+class State(NamedTuple):
+    """Everything the estimator remembers. Immutable: `step` returns a new one."""
+
+    seed: int
+    gate: Gate
+    method: AnyMethod
+    """How the adhesion is identified; another value may be put here."""
+    counts: Mapping[Outcome, int] = NO_COUNTS
+    events: tuple[Event, ...] = ()
+    """What the sample that came last brought about, other than that samples were accepted."""
+    inbox: Inbox = Inbox()
+    """Samples that wait."""
+    newest: Measurement | None = None
+    """The newest measurement that was accepted."""
+    belief: Gaussian | None = None
+    """Of (s, v) at the newest accepted measurement, from the tracker."""
+    window: MethodWindow | None = None
+    """The present braking; None while coasting or while the speed is not known."""
+    knowledge: Knowledge = Knowledge()
+    outliers: int = 0
+    """Outliers in a row."""
+    since_estimate: int = 0
+    """Measurements accepted since the last estimate."""
+    seen: Estimate | None = None
+    """The last estimate that positions have borne out."""
+    repeated: Repeated[Estimate] = Repeated(math.nan, 0, None)
+    unseen: int = 0
+    """Measurements in a row of a position sensor that is stuck."""
+
+    @property
+    def outcome(self) -> Outcome:
+        """What became of the sample that came last."""
+        return self.events[-1].outcome if self.events else Outcome.ACCEPTED
+
+    @property
+    def stuck(self) -> bool:
+        """Whether the position sensor repeats itself while the train moves."""
+        return self.unseen > 0
+
+    def told(self, *events: Event) -> State:
+        """The state after events, which are counted."""
+        return self._replace(counts=counted(self.counts, *events), events=self.events + events)
+
+    def forgotten(self) -> State:
+        """All but the counts, what still waits, and the number of windows, which keeps the random streams apart."""
+        seed, gate, method, counts, events, inbox, *_ = self
+        return State(seed, gate, method, counts, events, inbox, knowledge=Knowledge(windows=self.knowledge.windows))
