@@ -30,6 +30,7 @@ from adhesion_node.live.node import Live
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator
 from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.recorder import Recorder
+from adhesion_node.report.__main__ import main as report
 from adhesion_node.study.__main__ import main as study
 from sim_node.nodes import simulator, slip_simulator
 from sim_node.train.scenario import SCENARIOS
@@ -90,6 +91,15 @@ def test_a_page_with_another_number_is_found(tmp_path: Path) -> None:
 
 def test_the_readme_is_short() -> None:
     assert len(text_of(ROOT / "README.md").splitlines()) <= 250
+
+
+def test_the_table_of_the_readme_is_that_of_the_reference_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The demo's run, scenario and seed, is the recording's."""
+    (shown,) = re.findall(r"^```text\n(.*?)^```$", text_of(ROOT / "README.md"), re.MULTILINE | re.DOTALL)
+    assert report([str(ROOT / "bags" / "tunnel_entry"), "--output", str(tmp_path / "report"), "--target", "100"]) == 0
+    assert shown in capsys.readouterr().out
 
 
 def anchors(page: Path) -> set[str]:
