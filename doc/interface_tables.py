@@ -10,10 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import adhesion_node
+from adhesion_node.core import Outcome
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.params import Spec
 from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import Reason
 from adhesion_node.wire.topics import Topic
 from sim_node.faults.plan import FAULTS, NONE
 from sim_node.nodes import simulator, slip_simulator
@@ -61,6 +63,8 @@ def parts() -> dict[str, str]:
     return {
         **{f"parameters of {node}": "\n\n".join(_groups(specs)) for node, specs in NODES.items()},
         "topics": table(("topic", "type", "QoS", "meaning"), map(_topic, MEANINGS)),
+        "refusals": table(("refused message", "what helps"), ((f"`{r.name}`", _cell(r.value)) for r in Reason)),
+        "outcomes": table(("sample", "what becomes of it"), ((f"`{o.name}`", _cell(o.value)) for o in Outcome)),
         "house": table(("folder", "what is in it"), _house()),
         "faults": table(("`fault`", "what happens", "lasts, s", "share", "size"), _faults()),
     }
@@ -101,6 +105,11 @@ def _range(spec: Spec) -> str:
 def _topic(topic: Topic) -> tuple[str, ...]:
     quality = "sensor" if topic in MEASURED else "latched" if topic in LATCHED else "result"
     return f"`{topic.name}`", topic.type.replace("/msg/", "/"), quality, MEANINGS[topic]
+
+
+def _cell(text: str) -> str:
+    """Keep Markdown from taking a home folder for a struck-out text, or a bar for the end of a cell."""
+    return text.replace("~", "\\~").replace("|", "\\|")
 
 
 def _house() -> Iterator[tuple[str, str]]:
