@@ -18,7 +18,7 @@ from ...core.creep import fit as creep_fit
 from ...core.creep.curve import noise_products, peak
 from ...core.creep.recursion import Recursion, full_covariance
 from ...core.physics.train import Array
-from ..trial.tasks import Arrays
+from ..trial.running import Arrays
 from . import errors_in_variables as creep_eiv
 from .runs import (
     DRY,

@@ -21,9 +21,6 @@ from ..trial.text import Column
 from ..trial.trials import Results, Rows, each_trial, grouped
 from .cases import FAULTS, Case
 
-CHUNK = 10
-"""Seeds in a task."""
-
 NEAR = 3.0
 """Standard deviations within which an estimate counts as that of B."""
 
@@ -54,7 +51,7 @@ COLUMNS = (
 def rows(runs: int, where: Running) -> list[dict[str, Any]]:
     """Run what is missing; a row per fault."""
     cases = dict.fromkeys((*(case.without for case in FAULTS), *FAULTS))
-    found = grouped(((case, case.trials(runs)) for case in cases), CHUNK, where)
+    found = grouped(((case, case.trials(runs)) for case in cases), where)
     return [row(case, found[case], found[case.without]) for case in FAULTS]
 
 

@@ -17,8 +17,8 @@ from ..trial.text import Column
 from ..trial.trials import Results, Rows, each_trial, grouped
 from .cases import PAPER, RAILS, Case
 
-CHUNK = 10
-"""Seeds in a task."""
+FEW = 10
+"""Runs that do for the paper's method, which takes its time."""
 
 AGAIN_PERCENT = 10.0
 """Relative error below which the estimate counts as good again after a change."""
@@ -43,9 +43,9 @@ COLUMNS = (
 
 
 def rows(runs: int, where: Running) -> list[dict[str, Any]]:
-    """Run what is missing; a row per case. The paper's method, which takes its time, does with a few runs."""
-    wanted = ((case, case.trials(min(runs, CHUNK) if case.estimator == PAPER else runs)) for case in RAILS)
-    table = [row(case, found) for case, found in grouped(wanted, CHUNK, where).items()]
+    """Run what is missing; a row per case."""
+    wanted = ((case, case.trials(min(runs, FEW) if case.estimator == PAPER else runs)) for case in RAILS)
+    table = [row(case, found) for case, found in grouped(wanted, where).items()]
     clean = table[0]["mean_relative_error_percent"]
     for entry in table:
         error = entry["mean_relative_error_percent"]

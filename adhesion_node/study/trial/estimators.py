@@ -81,7 +81,7 @@ class Estimator(NamedTuple):
 
     def run(self, lanes: Sequence[Lane]) -> Tried:
         """Run through all lanes."""
-        return WAYS[self.way](self, lanes)
+        return WAYS[self.way].run(self, lanes)
 
 
 def _by_pipeline(estimator: Estimator, lane: Lane) -> Course:
@@ -148,12 +148,22 @@ def _in_lockstep(estimator: Estimator, lanes: Sequence[Lane]) -> Tried:
     return Tried([_estimated(estimates) for estimates in lockstep.drive(runs, window_ms)], window_ms)
 
 
-WAYS: Mapping[str, Callable[[Estimator, Sequence[Lane]], Tried]] = MappingProxyType(
+class Way(NamedTuple):
+    """How an estimator runs through its lanes."""
+
+    run: Callable[[Estimator, Sequence[Lane]], Tried]
+    weight: float
+    """Work of a lane, in that of a Kalman filter, about."""
+    lanes: int = 200
+    """In a task; side by side so many still stand in a processor's cache."""
+
+
+WAYS: Mapping[str, Way] = MappingProxyType(
     {
-        "pipeline": _one_by_one(_by_pipeline),
-        "core": _one_by_one(_by_core),
-        "ekf": _one_by_one(_by_ekf),
-        "lockstep": _in_lockstep,
+        "pipeline": Way(_one_by_one(_by_pipeline), 8.0, 10),
+        "core": Way(_one_by_one(_by_core), 6.0),
+        "ekf": Way(_one_by_one(_by_ekf), 1.0),
+        "lockstep": Way(_in_lockstep, 12.0),
     }
 )
-"""By name: how an estimator runs through its lanes."""
+"""By name."""

@@ -18,9 +18,8 @@ from sim_node.train.plant import ADHESION_LIMITED
 from ...core import Config, Regime
 from ...core.prediction import Prediction
 from ...run.score import CONVERGED_AFTER_MPS
-from .estimators import Course, Estimator, Lane
-from .running import Running, run_all
-from .tasks import Arrays
+from .estimators import WAYS, Course, Estimator, Lane
+from .running import Arrays, Running, run_all
 from .world import World, simulate
 
 FIRST_SEED = 1000
@@ -68,9 +67,8 @@ class Trials(NamedTuple):
     @property
     def weight(self) -> float:
         """How much work it is, in that of a Kalman filter, about."""
-        particles = self.estimator.config.method == "particle_em"
-        each = {"ekf": 1.0, "core": 6.0, "lockstep": 12.0, "pipeline": 80.0 if particles else 8.0}
-        return self.seeds * len(self.starts) * each[self.estimator.way]
+        slower = 10.0 if (self.estimator.way, self.estimator.config.method) == ("pipeline", "particle_em") else 1.0
+        return slower * self.seeds * len(self.starts) * WAYS[self.estimator.way].weight
 
     def compute(self) -> Arrays:
         """Simulate and estimate every trial."""
@@ -83,8 +81,11 @@ class Trials(NamedTuple):
         seconds = np.array([time.perf_counter() - started])
         return {**arrays, "window_ms": np.array(tried.window_ms), "seconds": seconds}
 
-    def split(self, chunk: int) -> list[Trials]:
-        """Divide the seeds into tasks of at most `chunk`."""
+    def tasks(self) -> list[Trials]:
+        """Divide the seeds into tasks. Raises ValueError without any."""
+        if self.seeds < 1:
+            raise ValueError(f"runs = {self.seeds}: give at least 1")
+        chunk = WAYS[self.estimator.way].lanes // len(self.starts)
         return [
             self._replace(first_seed=self.first_seed + first, seeds=min(chunk, self.seeds - first))
             for first in range(0, self.seeds, chunk)
@@ -112,9 +113,9 @@ class Results(NamedTuple):
         return self._replace(rows=self.rows[which])
 
 
-def grouped(wanted: Iterable[tuple[Key, Trials]], chunk: int, where: Running) -> dict[Key, Results]:
-    """Run what the cache lacks, and put together what has the same key."""
-    tasks = [(key, task) for key, trials in wanted for task in trials.split(chunk)]
+def grouped(wanted: Iterable[tuple[Key, Trials]], where: Running) -> dict[Key, Results]:
+    """Run what the cache lacks, and put together what has the same key. Raises ValueError without runs."""
+    tasks = [(key, task) for key, trials in wanted for task in trials.tasks()]
     parts: dict[Key, list[Arrays]] = {}
     for (key, _), found in zip(tasks, run_all([task for _, task in tasks], where), strict=True):
         parts.setdefault(key, []).append(found)

@@ -21,7 +21,7 @@ from ..trial.running import Running, add_running_options, running
 from ..trial.text import Column, lines
 from ..trial.trials import grouped
 from . import identified
-from .methods import CHUNK, METHODS, trials
+from .methods import METHODS, trials
 from .published import BRAKING_CASES, SAVINGS, WORST
 
 IDENTIFYING = ("particle_em", "rail_condition")
@@ -96,7 +96,7 @@ def by_identified(runs: int, where: Running) -> list[dict[str, Any]]:
         for scenario in identified.BRAKINGS
         for method in IDENTIFYING
     ]
-    return list(identified.rows(grouped(wanted, CHUNK, where)))
+    return list(identified.rows(grouped(wanted, where)))
 
 
 def run(options: argparse.Namespace) -> int:

@@ -20,7 +20,7 @@ from ..trial.running import add_running_options, running
 from ..trial.score import score
 from ..trial.text import Column, lines
 from ..trial.trials import Trials, grouped
-from .methods import CHUNK, METHODS, STARTS, trials
+from .methods import METHODS, STARTS, trials
 from .published import START_OF_MEAN, TABLES
 
 SCENARIO = "tunnel_entry"
@@ -72,7 +72,7 @@ def _changed(method: str, runs: int, setting: str, value: Any) -> Trials:
 
 def run(options: argparse.Namespace) -> int:
     """Run what is missing and print a line per setting and value."""
-    found = grouped(variations(options.runs), CHUNK, running(options))
+    found = grouped(variations(options.runs), running(options))
     table = [_row(*line, score(of_line)) for line, of_line in found.items()]
     report(options.json, table, "\n".join(_text(table)))
     return DONE

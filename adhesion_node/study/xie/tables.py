@@ -28,7 +28,7 @@ from ..trial.running import add_running_options, running
 from ..trial.score import over_speed, score
 from ..trial.text import Column, lines
 from ..trial.trials import Results, grouped
-from .methods import CHUNK, METHODS, NOMINAL_SIGMA_M, STARTS, trials
+from .methods import METHODS, NOMINAL_SIGMA_M, STARTS, trials
 from .published import START_OF_MEAN, TABLES
 
 Cell = tuple[str, str]
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
         for method, estimator in METHODS.items()
         for scenario in TABLES
     ]
-    cells = grouped(wanted, CHUNK, running(options))
+    cells = grouped(wanted, running(options))
     table = [row for cell, found in cells.items() for row in rows(cell, found)]
     if options.figures:
         from .curves import draw_all

@@ -23,7 +23,7 @@ from ..trial.running import add_running_options, running
 from ..trial.score import score
 from ..trial.text import Column, lines
 from ..trial.trials import Trials, grouped
-from .methods import CHUNK, METHODS, trials
+from .methods import METHODS, trials
 from .published import TABLES
 
 FIRST_SEED = 5000
@@ -55,7 +55,7 @@ def grid(runs: int) -> Iterator[tuple[tuple[Tuning, str], Trials]]:
 
 def run(options: argparse.Namespace) -> int:
     """Search the grid and print it, best first."""
-    found = grouped(grid(options.runs), CHUNK, running(options))
+    found = grouped(grid(options.runs), running(options))
     errors: dict[Tuning, list[float]] = {}
     for (tuning, _), results in found.items():
         errors.setdefault(tuning, []).append(score(results)["mean_relative_error_percent"])

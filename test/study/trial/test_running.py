@@ -19,10 +19,9 @@ import pytest
 
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.he.runs import VARYING_ETA, Experiment
-from adhesion_node.study.trial import engines, running, tasks
+from adhesion_node.study.trial import engines, running
 from adhesion_node.study.trial.estimators import Estimator
-from adhesion_node.study.trial.running import Running, run_all
-from adhesion_node.study.trial.tasks import Arrays, Task, file_name, load, save
+from adhesion_node.study.trial.running import Arrays, Running, Task, file_name, load, run_all, save
 from adhesion_node.study.trial.trials import Trials
 from adhesion_node.study.trial.world import World
 
@@ -96,7 +95,7 @@ def test_a_file_is_that_of_the_fields_and_the_code(tmp_path: Path, monkeypatch: 
     for folder, code in (("one", "a = 1"), ("other", "a = 2")):
         (tmp_path / folder / "sim_node").mkdir(parents=True)
         (tmp_path / folder / "sim_node" / "numbers.py").write_text(code)
-        monkeypatch.setattr(tasks, "PACKAGES", tmp_path / folder)
+        monkeypatch.setattr(running, "PACKAGES", tmp_path / folder)
         names.add(file_name(Square(1.0)))
     assert len(names) == 7
 

@@ -17,8 +17,7 @@ from adhesion_node.core import Config
 from adhesion_node.run.offline import READERS
 from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning
 from adhesion_node.study.trial.estimators import WAYS, Estimator
-from adhesion_node.study.trial.running import Running
-from adhesion_node.study.trial.tasks import Arrays, file_name, load, save
+from adhesion_node.study.trial.running import Arrays, Running, file_name, load, save
 from adhesion_node.study.trial.trials import ROW, Trials, grouped
 from adhesion_node.study.trial.world import Refusal, World, simulate
 from sim_node.faults.plan import Plan
@@ -38,9 +37,10 @@ def _quick() -> Arrays:
 
 
 def test_seeds_are_divided_so_that_each_comes_once() -> None:
-    tasks = QUICK._replace(seeds=95).split(40)
+    tasks = QUICK._replace(seeds=230).tasks()
+    assert [task.seeds for task in tasks] == [100, 100, 30]  # from two starts each
     seeds = [seed for task in tasks for seed in range(task.first_seed, task.first_seed + task.seeds)]
-    assert seeds == list(range(1000, 1095))
+    assert seeds == list(range(1000, 1230))
 
 
 def test_trials_come_back_from_the_cache_whole(tmp_path: Path) -> None:
@@ -87,7 +87,8 @@ def test_other_seeds_of_the_estimator_see_the_same_runs() -> None:
 
 def test_numbers_do_not_depend_on_the_workers_or_the_tasks(tmp_path: Path) -> None:
     both = QUICK._replace(seeds=2)
-    one, two = (grouped([("a", both)], 1, Running(tmp_path / f"{n}", workers=n))["a"] for n in (1, 2))
+    apart = [("a", QUICK), ("a", QUICK._replace(first_seed=1001))]
+    one, two = (grouped(apart, Running(tmp_path / f"{n}", workers=n))["a"] for n in (1, 2))
     assert one.rows.tobytes() == two.rows.tobytes()
     # sums may round otherwise in another batch
     np.testing.assert_allclose(both.compute()["rows"]["mu"], one.rows["mu"], rtol=1e-9)
@@ -96,11 +97,11 @@ def test_numbers_do_not_depend_on_the_workers_or_the_tasks(tmp_path: Path) -> No
 def test_groups_hold_what_has_their_key(tmp_path: Path) -> None:
     trials = Trials(World("tunnel_exit"), Estimator(way="ekf"), seeds=2)
     other = trials._replace(world=World("tunnel_entry"))
-    groups = grouped([("a", trials), ("b", other), ("a", trials._replace(first_seed=7, seeds=1))], 1, Running(tmp_path))
+    groups = grouped([("a", trials), ("b", other), ("a", trials._replace(first_seed=7, seeds=1))], Running(tmp_path))
     assert list(groups) == ["a", "b"]
     assert sorted(set(groups["a"].rows["seed"])) == [7, 1000, 1001]
     assert sorted(groups["b"].runs["seed"]) == [1000, 1001]
-    assert (groups["a"].seconds.size, groups["b"].window_ms.size) == (3, 2)
+    assert (groups["a"].seconds.size, groups["b"].window_ms.size) == (2, 2)
 
 
 @pytest.mark.parametrize("way", WAYS)

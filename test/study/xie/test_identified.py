@@ -76,7 +76,7 @@ def test_both_methods_stand_beside_each_other_on_the_trials_of_the_tables(
 ) -> None:
     asked: list[Trials] = []
 
-    def computed(wanted: Iterable[tuple[Key, Trials]], _chunk: int, _where: Running) -> dict[Key, Results]:
+    def computed(wanted: Iterable[tuple[Key, Trials]], _where: Running) -> dict[Key, Results]:
         """Where the paper's method reads mu 10 % too low, and the default one is right."""
         found = {}
         for key, some in wanted:
@@ -128,7 +128,7 @@ def test_one_setting_at_a_time_leaves_the_nominal_ones() -> None:
 def test_the_sensitivity_table_says_where_the_papers_figure_is_met(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def computed(wanted: Iterable[tuple[Key, Trials]], _chunk: int, _where: Running) -> dict[Key, Results]:
+    def computed(wanted: Iterable[tuple[Key, Trials]], _where: Running) -> dict[Key, Results]:
         """Errors of 1, 1.5, 10 ... %: rising with the noise."""
         scales = {0.05: 1.01, 0.1: 1.015}
         return {
@@ -142,4 +142,5 @@ def test_the_sensitivity_table_says_where_the_papers_figure_is_met(
     first = json.loads((tmp_path / "table.json").read_text())[0]
     assert (first["setting"], first["value"], first["method"]) == ("sigma_m", 0.05, "particle_em")
     assert first["mean_relative_error_percent"] == pytest.approx(1.0)
+    monkeypatch.undo()
     assert main(["sensitivity", "--runs", "0"]) == 2
