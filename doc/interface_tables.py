@@ -12,11 +12,9 @@ from pathlib import Path
 import adhesion_node
 from adhesion_node.core import Outcome
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator
-from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.params import Spec
-from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Reason
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.topics import TOPICS, Quality, Topic
 from sim_node.faults.plan import FAULTS, NONE
 from sim_node.nodes import simulator, slip_simulator
 
@@ -30,39 +28,14 @@ NODES: dict[str, Sequence[Spec]] = {
     "slip_simulator": slip_simulator.PARAMETERS,
 }
 
-MEANINGS = {
-    topics.POSITION: "**in**: measured position along the track, pose.position.x m, covariance[0] m²",
-    topics.BRAKE_PRESSURE: "**in**: brake cylinder, **absolute** Pa",
-    topics.SPEED: "**in**, optional: m/s; used while coasting, as a braked axle slides (`speed_while_braking`)",
-    topics.WHEEL_SPEED: "**in**, optional: rad/s, one velocity per axle. Sliding wheels show that adhesion limits, "
-    "rolling ones that the brake does. **In** of `creep_estimator`: the driven axles",
-    topics.TRACTION_FORCE: "**in** of `creep_estimator`: force.x N, all driven axles together, at the rim",
-    topics.MU: "μ̂, one per window",
-    topics.MU_LOWER: "its lower bound at the one-sided `confidence`, one per window",
-    topics.DECELERATION: "−μ̂ g, m/s², and its variance, stamped: the form for machines",
-    topics.STATE: "position and speed with their variances",
-    topics.BRAKING_CURVE: "full braking to standstill on `mu_lower`: 64 points, joint `train`",
-    topics.BRAKING_CURVE_NOMINAL: "the same on μ̂",
-    topics.CREEP_MU_MAX: "the peak of the creep curve; nothing while the data cannot tell it",
-    topics.CREEP_LAMBDA_M: "the creep at that peak",
-    topics.ATP_STATUS: "supervision: `level`, its limits in m/s, distance and margin in m",
-    topics.DIAGNOSTICS: "regime, window, ESS, drops by reason, digest; of `creep_estimator` p₁, p₂, the peak with its "
-    "standard deviation and bounds, whether and why it is withheld",
-    topics.TRUTH_STATE: "simulators only: position and speed as they are",
-    topics.TRUTH_MU: "simulators only: the available adhesion; of `slip_simulator` the peak",
-    topics.CLOCK: "time of a simulated or replayed run; the nodes follow it with `use_sim_time`",
-}
-"""What the messages of a topic say."""
-
-LATCHED = {topic for topic, profile in estimator.OUTPUTS.items() if profile is qos.EXPIRING}
-MEASURED = {*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH, topics.CLOCK}
+QUALITIES = {Quality.SENSOR: "sensor", Quality.RESULT: "result", Quality.EXPIRING: "latched"}
 
 
 def parts() -> dict[str, str]:
     """Return the tables by the name of their part."""
     return {
         **{f"parameters of {node}": "\n\n".join(_groups(specs)) for node, specs in NODES.items()},
-        "topics": table(("topic", "type", "QoS", "meaning"), map(_topic, MEANINGS)),
+        "topics": table(("topic", "type", "QoS", "meaning"), map(_topic, TOPICS)),
         "refusals": table(("refused message", "what helps"), ((f"`{r.name}`", _cell(r.value)) for r in Reason)),
         "outcomes": table(("sample", "what becomes of it"), ((f"`{o.name}`", _cell(o.value)) for o in Outcome)),
         "house": table(("folder", "what is in it"), _house()),
@@ -103,8 +76,7 @@ def _range(spec: Spec) -> str:
 
 
 def _topic(topic: Topic) -> tuple[str, ...]:
-    quality = "sensor" if topic in MEASURED else "latched" if topic in LATCHED else "result"
-    return f"`{topic.name}`", topic.type.replace("/msg/", "/"), quality, MEANINGS[topic]
+    return f"`{topic.name}`", topic.type.replace("/msg/", "/"), QUALITIES[topic.quality], topic.meaning
 
 
 def _cell(text: str) -> str:

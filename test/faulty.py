@@ -12,27 +12,22 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
+from messages import message_of
 
 from adhesion_node.core import Config, Estimate
 from adhesion_node.core.intake.samples import Sample
 from adhesion_node.core.physics.train import Array
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
 from sim_node.faults.plan import Plan, faulty_run, period_of
-from sim_node.nodes.messages import message_of
 from sim_node.train.plant import Truth
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings
 
 S = 10**9
 SETTINGS = SensorSettings()
-READERS: dict[topics.Topic, Callable[[Any], Sample]] = {
-    topics.POSITION: reading.position,
-    topics.BRAKE_PRESSURE: reading.brake_pressure,
-    topics.SPEED: reading.speed,
-}
+READERS: dict[topics.Topic, Callable[[Any], Sample]] = {topic: topic.read for topic in topics.ADHESION_INPUTS}
 
 
 class Outcome(NamedTuple):

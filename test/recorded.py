@@ -11,9 +11,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import cdrs
 import numpy as np
 
-from adhesion_node.bag import BagWriter, Record, sensors
+from adhesion_node.bag import BagWriter, Record
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
@@ -69,8 +70,8 @@ def write_steps(path: Path, steps: int, first: int = 0) -> list[Record]:
     records = []
     for step in range(first, first + steps):
         t_ns = step * S // 10
-        records.append(Record("/brake_pressure", BRAKE_PRESSURE.type, sensors.brake_pressure(t_ns, 101325.0), t_ns))
-        records.append(Record("/position", POSITION.type, sensors.position(t_ns, step / 3, 0.25), t_ns))
+        records.append(Record("/brake_pressure", BRAKE_PRESSURE.type, cdrs.brake_pressure(t_ns, 101325.0), t_ns))
+        records.append(Record("/position", POSITION.type, cdrs.position(t_ns, step / 3, 0.25), t_ns))
     with BagWriter(path) as writer:
         for record in records:
             writer.write(*record)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from .reader import BagReader
 from .recordings import Record
 from .selection import parse_remap, select
-from .types import deserialize, serialize, typestore
+from .types import deserialize, encode, serialize, typestore
 from .writer import BagWriter, Limits
 
 __all__ = [
@@ -17,6 +17,7 @@ __all__ = [
     "Limits",
     "Record",
     "deserialize",
+    "encode",
     "parse_remap",
     "select",
     "serialize",

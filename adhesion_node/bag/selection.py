@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from ..wire import topics
 from .types import same_name
 
-_OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH)}
+_OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}
 
 
 def parse_remap(text: str) -> tuple[str, str]:

@@ -9,9 +9,12 @@ import re
 from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 from rosbags.typesys.store import Typestore
+
+from ..wire.topics import Topic
 
 
 class Definition(NamedTuple):
@@ -27,10 +30,26 @@ def typestore() -> Typestore:
     return get_typestore(Stores.ROS2_JAZZY)
 
 
+def new(type_name: str, /, **fields: Any) -> Any:
+    """Make a message, or a part of one, for the codecs of `wire`: a tuple becomes an array, a byte its number."""
+    return typestore().types[type_name](**{name: _stored(value) for name, value in fields.items()})
+
+
+def _stored(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return np.array(value, dtype=np.float64)
+    return value[0] if isinstance(value, bytes) else value
+
+
 def serialize(message: object, type_name: str) -> bytes:
     """Return `message` as little-endian CDR: equal messages give equal bytes, padding included."""
     _require(type_name)
     return bytes(typestore().serialize_cdr(message, type_name, little_endian=True))
+
+
+def encode(topic: Topic, *values: Any) -> bytes:
+    """Return as CDR the message that the topic's codec writes of `values`."""
+    return serialize(topic.build(new, *values), topic.type)
 
 
 def deserialize(cdr: bytes, type_name: str) -> Any:

@@ -12,15 +12,17 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.node import Node
 
-from ..core.intake.samples import MAX_POSITION_M
-from ..nodes.ros import messages as convert
 from ..nodes.ros import qos
-from ..wire import codecs as reading
 from ..wire import topics
+from ..wire.codecs import Rejected
+from ..wire.curves import PlacedCurve
+from ..wire.results import Statuses
+from ..wire.topics import Frame, Role
 from .view import View
 
 PERIOD_S = 0.1
@@ -37,8 +39,8 @@ class Live(Node):
         """Serve at once. Raises OSError when the address is taken, ValueError when aiohttp is missing."""
         super().__init__("live", **kwargs)
         self.view = View()
-        for topic, (take, profile) in self._inputs().items():
-            qos.subscribe(self, topic, self._receiver(topic, take), profile)
+        for topic, take in self._inputs().items():
+            qos.subscribe(self, topic, self._receiver(topic, take))
         self.server = _server(host, port, lambda: self.view.parts(time.monotonic()))
         self.get_logger().info(f"open {self.server.url}")
 
@@ -46,57 +48,48 @@ class Live(Node):
         """End the pages and give the address back."""
         self.server.close()
 
-    def _inputs(self) -> dict[topics.Topic, tuple[Callable[[Any], None], Any]]:
-        """How each topic is taken, in the order in which the estimator publishes."""
+    def _inputs(self) -> dict[topics.Topic, Callable[[Any], None]]:
+        """How what is read of each topic is taken, in the order in which the estimator publishes."""
         view = self.view
         return {
-            topics.BRAKE_PRESSURE: (lambda message: None, qos.SENSOR_SUBSCRIPTION),
-            topics.SPEED: (lambda message: None, qos.SENSOR_SUBSCRIPTION),
-            topics.POSITION: (self._on_position, qos.SENSOR_SUBSCRIPTION),
-            topics.TRUTH_MU: (self._adhesion("true_mu"), qos.SENSOR_SUBSCRIPTION),
-            topics.MU: (self._adhesion("mu"), qos.RESULT),
-            topics.MU_LOWER: (self._adhesion("mu_lower"), qos.RESULT),
-            topics.STATE: (lambda message: view.train(convert.state(message)), qos.RESULT),
-            topics.BRAKING_CURVE: (self._curve("safe"), qos.LATCHED),
-            topics.BRAKING_CURVE_NOMINAL: (self._curve("nominal"), qos.LATCHED),
-            topics.DIAGNOSTICS: (self._on_diagnostics, qos.RESULT),
-            topics.ATP_STATUS: (self._on_status, qos.RESULT),
+            topics.BRAKE_PRESSURE: lambda sample: None,
+            topics.SPEED: lambda sample: None,
+            topics.POSITION: lambda sample: view.place(sample.position_m),
+            topics.TRUTH_MU: partial(view.adhesion, "true_mu"),
+            topics.MU: partial(view.adhesion, "mu"),
+            topics.MU_LOWER: partial(view.adhesion, "mu_lower"),
+            topics.STATE: view.train,
+            topics.BRAKING_CURVE: self._curve("safe"),
+            topics.BRAKING_CURVE_NOMINAL: self._curve("nominal"),
+            topics.DIAGNOSTICS: self._on_diagnostics,
+            topics.ATP_STATUS: self._on_status,
         }
 
     def _receiver(self, topic: topics.Topic, take: Callable[[Any], None]) -> Callable[[Any], None]:
+        # Which frame the sensors are to have is a parameter of the estimator, which says so if it is another.
+        read = topic._replace(frame=Frame.ANY).read if topic.role is Role.SENSOR else topic.read
+
         def receive(message: Any) -> None:
             refusal = ""
             try:
-                take(message)
-            except reading.Rejected as refused:
+                take(read(message))
+            except Rejected as refused:
                 refusal = str(refused)
             self.view.heard(topic, time.monotonic(), refusal)
 
         return receive
 
-    def _adhesion(self, name: str) -> Callable[[Any], None]:
-        return lambda message: self.view.adhesion(name, reading.finite(name, message.data))
+    def _curve(self, name: str) -> Callable[[PlacedCurve], None]:
+        return lambda placed: self.view.curve(name, placed.position_m, placed.curve)
 
-    def _curve(self, name: str) -> Callable[[Any], None]:
-        def take(message: Any) -> None:
-            _, braking = convert.curve(message)
-            self.view.curve(name, message.points[0].positions[0], braking)
+    def _on_diagnostics(self, read: Statuses) -> None:
+        for status in read.entries:
+            if "regime" in status.values:  # /diagnostics is shared with everybody
+                self.view.estimated(status.values, status.message)
 
-        return take
-
-    def _on_position(self, message: Any) -> None:
-        place = message.pose.pose.position.x
-        self.view.place(reading.plausible("position x", place, MAX_POSITION_M, reading.Reason.IMPLAUSIBLE_POSITION))
-
-    def _on_diagnostics(self, message: Any) -> None:
-        for status in message.status:
-            values = {pair.key: pair.value for pair in status.values}
-            if "regime" in values:  # /diagnostics is shared with everybody
-                self.view.estimated(values, status.message)
-
-    def _on_status(self, message: Any) -> None:
-        for status in message.status:
-            self.view.supervised({pair.key: pair.value for pair in status.values}, status.message)
+    def _on_status(self, read: Statuses) -> None:
+        for status in read.entries:
+            self.view.supervised(status.values, status.message)
 
 
 def _server(host: str, port: int, parts: Callable[[], dict[str, Any]]) -> Any:

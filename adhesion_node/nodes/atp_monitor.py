@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
@@ -35,13 +34,14 @@ from adhesion_node.core.atp.supervision import (
     unsafe,
 )
 from adhesion_node.core.setting import setting, settings_of
-from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import Rejected
+from adhesion_node.wire.results import Status
 from adhesion_node.wire.topics import Topic
 
-from .ros import messages as convert
 from .ros import qos, runtime
 from .ros.params import declare, spec_of
+from .ros.types import new
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,9 +87,9 @@ class AtpMonitor(Node):
         self._level: Level | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._moved_ns = self._steady.now().nanoseconds
-        self._status = qos.advertise(self, topics.ATP_STATUS, qos.RESULT)
-        qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve, qos.LATCHED)
-        qos.subscribe(self, topics.STATE, self._on_state, qos.RESULT)
+        self._status = qos.advertise(self, topics.ATP_STATUS)
+        qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve)
+        qos.subscribe(self, topics.STATE, self._on_state)
         period_s = 1.0 / watchdogs.check_rate_hz
         self.create_timer(period_s, self._on_watchdog)
         self.create_timer(period_s, self._on_steady_watchdog, clock=self._steady)
@@ -97,15 +97,16 @@ class AtpMonitor(Node):
     def _on_curve(self, message: Any) -> None:
         self.heard[topics.BRAKING_CURVE] += 1
         try:
-            self._curve = StampedCurve(*convert.curve(message))
-        except reading.Rejected as refusal:
+            read = topics.BRAKING_CURVE.read(message)
+            self._curve = StampedCurve(read.t_ns, read.curve)
+        except Rejected as refusal:
             self._curve = Unavailable(f"refused: {refusal}")
 
     def _on_state(self, message: Any) -> None:
         self.heard[topics.STATE] += 1
         try:
-            self._state = convert.state(message)
-        except reading.Rejected as refusal:
+            self._state = topics.STATE.read(message)
+        except Rejected as refusal:
             self._state = Unavailable(f"refused: {refusal}")
         self._judge()
 
@@ -143,8 +144,8 @@ class AtpMonitor(Node):
             _log(self, decision)
 
 
-def status_message(t_ns: int, config: SupervisionConfig, decision: Decision) -> DiagnosticArray:
-    """Build the status: level and every number behind it; a number that is not known has no key."""
+def status_message(t_ns: int, config: SupervisionConfig, decision: Decision) -> Any:
+    """Build the message of the status: level and every number behind it; a number that is not known has no key."""
     numbers = {
         "target_position_m": config.target_position_m,
         "target_speed_mps": config.target_speed_mps,
@@ -152,14 +153,11 @@ def status_message(t_ns: int, config: SupervisionConfig, decision: Decision) -> 
         "state_age_s": decision.state_age_s,
         **({} if decision.reading is None else decision.reading._asdict()),
     }
-    status = DiagnosticStatus(
-        level=bytes([decision.severity]),
-        name="atp_monitor/supervision",
-        message=decision.message,
-        values=[KeyValue(key="level", value=decision.level.name)]
-        + [KeyValue(key=key, value=f"{value:.3f}") for key, value in numbers.items() if value is not None],
+    known = {key: f"{value:.3f}" for key, value in numbers.items() if value is not None}
+    status = Status(
+        "atp_monitor/supervision", decision.severity, decision.message, {"level": decision.level.name, **known}
     )
-    return DiagnosticArray(header=convert.header(t_ns), status=[status])
+    return topics.ATP_STATUS.build(new, t_ns, status)
 
 
 def _log(node: Node, decision: Decision) -> None:

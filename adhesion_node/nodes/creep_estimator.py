@@ -22,20 +22,18 @@ from rclpy.node import Node
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.creep.estimator import CreepEstimate
-from adhesion_node.run.creep_pipeline import READERS, SETTINGS, CreepPipeline, setup_of
+from adhesion_node.run.creep_pipeline import SETTINGS, CreepPipeline, setup_of
 from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
 from adhesion_node.wire.topics import Topic
 
-from .ros import messages as convert
 from .ros import qos, runtime
 from .ros.diagnostics import Finding, next_stamp, status_message
 from .ros.intake import Intake
 from .ros.params import declare, spec_of
+from .ros.types import new
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
-
-INPUTS = (topics.SPEED, topics.TRACTION_FORCE, topics.WHEEL_SPEED)
 
 EXAMPLES = ("creep_estimator", "creep_estimator --ros-args -p axles:=4 -p wheel_radius_m:=0.46")
 
@@ -55,9 +53,8 @@ class CreepEstimator(Node):
         self._reported_ns = 0
         self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/peak"
         self.published: Counter[Topic] = Counter()
-        readers = {topic: READERS[topic.name] for topic in INPUTS}
-        self._intake = Intake(self, self, readers, setup.frame, setup.sensor_timeout_s)
-        self._outputs = {topic: qos.advertise(self, topic, qos.RESULT, tell=self._intake.tell) for topic in OUTPUTS}
+        self._intake = Intake(self, self, topics.CREEP_INPUTS, setup.line, setup.sensor_timeout_s)
+        self._outputs = {topic: qos.advertise(self, topic, tell=self._intake.tell) for topic in OUTPUTS}
 
     @property
     def heard(self) -> Counter[Topic]:
@@ -107,9 +104,10 @@ class CreepEstimator(Node):
 
     def _publish(self, estimates: list[CreepEstimate]) -> None:
         for estimate in estimates:
-            if estimate.known:
-                self._send(topics.CREEP_MU_MAX, convert.mu_message(estimate.mu_max))
-                self._send(topics.CREEP_LAMBDA_M, convert.mu_message(estimate.lambda_m))
+            for topic in topics.CREEP_RESULTS:
+                message = topic.build(new, estimate)
+                if message is not None:
+                    self._send(topic, message)
             self._report(estimate.t_ns)
 
     def _send(self, topic: Topic, message: Any) -> None:

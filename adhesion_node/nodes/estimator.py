@@ -30,11 +30,11 @@ from adhesion_node.wire.settings import SETTINGS, setup_of
 from adhesion_node.wire.topics import Topic
 
 from .health import findings, values
-from .ros import messages as convert
 from .ros import qos, runtime
 from .ros.diagnostics import next_stamp, status_message
 from .ros.intake import Intake
 from .ros.params import declare, spec_of
+from .ros.types import new
 
 PARAMETERS = tuple(map(spec_of, SETTINGS))
 
@@ -44,23 +44,7 @@ EXAMPLES = (
     "estimator --ros-args --params-file my_train.yaml -r __ns:=/train1",
 )
 
-READERS = {
-    topics.BRAKE_PRESSURE: reading.brake_pressure,
-    topics.SPEED: reading.speed,
-    topics.WHEEL_SPEED: reading.wheel_speed,
-    topics.POSITION: reading.position,
-}
-
-OUTPUTS = {
-    topics.MU: qos.RESULT,
-    topics.MU_LOWER: qos.RESULT,
-    topics.DECELERATION: qos.RESULT,
-    topics.STATE: qos.RESULT,
-    topics.BRAKING_CURVE: qos.EXPIRING,
-    topics.BRAKING_CURVE_NOMINAL: qos.EXPIRING,
-    topics.DIAGNOSTICS: qos.RESULT,
-}
-"""What the node publishes, in the order of publishing."""
+OUTPUTS = (*topics.RESULTS, topics.DIAGNOSTICS)
 
 
 class Estimator(Node):
@@ -76,10 +60,8 @@ class Estimator(Node):
         self._reported_ns = 0
         self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/adhesion"
         self.published: Counter[Topic] = Counter()
-        self._intake = Intake(self, self, READERS, setup.frame, setup.sensor_timeout_s)
-        self._outputs = {
-            topic: qos.advertise(self, topic, profile, tell=self._intake.tell) for topic, profile in OUTPUTS.items()
-        }
+        self._intake = Intake(self, self, topics.ADHESION_INPUTS, setup.line, setup.sensor_timeout_s)
+        self._outputs = {topic: qos.advertise(self, topic, tell=self._intake.tell) for topic in OUTPUTS}
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(SetBool, "~/set_enabled", self._on_set_enabled)
 
@@ -153,30 +135,15 @@ class Estimator(Node):
 
     def _publish(self, predictions: list[Prediction]) -> None:
         for prediction in predictions:
-            for topic, message in messages_of(prediction):
-                self._send(topic, message)
+            for topic in topics.RESULTS:
+                message = topic.build(new, prediction)
+                if message is not None:
+                    self._send(topic, message)
             self._report(prediction.estimate.t_ns)
 
     def _send(self, topic: Topic, message: Any) -> None:
         self._outputs[topic].publish(message)
         self.published[topic] += 1
-
-
-def messages_of(prediction: Prediction) -> list[tuple[Topic, Any]]:
-    """Return what is published of a prediction, in order; of a withheld mu nothing is."""
-    estimate = prediction.estimate
-    t_ns, place = estimate.t_ns, estimate.position_m
-    found: list[tuple[Topic, Any]] = []
-    if not estimate.withheld:
-        found += [
-            (topics.MU, convert.mu_message(estimate.mu)),
-            (topics.MU_LOWER, convert.mu_message(estimate.mu_lower)),
-            (topics.DECELERATION, convert.deceleration_message(t_ns, estimate.mu, estimate.mu_std)),
-        ]
-    variances = estimate.position_std_m**2, estimate.speed_std_mps**2
-    found.append((topics.STATE, convert.state_message(t_ns, place, variances[0], estimate.speed_mps, variances[1])))
-    curves = (topics.BRAKING_CURVE, prediction.safe), (topics.BRAKING_CURVE_NOMINAL, prediction.nominal)
-    return found + [(topic, convert.curve_message(t_ns, curve, place)) for topic, curve in curves if curve is not None]
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -18,11 +18,11 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
-from rosgraph_msgs.msg import Clock
 
 from ..bag import BagReader, Record
 from ..wire import topics
-from .ros.qos import SENSOR_PUBLISHER, advertise
+from .ros.qos import advertise
+from .ros.types import new
 
 PERIOD_S, RUSH_PERIOD_S = 0.002, 0.0005
 """Between two ticks at a given rate and as fast as possible."""
@@ -61,10 +61,9 @@ class Replay(Node):
         self.published: Counter[str] = Counter()
         self._rate = rate
         self._wanted = subscribers
-        self._clock_out = advertise(self, topics.CLOCK, SENSOR_PUBLISHER)
+        self._clock_out = advertise(self, topics.CLOCK)
         self._outputs = {
-            source: advertise(self, topics.Topic(target, reader.topics[source]), SENSOR_PUBLISHER)
-            for source, target in selection.items()
+            source: advertise(self, topics.Topic(target, reader.topics[source])) for source, target in selection.items()
         }
         self._steps = groupby(reader.messages(selection), key=lambda record: record.log_ns)
         self._next: tuple[int, Iterator[Record]] | None = None
@@ -133,7 +132,7 @@ class Replay(Node):
             log_ns, records = self._next
             if log_ns > self._due_ns():
                 return
-            self._clock_out.publish(_clock_message(log_ns))
+            self._clock_out.publish(topics.CLOCK.build(new, log_ns))
             for record in records:
                 self._publish(record)
             self._advance()
@@ -172,9 +171,3 @@ class Replay(Node):
         if not all(self._await_acknowledgement(output) for output in self._outputs.values()):
             self.failure = "the last messages were not acknowledged: did a subscriber hang?"
         self.finished = True
-
-
-def _clock_message(log_ns: int) -> Clock:
-    message = Clock()
-    message.clock.sec, message.clock.nanosec = divmod(log_ns, 10**9)
-    return message

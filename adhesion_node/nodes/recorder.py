@@ -18,14 +18,14 @@ from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rosgraph_msgs.msg import Clock
 
 from ..bag import BagWriter, Limits, deserialize, serialize
 from ..bag.writer import MB
 from ..command.options import help_texts, run_tool
 from ..wire import topics
+from ..wire.codecs import stamp_ns
 from .ros import runtime
-from .ros.qos import RESULT, SENSOR_SUBSCRIPTION, subscribe
+from .ros.qos import subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
@@ -44,7 +44,6 @@ CLOCKS = 1000
 MIN_FREE_MB = 100.0
 LIMITS = Limits(span_ns=SPAN_NS, min_free_bytes=MIN_FREE_MB * MB)
 
-LATCHED = (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)
 LATCHED_SUBSCRIPTION = QoSProfile(
     depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
@@ -96,9 +95,9 @@ class Recorder(Node):
         self._oldest_unsaved = 0
         self._pending: list[_Message] = []
         if self._simulated:
-            subscribe(self, topics.CLOCK, self._on_clock, SENSOR_SUBSCRIPTION)
+            subscribe(self, topics.CLOCK, self._on_clock)
         for topic in topics.RECORDED:
-            subscribe(self, topic, self._receiver(topic), _profile(topic), raw=True)
+            subscribe(self, topic, self._receiver(topic), LATCHED_SUBSCRIPTION if topic.latched else None, raw=True)
         self._writer = BagWriter(output, limits)
         each_round = self._writer.check_disk if by_log_time else self.save
         self.create_timer(ROUND_S, each_round, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
@@ -131,7 +130,7 @@ class Recorder(Node):
         name = self.resolve_topic_name(topic.name)
 
         def receive(cdr: bytes, info: Mapping[str, int]) -> None:
-            self._writer.add_topic(name, topic.type, latched=topic in LATCHED)
+            self._writer.add_topic(name, topic.type, latched=topic.latched)
             exact, stamp_ns = self._canonical(name, topic.type, cdr)
             self._arrivals += 1
             self.heard[topic] += 1
@@ -151,13 +150,12 @@ class Recorder(Node):
             self.get_logger().warning(f"{name}: recorded as it came: {error}", throttle_duration_sec=10.0)
             return cdr, 0
         header = getattr(message, "header", None)
-        stamp_ns = header.stamp.sec * 10**9 + header.stamp.nanosec if header else 0
-        return serialize(message, type_name), stamp_ns
+        return serialize(message, type_name), stamp_ns(header) if header else 0
 
-    def _on_clock(self, message: Clock, info: Mapping[str, int]) -> None:
+    def _on_clock(self, message: Any, info: Mapping[str, int]) -> None:
         """Write what was published before the /clock before this one: what was published since may be on its way."""
         self.heard[topics.CLOCK] += 1
-        insort(self._clocks, _Tick(info["source_timestamp"], message.clock.sec * 10**9 + message.clock.nanosec))
+        insort(self._clocks, _Tick(info["source_timestamp"], topics.CLOCK.read(message)))
         del self._clocks[:-CLOCKS]
         if len(self._clocks) > 1:
             before = self._clocks[-2]
@@ -226,10 +224,3 @@ def _parser() -> argparse.ArgumentParser:
         help=f"end before less is free on the disk (default: {MIN_FREE_MB:g})",
     )
     return parser
-
-
-def _profile(topic: topics.Topic) -> QoSProfile:
-    if topic in LATCHED:
-        return LATCHED_SUBSCRIPTION
-    sensors = (*topics.SENSORS, *topics.CREEP_SENSORS, *topics.TRUTH)
-    return SENSOR_SUBSCRIPTION if topic in sensors else RESULT

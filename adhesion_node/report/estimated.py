@@ -30,7 +30,7 @@ def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) 
     """
     pipeline = Pipeline(setup.config, setup.seed)
     recorded = progress(offline.messages(reader, selection), "messages")
-    predictions = offline.replay(pipeline, Truth(), recorded, setup.frame).predictions
+    predictions = offline.replay(pipeline, Truth(), recorded, setup.line).predictions
     if not predictions:
         dropped = ", ".join(f"{count} {reason}" for reason, count in pipeline.dropped.items()) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")

@@ -6,42 +6,30 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from functools import partial
-from types import MappingProxyType
 from typing import Any, NamedTuple, final
 
-from ..core import Sample
 from ..core.creep import estimator as creep
 from ..core.creep.config import CreepConfig
 from ..core.creep.estimator import CreepEstimate, CreepState
 from ..core.creep.vehicle import Vehicle
 from ..core.setting import check_value, settings_of
-from ..wire import codecs as reading
+from ..wire.codecs import Line
 from ..wire.settings import FRAME_ID, SENSOR_TIMEOUT, check_names
-from ..wire.topics import SPEED, TRACTION_FORCE, WHEEL_SPEED
+from ..wire.topics import WHEEL_SPEED
 from .engine import EstimatorPipeline, Verbs
 
 SETTINGS = (FRAME_ID, SENSOR_TIMEOUT, *settings_of(Vehicle), *settings_of(CreepConfig))
 """All settings of the creep estimator."""
-
-READERS: Mapping[str, Callable[[Any, str], Sample]] = MappingProxyType(
-    {
-        SPEED.name: reading.speed,
-        TRACTION_FORCE.name: reading.traction_force,
-        WHEEL_SPEED.name: reading.wheel_speed,
-    }
-)
-"""How the messages of a sensor topic become samples."""
 
 
 class CreepSetup(NamedTuple):
     """What a creep estimator is set up with."""
 
     config: CreepConfig
-    frame: str
-    """The frame_id that sensor messages must have."""
+    line: Line
     sensor_timeout_s: float
     """Silence of the wheel speeds after which /diagnostics says STALE; no result depends on it."""
 
@@ -57,7 +45,8 @@ def setup_of(values: Mapping[str, Any]) -> CreepSetup:
     for own, value in zip(of_the_node, given, strict=True):
         check_value(own.name, value, type(own.default), own._asdict())
     vehicle = Vehicle(**_own(Vehicle, values))
-    return CreepSetup(CreepConfig(vehicle=vehicle, **_own(CreepConfig, values)), *given)
+    frame, timeout_s = given
+    return CreepSetup(CreepConfig(vehicle=vehicle, **_own(CreepConfig, values)), Line(frame), timeout_s)
 
 
 def _own(kind: type[Any], values: Mapping[str, Any]) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,20 +16,15 @@ from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
 from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
-from ..wire import codecs as reading
 from ..wire import parameter_file
+from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.settings import SEED, SETTINGS, setup_of
-from ..wire.topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED, TRUTH_MU, TRUTH_STATE, WHEEL_SPEED
+from ..wire.topics import ADHESION_INPUTS, POSITION, TRUTH, TRUTH_MU
 from .pipeline import Pipeline
 from .score import Truth, mean_relative_error_percent
 
-READERS: dict[str, Callable[[Any, str], Sample]] = {
-    POSITION.name: reading.position,
-    BRAKE_PRESSURE.name: reading.brake_pressure,
-    SPEED.name: reading.speed,
-    WHEEL_SPEED.name: reading.wheel_speed,
-}
-"""How the messages of a sensor topic become samples."""
+READ = {topic.name: topic for topic in (*ADHESION_INPUTS, *TRUTH)}
+"""The topics that are used, by name."""
 
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
@@ -38,7 +33,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         raise ValueError(f"bag = {reader.path}: holds no {POSITION.name}, without which nothing is identified")
     setup, truth = setup_of(parameters_of(options)), Truth()
     pipeline = Pipeline(setup.config, setup.seed)
-    replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.frame)
+    replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.line)
     result = summary(pipeline, replayed, truth)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return DONE if replayed.predictions else FAILED
@@ -58,24 +53,28 @@ class Replayed(NamedTuple):
     """How long each full window took, estimate and curves included."""
 
 
-def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, int]], frame: str = FRAME) -> Replayed:
+def replay(
+    pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, int]], line: Line = NOMINAL
+) -> Replayed:
     """Feed recorded messages to the pipeline, and the simulator's truth to `truth`.
 
-    A message comes with our name of its topic and its log time in ns; sensor messages must be in `frame`.
+    A message comes with our name of its topic and its log time in ns; sensor messages are those of `line`.
     """
     replayed = Replayed([], [])
     for name, message, log_ns in recorded:
-        if name in READERS:
-            try:
-                sample = READERS[name](message, frame)
-            except reading.Rejected as refusal:
-                pipeline.refuse(name, refusal.reason)
+        if name not in READ:
+            continue
+        try:
+            read = READ[name].read(message, line)
+        except Rejected as refusal:
+            pipeline.refuse(name, refusal.reason)
+        else:
+            if READ[name] not in TRUTH:
+                _take_sample(pipeline, truth, replayed, read)
+            elif name == TRUTH_MU.name:
+                truth.mu[log_ns] = read
             else:
-                _take_sample(pipeline, truth, replayed, sample)
-        elif name == TRUTH_MU.name:
-            truth.mu[log_ns] = float(message.data)
-        elif name == TRUTH_STATE.name:
-            truth.speed_mps[reading.stamp_ns(message.header)] = float(message.twist.twist.linear.x)
+                truth.speed_mps[read.t_ns] = read.speed_mps
     replayed.predictions.extend(pipeline.finish())
     return replayed
 

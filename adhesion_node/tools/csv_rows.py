@@ -14,7 +14,7 @@ from decimal import Decimal, InvalidOperation
 from typing import NamedTuple, TextIO
 
 from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MAX_VARIANCE_M2, MIN_VARIANCE_M2
-from ..wire.codecs import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA
+from ..wire.codecs import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA, Line
 
 TIME_UNITS = {"s": Decimal(10**9), "ms": Decimal(10**6), "ns": Decimal(1), "iso": Decimal(10**9)}
 POSITION_UNITS = {"m": Decimal(1), "km": Decimal(1000)}
@@ -47,6 +47,7 @@ class Format:
     """Stands in where the log gives no variance."""
     pressure_unit: str = "pa"
     pressure_is_gauge: bool = True
+    ambient_pressure_pa: float = ATMOSPHERE_PA
     speed_unit: str = "mps"
 
     def __post_init__(self) -> None:
@@ -54,6 +55,7 @@ class Format:
             raise ValueError(f"delimiter = {self.delimiter!r}: give one character, such as ',' or ';'")
         if not MIN_VARIANCE_M2 <= self.position_std_m**2 <= MAX_VARIANCE_M2:
             raise ValueError(f"position-std = {self.position_std_m!r}: give a standard deviation above 0, in m")
+        Line(ambient_pressure_pa=self.ambient_pressure_pa)
 
 
 class Row(NamedTuple):
@@ -136,7 +138,7 @@ def _row(text: str, columns: Mapping[str, int], width: int, form: Format) -> Row
     for column in REQUIRED:
         if not cell[column]:
             raise _Bad("empty", column, "", "every row needs a time and a position")
-    offset = Decimal(ATMOSPHERE_PA) if form.pressure_is_gauge else Decimal(0)
+    offset = Decimal(form.ambient_pressure_pa) if form.pressure_is_gauge else Decimal(0)
     row = Row(
         t_ns=_time_ns(cell["time"], form.time_unit),
         position_m=float(_decimal("position", cell["position"]) * POSITION_UNITS[form.position_unit]),
@@ -149,7 +151,7 @@ def _row(text: str, columns: Mapping[str, int], width: int, form: Format) -> Row
 
 
 def _check_ranges(row: Row, cell: Mapping[str, str]) -> None:
-    kind = "is the --pressure-unit or --pressure-kind another?"
+    kind = "is the --pressure-unit, --pressure-kind or --ambient-pressure another?"
     limits = (
         ("position", row.position_m, -MAX_POSITION_M, MAX_POSITION_M, "m: is the --position-unit another?"),
         ("variance", row.variance_m2, MIN_VARIANCE_M2, MAX_VARIANCE_M2, "m^2: leave it empty where unknown"),

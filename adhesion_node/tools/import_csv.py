@@ -12,9 +12,10 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag import BagWriter, sensors
+from ..bag import BagWriter, encode
 from ..command.options import DONE, FAILED, help_texts, json_option, progress, report, run_tool
 from ..wire import topics
+from ..wire.settings import AMBIENT
 from . import csv_rows
 from .csv_rows import Format, Refusal, Row
 
@@ -84,21 +85,21 @@ def _write_row(row: Row, writer: BagWriter, form: Format) -> list[str]:
     if row.absolute_pa is None:
         empty.append("brake_pressure")
     else:
-        _put(writer, topics.BRAKE_PRESSURE, sensors.brake_pressure(row.t_ns, row.absolute_pa), row.t_ns)
+        _put(writer, topics.BRAKE_PRESSURE, row.t_ns, row.absolute_pa)
     if row.speed_mps is None:
         empty.append("speed")
     else:
-        _put(writer, topics.SPEED, sensors.speed(row.t_ns, row.speed_mps), row.t_ns)
+        _put(writer, topics.SPEED, row.t_ns, row.speed_mps)
     variance_m2 = row.variance_m2
     if variance_m2 is None:
         empty.append("variance")
         variance_m2 = form.position_std_m**2
-    _put(writer, topics.POSITION, sensors.position(row.t_ns, row.position_m, variance_m2), row.t_ns)
+    _put(writer, topics.POSITION, row.t_ns, row.position_m, variance_m2)
     return empty
 
 
-def _put(writer: BagWriter, topic: topics.Topic, cdr: bytes, t_ns: int) -> None:
-    writer.write(f"/{topic.name}", topic.type, cdr, t_ns)
+def _put(writer: BagWriter, topic: topics.Topic, t_ns: int, value: float, variance: float = 0.0) -> None:
+    writer.write(f"/{topic.name}", topic.type, encode(topic, t_ns, (value,), variance), t_ns)
 
 
 def _work(options: argparse.Namespace) -> int:
@@ -124,6 +125,7 @@ def _form(options: argparse.Namespace) -> Format:
         position_std_m=options.position_std,
         pressure_unit=options.pressure_unit,
         pressure_is_gauge=options.pressure_kind == "gauge",
+        ambient_pressure_pa=options.ambient_pressure,
         speed_unit=options.speed_unit,
     )
 
@@ -144,5 +146,13 @@ def _parser() -> argparse.ArgumentParser:
     add("--position-std", type=float, default=0.5, metavar="M", help="where there is no variance (default: 0.5)")
     add("--pressure-unit", choices=list(csv_rows.PRESSURE_UNITS), default="pa", help="default: pa")
     add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="default: gauge")
+    add(
+        "--ambient-pressure",
+        type=float,
+        default=AMBIENT.default,
+        metavar="PA",
+        help=f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name} "
+        f"(default: {AMBIENT.default:g})",
+    )
     add("--speed-unit", choices=list(csv_rows.SPEED_UNITS), default="mps", help="default: mps")
     return parser

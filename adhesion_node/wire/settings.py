@@ -13,7 +13,7 @@ from ..core import Config
 from ..core.physics.track import parse_track
 from ..core.physics.train import Train
 from ..core.setting import Setting, check_value, settings_of
-from .topics import FRAME
+from .codecs import Line
 
 TRACK = Setting(
     "track",
@@ -27,13 +27,13 @@ TRACK = Setting(
 
 SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, ())
 
-FRAME_ID = Setting("frame", FRAME, "frame_id that sensor messages must have", "", 0.0, 0.0, ())
+FRAME_ID, AMBIENT = settings_of(Line)
 
 SENSOR_TIMEOUT = Setting(
     "sensor_timeout_s", 0.5, "Silence of the sensor after which /diagnostics says STALE", "s", 0.05, 3600.0, ()
 )
 
-SETTINGS = (SEED, FRAME_ID, SENSOR_TIMEOUT, *settings_of(Config), *settings_of(Train, "train."), TRACK)
+SETTINGS = (SEED, FRAME_ID, AMBIENT, SENSOR_TIMEOUT, *settings_of(Config), *settings_of(Train, "train."), TRACK)
 """All settings of the estimator."""
 
 
@@ -42,8 +42,7 @@ class Setup(NamedTuple):
 
     config: Config
     seed: int
-    frame: str
-    """The frame_id that sensor messages must have."""
+    line: Line
     sensor_timeout_s: float
     """Silence of the position after which /diagnostics says STALE; no result depends on it."""
 
@@ -62,7 +61,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
     check_names(values, SETTINGS)
-    for setting in (SEED, FRAME_ID, SENSOR_TIMEOUT, TRACK):
+    for setting in (SEED, SENSOR_TIMEOUT, TRACK):
         check_value(setting.name, values.get(setting.name, setting.default), type(setting.default), setting._asdict())
     train = Train(**{name.removeprefix("train."): value for name, value in values.items() if name.startswith("train.")})
     own = {item.name for item in fields(Config) if item.metadata}
@@ -71,7 +70,9 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
         track=parse_track(values.get(TRACK.name, ""), train.length_m),
         **{name: value for name, value in values.items() if name in own},
     )
-    return Setup(config, *(values.get(setting.name, setting.default) for setting in (SEED, FRAME_ID, SENSOR_TIMEOUT)))
+    line = Line(**{setting.name: values[setting.name] for setting in (FRAME_ID, AMBIENT) if setting.name in values})
+    seed, timeout_s = (values.get(setting.name, setting.default) for setting in (SEED, SENSOR_TIMEOUT))
+    return Setup(config, seed, line, timeout_s)
 
 
 def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:

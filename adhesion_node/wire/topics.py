@@ -1,54 +1,214 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The topics of the package: relative names, message types and what they mean. Pure data, no ROS."""
+"""The table of topics: the one place that says a topic's name, type, role, quality of service, frame and codec.
+
+Pure data, no ROS. Names are relative, so that namespaces separate trains.
+"""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from enum import Enum
+from typing import Any, NamedTuple
 
-FRAME = "track"
-"""Frame of every stamped message: x runs along the track."""
+from . import curves, results, sensors
+from .codecs import FRAME, NOMINAL, Codec, Line, New, Reason, Rejected
 
-TRAIN = "train"
-"""Moving frame of the state and joint of the braking curve."""
+
+class Role(Enum):
+    """What a topic is to the package."""
+
+    SENSOR = "measured"
+    TRUTH = "what a simulator knows"
+    ADHESION = "found out by the estimator; its writers take a Prediction"
+    CREEP = "found out by the creep estimator; its writers take a CreepEstimate"
+    STATUS = "how things stand"
+    CLOCK = "time"
+    OTHER = "not ours"
+
+
+class Quality(Enum):
+    """Quality of service in words; nodes/ros/qos.py has the profiles."""
+
+    SENSOR = "reliable; subscribed best effort, so that every publisher matches"
+    RESULT = "reliable"
+    EXPIRING = "reliable, transient local: who comes later gets the last one, unless it is too old"
+
+
+class Frame(Enum):
+    """Which frame_id a reader insists on."""
+
+    ANY = "none"
+    TRACK = f"'{FRAME}'"
+    LINE = "that of the parameter `frame`"
 
 
 class Topic(NamedTuple):
-    """A topic: its relative name and its message type in ROS 2 spelling."""
+    """A topic: its relative name, its message type in ROS 2 spelling, and how its messages are carried and coded."""
 
     name: str
     type: str
+    role: Role = Role.OTHER
+    quality: Quality = Quality.SENSOR
+    frame: Frame = Frame.ANY
+    codec: Codec | None = None
+    meaning: str = ""
+    """For the documentation."""
+
+    @property
+    def latched(self) -> bool:
+        """Whether who subscribes late gets the last message."""
+        return self.quality is Quality.EXPIRING
+
+    def read(self, message: Any, line: Line = NOMINAL) -> Any:
+        """Read and check a message; raises Rejected with reason and remedy."""
+        wanted = {Frame.LINE: line.frame, Frame.TRACK: FRAME}.get(self.frame)
+        if wanted is not None and message.header.frame_id != wanted:
+            raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}")
+        return self._codec.read(message, line)
+
+    def build(self, new: New, *values: Any) -> Any:
+        """Build the message of what the codec's writer takes; None where there is nothing to publish."""
+        fields = self._codec.write(new, *values)
+        return None if fields is None else new(self.type, **fields)
+
+    @property
+    def _codec(self) -> Codec:
+        assert self.codec is not None, f"{self.name}: {self.role.value}"
+        return self.codec
 
 
-POSITION = Topic("position", "geometry_msgs/msg/PoseWithCovarianceStamped")
-BRAKE_PRESSURE = Topic("brake_pressure", "sensor_msgs/msg/FluidPressure")
-SPEED = Topic("speed", "geometry_msgs/msg/TwistWithCovarianceStamped")
-SENSORS = (POSITION, BRAKE_PRESSURE, SPEED)
+def _sensor(name: str, type_name: str, codec: Codec, meaning: str) -> Topic:
+    return Topic(name, type_name, Role.SENSOR, Quality.SENSOR, Frame.LINE, codec, meaning)
 
-TRUTH_STATE = Topic("truth/state", "nav_msgs/msg/Odometry")
-TRUTH_MU = Topic("truth/mu", "std_msgs/msg/Float64")
-TRUTH = (TRUTH_STATE, TRUTH_MU)
 
-MU = Topic("adhesion/mu", "std_msgs/msg/Float64")
-MU_LOWER = Topic("adhesion/mu_lower", "std_msgs/msg/Float64")
-DECELERATION = Topic("adhesion/deceleration", "geometry_msgs/msg/AccelWithCovarianceStamped")
-STATE = Topic("adhesion/state", "nav_msgs/msg/Odometry")
-BRAKING_CURVE = Topic("adhesion/braking_curve", "trajectory_msgs/msg/JointTrajectory")
-BRAKING_CURVE_NOMINAL = Topic("adhesion/braking_curve_nominal", "trajectory_msgs/msg/JointTrajectory")
-RESULTS = (MU, MU_LOWER, DECELERATION, STATE, BRAKING_CURVE, BRAKING_CURVE_NOMINAL)
+def _number(name: str, role: Role, codec: Codec, meaning: str) -> Topic:
+    quality = Quality.SENSOR if role is Role.TRUTH else Quality.RESULT
+    return Topic(name, "std_msgs/msg/Float64", role, quality, Frame.ANY, codec, meaning)
 
-ATP_STATUS = Topic("atp/status", "diagnostic_msgs/msg/DiagnosticArray")
-DIAGNOSTICS = Topic("/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
-CLOCK = Topic("/clock", "rosgraph_msgs/msg/Clock")
 
-WHEEL_SPEED = Topic("wheel_speed", "sensor_msgs/msg/JointState")
-TRACTION_FORCE = Topic("traction_force", "geometry_msgs/msg/WrenchStamped")
-CREEP_SENSORS = (WHEEL_SPEED, TRACTION_FORCE)
+def _curve(name: str, codec: Codec, meaning: str) -> Topic:
+    trajectory = "trajectory_msgs/msg/JointTrajectory"
+    return Topic(name, trajectory, Role.ADHESION, Quality.EXPIRING, Frame.TRACK, codec, meaning)
 
-CREEP_MU_MAX = Topic("creep/mu_max", "std_msgs/msg/Float64")
-CREEP_LAMBDA_M = Topic("creep/lambda_m", "std_msgs/msg/Float64")
-CREEP_RESULTS = (CREEP_MU_MAX, CREEP_LAMBDA_M)
 
-RECORDED = (*SENSORS, *CREEP_SENSORS, *TRUTH, *RESULTS, *CREEP_RESULTS, ATP_STATUS, DIAGNOSTICS)
+def _status(name: str, meaning: str) -> Topic:
+    kind = "diagnostic_msgs/msg/DiagnosticArray"  # shared with everybody, whatever their frame
+    return Topic(name, kind, Role.STATUS, Quality.RESULT, Frame.ANY, results.STATUS, meaning)
+
+
+POSITION = _sensor(
+    "position",
+    "geometry_msgs/msg/PoseWithCovarianceStamped",
+    sensors.POSITION,
+    "**in**: measured position along the track, pose.position.x m, covariance[0] m²",
+)
+BRAKE_PRESSURE = _sensor(
+    "brake_pressure", "sensor_msgs/msg/FluidPressure", sensors.BRAKE_PRESSURE, "**in**: brake cylinder, **absolute** Pa"
+)
+SPEED = _sensor(
+    "speed",
+    "geometry_msgs/msg/TwistWithCovarianceStamped",
+    sensors.SPEED,
+    "**in**, optional: m/s; used while coasting, as a braked axle slides (`speed_while_braking`)",
+)
+WHEEL_SPEED = _sensor(
+    "wheel_speed",
+    "sensor_msgs/msg/JointState",
+    sensors.WHEEL_SPEED,
+    "**in**, optional: rad/s, one velocity per axle. Sliding wheels show that adhesion limits, rolling ones that "
+    "the brake does. **In** of `creep_estimator`: the driven axles",
+)
+TRACTION_FORCE = _sensor(
+    "traction_force",
+    "geometry_msgs/msg/WrenchStamped",
+    sensors.TRACTION_FORCE,
+    "**in** of `creep_estimator`: force.x N, all driven axles together, at the rim",
+)
+
+TRUTH_STATE = Topic(
+    "truth/state",
+    "nav_msgs/msg/Odometry",
+    Role.TRUTH,
+    Quality.SENSOR,
+    Frame.TRACK,
+    results.STATE,
+    "simulators only: position and speed as they are",
+)
+TRUTH_MU = _number(
+    "truth/mu", Role.TRUTH, results.NUMBER, "simulators only: the available adhesion; of `slip_simulator` the peak"
+)
+
+MU = _number("adhesion/mu", Role.ADHESION, results.MU, "μ̂, one per window")
+MU_LOWER = _number(
+    "adhesion/mu_lower",
+    Role.ADHESION,
+    results.MU_LOWER,
+    "its lower bound at the one-sided `confidence`, one per window",
+)
+DECELERATION = Topic(
+    "adhesion/deceleration",
+    "geometry_msgs/msg/AccelWithCovarianceStamped",
+    Role.ADHESION,
+    Quality.RESULT,
+    Frame.TRACK,
+    results.DECELERATION,
+    "−μ̂ g, m/s², and its variance, stamped: the form for machines",
+)
+STATE = Topic(
+    "adhesion/state",
+    "nav_msgs/msg/Odometry",
+    Role.ADHESION,
+    Quality.RESULT,
+    Frame.TRACK,
+    results.ESTIMATED_STATE,
+    "position and speed with their variances",
+)
+BRAKING_CURVE = _curve(
+    "adhesion/braking_curve", curves.SAFE, "full braking to standstill on `mu_lower`: 64 points, joint `train`"
+)
+BRAKING_CURVE_NOMINAL = _curve("adhesion/braking_curve_nominal", curves.NOMINAL, "the same on μ̂")
+
+CREEP_MU_MAX = _number(
+    "creep/mu_max",
+    Role.CREEP,
+    results.CREEP_MU_MAX,
+    "the peak of the creep curve; nothing while the data cannot tell it",
+)
+CREEP_LAMBDA_M = _number("creep/lambda_m", Role.CREEP, results.CREEP_LAMBDA_M, "the creep at that peak")
+
+ATP_STATUS = _status("atp/status", "supervision: `level`, its limits in m/s, distance and margin in m")
+DIAGNOSTICS = _status(
+    "/diagnostics",
+    "regime, window, ESS, drops by reason, digest; of `creep_estimator` p₁, p₂, the peak with its standard "
+    "deviation and bounds, whether and why it is withheld",
+)
+CLOCK = Topic(
+    "/clock",
+    "rosgraph_msgs/msg/Clock",
+    Role.CLOCK,
+    Quality.SENSOR,
+    Frame.ANY,
+    results.CLOCK,
+    "time of a simulated or replayed run; the nodes follow it with `use_sim_time`",
+)
+
+TOPICS = tuple(value for value in tuple(globals().values()) if isinstance(value, Topic))
+"""All of the above, in this order: a topic stands once."""
+
+
+def topics_of(*roles: Role) -> tuple[Topic, ...]:
+    """Return the topics that are the one or the other to the package."""
+    return tuple(topic for topic in TOPICS if topic.role in roles)
+
+
+SENSORS, TRUTH = topics_of(Role.SENSOR), topics_of(Role.TRUTH)
+RESULTS, CREEP_RESULTS = topics_of(Role.ADHESION), topics_of(Role.CREEP)
+"""In the order of publishing."""
+
+RECORDED = tuple(topic for topic in TOPICS if topic.role is not Role.CLOCK)
 """What the recorder subscribes to; /clock is left out because every message carries its log time."""
+
+ADHESION_INPUTS = (BRAKE_PRESSURE, SPEED, WHEEL_SPEED, POSITION)
+CREEP_INPUTS = (SPEED, TRACTION_FORCE, WHEEL_SPEED)
+"""What the estimators take in. The last one is that without which there is no estimate."""

@@ -22,7 +22,8 @@ from rclpy.node import Node
 from adhesion_node.core.physics.train import KMH
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.nodes.ros.params import Spec, declare
-from adhesion_node.nodes.ros.qos import SENSOR_PUBLISHER, advertise
+from adhesion_node.nodes.ros.qos import advertise
+from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
 from ..faults.plan import FAULTS, Plan, faulty_run, period_of
@@ -30,7 +31,6 @@ from ..train import scenario
 from ..train.messages import SensorMessage
 from ..train.plant import Truth
 from ..train.sensors import SensorSettings
-from . import messages
 from .pace import Pace, run_parameters
 
 _NOISE = SensorSettings()
@@ -93,9 +93,7 @@ class Simulator(Node):
         self._ended = False
         optional = ((topics.SPEED, settings.speed_std_mps), (topics.WHEEL_SPEED, settings.wheel_speed_std_radps))
         there = (topics.BRAKE_PRESSURE, *(topic for topic, std in optional if std > 0), topics.POSITION)
-        self._outputs = {
-            topic: advertise(self, topic, SENSOR_PUBLISHER) for topic in (topics.CLOCK, *topics.TRUTH, *there)
-        }
+        self._outputs = {topic: advertise(self, topic) for topic in (topics.CLOCK, *topics.TRUTH, *there)}
         if paced:
             self._wait_for(values["wait_for"], period_s, values["real_time_factor"])
 
@@ -118,12 +116,15 @@ class Simulator(Node):
 
     def _publish(self, truth: Truth, sent: Sequence[SensorMessage]) -> None:
         t_ns = self.now_ns = self._start_ns + truth.t_ns
-        self._outputs[topics.CLOCK].publish(messages.clock(t_ns))
-        self._outputs[topics.TRUTH_STATE].publish(messages.truth_state(t_ns, truth))
-        self._outputs[topics.TRUTH_MU].publish(messages.truth_mu(truth))
+        self._send(topics.CLOCK, t_ns)
+        self._send(topics.TRUTH_STATE, t_ns, truth.position_m, truth.speed_mps)
+        self._send(topics.TRUTH_MU, truth.mu)
         for one in sent:
             stamped = one._replace(t_ns=max(self._start_ns + one.t_ns, 0))
-            self._outputs[one.topic].publish(messages.message_of(stamped))
+            self._outputs[one.topic].publish(stamped.build(new))
+
+    def _send(self, topic: topics.Topic, *values: float) -> None:
+        self._outputs[topic].publish(topic.build(new, *values))
 
     def _report(self, truth: Truth) -> None:
         if not self.samples:

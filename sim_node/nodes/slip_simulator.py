@@ -17,16 +17,15 @@ from dataclasses import fields
 from typing import Any
 
 from rclpy.node import Node
-from std_msgs.msg import Float64
 
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.nodes.ros.params import Spec, declare
-from adhesion_node.nodes.ros.qos import SENSOR_PUBLISHER, advertise
+from adhesion_node.nodes.ros.qos import advertise
+from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
 from ..slip import plant as slip
 from ..slip import scenario as slip_scenario
-from . import messages
 from .pace import Pace, run_parameters
 
 _NOISE = slip.SlipNoise()
@@ -64,7 +63,7 @@ class SlipSimulator(Node):
         self._published = 0
         self._mu_max = 0.0
         self._ended = False
-        self._outputs = {topic: advertise(self, topic, SENSOR_PUBLISHER) for topic in OUTPUTS}
+        self._outputs = {topic: advertise(self, topic) for topic in OUTPUTS}
         if paced:
             awaited = self._outputs[topics.WHEEL_SPEED]
             factor = values["real_time_factor"]
@@ -79,16 +78,16 @@ class SlipSimulator(Node):
         truth, reading = sample
         self._report(truth)
         t_ns = self._start_ns + truth.t_ns
-        for topic, message in (
-            (topics.CLOCK, messages.clock(t_ns)),
-            (topics.TRUTH_MU, Float64(data=truth.mu_max)),
-            (topics.SPEED, messages.speed(t_ns, reading.speed_mps, self._noise.speed_std_mps)),
-            (topics.TRACTION_FORCE, messages.traction_force(t_ns, reading.force_n)),
-            (topics.WHEEL_SPEED, messages.wheel_speed(t_ns, reading.wheel_radps)),
-        ):
-            self._outputs[topic].publish(message)
+        self._send(topics.CLOCK, t_ns)
+        self._send(topics.TRUTH_MU, truth.mu_max)
+        self._send(topics.SPEED, t_ns, (reading.speed_mps,), self._noise.speed_std_mps**2)
+        self._send(topics.TRACTION_FORCE, t_ns, (reading.force_n,))
+        self._send(topics.WHEEL_SPEED, t_ns, reading.wheel_radps)
         self._published += 1
         return True
+
+    def _send(self, topic: topics.Topic, *values: Any) -> None:
+        self._outputs[topic].publish(topic.build(new, *values))
 
     def _report(self, truth: slip.SlipTruth) -> None:
         if not self._published:

@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from adhesion_node.wire.topics import BRAKE_PRESSURE, FRAME, POSITION, SPEED, WHEEL_SPEED, Topic
+from adhesion_node.wire.codecs import FRAME, New
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, WHEEL_SPEED, Topic
 
 from .plant import Truth
 from .sensors import Reading, SensorSettings
@@ -22,6 +23,10 @@ class SensorMessage(NamedTuple):
     values: tuple[float, ...]
     variance: float
     frame: str = FRAME
+
+    def build(self, new: New) -> Any:
+        """Build the message, with all that a fault has made of it."""
+        return self.topic.build(new, self.t_ns, self.values, self.variance, self.frame)
 
 
 Tick = tuple[Truth, tuple[SensorMessage, ...]]

@@ -10,6 +10,7 @@ import itertools
 from pathlib import Path
 from typing import Any
 
+import cdrs
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -19,7 +20,7 @@ from recorded import S, filled, plain, ros_class, write_steps
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability
 from rosbags.rosbag2 import Reader
 
-from adhesion_node.bag import BagReader, BagWriter, deserialize, sensors, serialize, typestore
+from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize, typestore
 from adhesion_node.bag.writer import file_name
 from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, RECORDED
 
@@ -90,7 +91,7 @@ def test_ros_decodes_our_serialisation() -> None:
 
 
 def test_serialising_again_clears_what_stands_in_the_padding() -> None:
-    clean = sensors.position(1, 2.0, 3.0)
+    clean = cdrs.position(1, 2.0, 3.0)
     text_end = clean.index(b"track\0") + 6
     assert clean[text_end : text_end + 2] == b"\0\0", "this message has padding before its numbers"
     dirty = clean[:text_end] + b"\xab\xcd" + clean[text_end + 2 :]
@@ -98,12 +99,12 @@ def test_serialising_again_clears_what_stands_in_the_padding() -> None:
 
 
 def test_sensor_messages_say_what_they_should() -> None:
-    position = deserialize(sensors.position(1_500_000_001, 12.5, 0.25), POSITION.type)
+    position = deserialize(cdrs.position(1_500_000_001, 12.5, 0.25), POSITION.type)
     assert (position.header.stamp.sec, position.header.stamp.nanosec) == (1, 500_000_001)
     assert position.header.frame_id == "track"
     assert (position.pose.pose.position.x, position.pose.covariance[0]) == (12.5, 0.25)
     assert position.pose.pose.orientation.w == 1.0
-    pressure = deserialize(sensors.brake_pressure(7, 511325.0), BRAKE_PRESSURE.type)
+    pressure = deserialize(cdrs.brake_pressure(7, 511325.0), BRAKE_PRESSURE.type)
     assert (pressure.header.stamp.nanosec, pressure.fluid_pressure) == (7, 511325.0)
 
 
@@ -176,4 +177,4 @@ def test_what_cannot_be_written_is_refused_by_name(tmp_path: Path) -> None:
     ):
         _ = next(reader.messages()).message
     with pytest.raises(ValueError, match=f"does not decode as {POSITION.type}"):
-        deserialize(sensors.brake_pressure(0, 1.0), POSITION.type)
+        deserialize(cdrs.brake_pressure(0, 1.0), POSITION.type)

@@ -11,6 +11,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import cdrs
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
@@ -19,18 +20,18 @@ from mcap.summary import Summary
 from recorded import S, write_steps
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
-from adhesion_node.bag import BagReader, Record, sensors, typestore
+from adhesion_node.bag import BagReader, Record, typestore
 from adhesion_node.bag.writer import file_name
 from adhesion_node.wire.topics import POSITION
 
 WRITER_THAT_IS_KILLED = """
 import sys
-from adhesion_node.bag import BagWriter, sensors
+from adhesion_node.bag import BagWriter, encode
 from adhesion_node.wire.topics import POSITION
 writer = BagWriter(sys.argv[1])
 step = 0
 while True:
-    writer.write("/position", POSITION.type, sensors.position(step * 10**7, step / 7, 0.25), step * 10**7)
+    writer.write("/position", POSITION.type, encode(POSITION, step * 10**7, (step / 7,), 0.25), step * 10**7)
     step += 1
     if step % 100 == 0:  # a second of a 100 Hz sensor
         writer.flush()
@@ -184,9 +185,7 @@ def test_recordings_of_other_recorders(tmp_path: Path, plugin: StoragePlugin, co
     foreign = Writer(path, version=9, storage_plugin=plugin)
     foreign.set_compression(compression, CompressionFormat.ZSTD)
     topic = "/train1/odometry/position"
-    written = [
-        Record(topic, POSITION.type, sensors.position(step * S, float(step), 0.25), step * S) for step in range(50)
-    ]
+    written = [Record(topic, POSITION.type, cdrs.position(step * S, float(step), 0.25), step * S) for step in range(50)]
     with foreign:
         connection = foreign.add_connection(topic, POSITION.type, typestore=typestore())
         for record in written:

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cdrs
 import numpy as np
 import pytest
 from conftest import SpinUntil
@@ -27,7 +28,7 @@ from rosbags.rosbag2 import Reader
 from ruamel.yaml import YAML
 from test_recorder import clock, has_messages, recording_process, stamped, start
 
-from adhesion_node.bag import BagReader, BagWriter, Limits, sensors
+from adhesion_node.bag import BagReader, BagWriter, Limits
 from adhesion_node.bag.part import MARGIN_BYTES, STEP_BYTES
 from adhesion_node.bag.writer import file_name
 from adhesion_node.nodes import recorder
@@ -193,7 +194,7 @@ def test_a_recording_that_cannot_begin_leaves_nothing(tmp_path: Path) -> None:
 
 def test_the_end_of_a_file_gives_back_the_room_that_metadata_needs(tmp_path: Path) -> None:
     writer = BagWriter(tmp_path / "bag")
-    writer.write("/position", POSITION.type, sensors.position(0, 0.0, 1.0), 0)
+    writer.write("/position", POSITION.type, cdrs.position(0, 0.0, 1.0), 0)
     held = (tmp_path / "bag" / file_name(0)).stat().st_blocks
     writer.close()
     left = (tmp_path / "bag" / file_name(0)).stat()

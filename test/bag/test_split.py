@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import SpinUntil
+from messages import message_class
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -24,7 +25,6 @@ from adhesion_node.bag import BagReader, BagWriter, Limits, Record
 from adhesion_node.bag.writer import file_name
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
-from adhesion_node.nodes.ros.qos import message_class
 from adhesion_node.tools import recover
 from adhesion_node.wire.topics import CLOCK, POSITION, TRUTH_MU
 

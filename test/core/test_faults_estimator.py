@@ -12,6 +12,7 @@ from functools import partial
 from itertools import pairwise
 from typing import Any
 
+import messages
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -30,7 +31,6 @@ from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import setup_of
 from sim_node.faults.plan import Plan, faulty_run
-from sim_node.nodes import messages
 from sim_node.train.messages import SensorMessage, Tick
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings
@@ -280,7 +280,9 @@ RELIABLE = {"qos_overrides./position.subscription.reliability": "reliable"}
 def test_a_publisher_that_offers_too_little_is_told_with_the_remedy(make_line: MakeLine) -> None:
     line = make_line(**RELIABLE)
     line.driver.create_publisher(
-        qos.message_class(topics.POSITION), "position", QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+        messages.message_class(topics.POSITION),
+        "position",
+        QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
     )
     told = said(line, "less reliability", "-p qos_overrides./position.subscription.reliability:=best_effort")
     line.spin_until(line.executor, told, 1.0)
@@ -288,7 +290,7 @@ def test_a_publisher_that_offers_too_little_is_told_with_the_remedy(make_line: M
 
 def test_a_subscriber_that_asks_too_much_is_told(make_line: MakeLine) -> None:
     line = make_line()
-    line.driver.create_subscription(qos.message_class(topics.MU), topics.MU.name, print, qos.LATCHED)
+    line.driver.create_subscription(messages.message_class(topics.MU), topics.MU.name, print, qos.LATCHED)
     line.spin_until(line.executor, said(line, "/adhesion/mu: a subscriber asks for more durability"), 1.0)
 
 
@@ -327,7 +329,7 @@ def test_who_comes_late_gets_no_old_curve(make_line: MakeLine) -> None:
     line.spin_until(line.executor, lambda: time.monotonic() > expired)
     late: dict[topics.Topic, list[Any]] = {topics.BRAKING_CURVE: [], topics.BRAKING_CURVE_NOMINAL: []}
     for topic, heard in late.items():
-        line.driver.create_subscription(qos.message_class(topic), topic.name, heard.append, qos.LATCHED)
+        line.driver.create_subscription(messages.message_class(topic), topic.name, heard.append, qos.LATCHED)
     line.spin_until(line.executor, lambda: late[topics.BRAKING_CURVE_NOMINAL])
     assert late[topics.BRAKING_CURVE] == []
 

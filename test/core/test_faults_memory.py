@@ -12,6 +12,7 @@ from itertools import chain, islice
 from types import BuiltinFunctionType, FunctionType, ModuleType
 from typing import Any
 
+import messages
 import numpy as np
 import pytest
 
@@ -21,7 +22,6 @@ from adhesion_node.core.intake import stream
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample, WheelSample
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import codecs as reading
-from sim_node.nodes import messages
 
 S = 10**9
 TURN = 2700

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from messages import message_of
 from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
@@ -21,7 +22,6 @@ from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
 from sim_node.faults.plan import FAULTS, Plan, faulty_run, period_of
 from sim_node.faults.streams import RATES_HZ
-from sim_node.nodes.messages import message_of
 from sim_node.nodes.simulator import Simulator
 from sim_node.train.messages import SensorMessage, Tick
 from sim_node.train.scenario import find
@@ -52,7 +52,7 @@ def usable(messages: Sequence[SensorMessage]) -> list[SensorMessage]:
     kept = []
     for message in messages:
         try:
-            reading.position(message_of(message))
+            topics.POSITION.read(message_of(message))
         except reading.Rejected:
             continue
         kept.append(message)

@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
+import messages
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -30,7 +31,6 @@ from adhesion_node.core.physics.braking import curve
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.live.__main__ import main
 from adhesion_node.live.node import Live
-from adhesion_node.nodes.ros import messages as convert
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
 
@@ -72,12 +72,12 @@ def publish_run(executor: SingleThreadedExecutor, context: Context) -> Node:
     regime = DiagnosticStatus(message="it is identified", values=[KeyValue(key="regime", value="ADHESION_LIMITED")])
     level = DiagnosticStatus(message="brake", values=[KeyValue(key="level", value="WARNING")])
     for topic, message, profile in (
-        (topics.MU, convert.mu_message(0.08), qos.RESULT),
-        (topics.MU_LOWER, convert.mu_message(0.075), qos.RESULT),
-        (topics.STATE, convert.state_message(5 * S, 1200.0, 1.0, 50.0, 1.0), qos.RESULT),
-        (topics.BRAKING_CURVE, convert.curve_message(5 * S, curve(CRH3, 50.0, 0.075), 1200.0), qos.LATCHED),
-        (topics.DIAGNOSTICS, DiagnosticArray(header=convert.header(5 * S), status=[regime]), qos.RESULT),
-        (topics.ATP_STATUS, DiagnosticArray(header=convert.header(5 * S), status=[level]), qos.RESULT),
+        (topics.MU, messages.mu_message(0.08), qos.RESULT),
+        (topics.MU_LOWER, messages.mu_message(0.075), qos.RESULT),
+        (topics.STATE, messages.state_message(5 * S, 1200.0, 1.0, 50.0, 1.0), qos.RESULT),
+        (topics.BRAKING_CURVE, messages.curve_message(5 * S, curve(CRH3, 50.0, 0.075), 1200.0), qos.LATCHED),
+        (topics.DIAGNOSTICS, DiagnosticArray(header=messages.header(5 * S), status=[regime]), qos.RESULT),
+        (topics.ATP_STATUS, DiagnosticArray(header=messages.header(5 * S), status=[level]), qos.RESULT),
     ):
         publisher = qos.advertise(node, topic, profile)
         deadline = time.monotonic() + TIMEOUT_S
@@ -113,7 +113,7 @@ def test_a_message_that_cannot_be_shown_is_said_and_shown_nowhere(
     executor.add_node(node)
     publisher = qos.advertise(node, topics.STATE, qos.RESULT)
     spin_until(executor, publisher.get_subscription_count)
-    publisher.publish(convert.state_message(5 * S, float("nan"), 1.0, 50.0, 1.0))
+    publisher.publish(messages.state_message(5 * S, float("nan"), 1.0, 50.0, 1.0))
     spin_until(executor, lambda: live.view.parts(0.0)["inputs"][3]["state"] == "refused")
     assert "position x = nan" in live.view.parts(0.0)["inputs"][3]["why"]
     assert live.view.parts(0.0)["train"] is None

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
+import messages
 import numpy as np
 import pytest
 from conftest import SpinUntil
@@ -23,7 +24,6 @@ from rosgraph_msgs.msg import Clock
 from adhesion_node.core.atp.supervision import Level, StampedCurve
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.nodes.atp_monitor import AtpMonitor
-from adhesion_node.nodes.ros import messages as convert
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import stamp_ns
@@ -85,7 +85,7 @@ class Line:
         def arrived() -> bool:
             if self.monitor.get_clock().now().nanoseconds == wanted_ns:
                 return True
-            self.clock.publish(Clock(clock=convert.header(wanted_ns).stamp))  # again: it is best effort
+            self.clock.publish(Clock(clock=messages.header(wanted_ns).stamp))  # again: it is best effort
             return False
 
         self.spin_until(self.executor, arrived)
@@ -124,11 +124,11 @@ def t_ns(offset_s: float = 0.0) -> int:
 
 
 def state(position_m: float, speed_mps: float = 40.0, offset_s: float = 0.0) -> Any:
-    return convert.state_message(t_ns(offset_s), position_m, 0.01, speed_mps, 0.01)
+    return messages.state_message(t_ns(offset_s), position_m, 0.01, speed_mps, 0.01)
 
 
 def curve(offset_s: float = 0.0) -> Any:
-    return convert.curve_message(t_ns(offset_s), constant_curve(50.0, 0.8), 0.0)
+    return messages.curve_message(t_ns(offset_s), constant_curve(50.0, 0.8), 0.0)
 
 
 def values(status: DiagnosticStatus) -> dict[str, str]:
@@ -284,7 +284,7 @@ def test_a_curve_from_before_the_monitor_started_is_used(
     executor.add_node(early)
     now_ns = early.get_clock().now().nanoseconds
     latched = qos.advertise(early, topics.BRAKING_CURVE, qos.LATCHED)
-    latched.publish(convert.curve_message(now_ns, constant_curve(50.0, 0.8), 0.0))
+    latched.publish(messages.curve_message(now_ns, constant_curve(50.0, 0.8), 0.0))
     monitor = AtpMonitor(context=context, namespace=NAMESPACE)
     executor.add_node(monitor)
     spin_until(executor, lambda: isinstance(monitor._curve, StampedCurve) and monitor._curve.t_ns == now_ns)

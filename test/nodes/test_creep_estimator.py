@@ -10,9 +10,11 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
+import messages
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
+from messages import traction_force, wheel_speed
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -23,14 +25,11 @@ from adhesion_node.core.intake.samples import ForceSample, SpeedSample, WheelSam
 from adhesion_node.nodes.creep_estimator import OUTPUTS, PARAMETERS, CreepEstimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.run.creep_pipeline import CreepPipeline
-from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
-from sim_node.nodes import messages
-from sim_node.nodes.messages import traction_force, wheel_speed
 from sim_node.slip import plant as slip
 from sim_node.slip.scenario import DRY, WET, SlipScenario, find
 
-INPUTS = (topics.SPEED, *topics.CREEP_SENSORS)
+INPUTS = topics.CREEP_INPUTS
 PERIOD_S = 0.05
 """20 Hz: these tests compare runs, not accuracy."""
 
@@ -222,5 +221,5 @@ def test_parameters_reach_the_configuration_and_bad_ones_are_refused(context: Co
 
 
 def test_readers_take_good_messages() -> None:
-    assert reading.wheel_speed(wheel_speed(5, (1.0, -2.0))) == (5, (1.0, -2.0))
-    assert reading.traction_force(traction_force(7, -3.0)) == (7, -3.0)
+    assert topics.WHEEL_SPEED.read(wheel_speed(5, (1.0, -2.0))) == (5, (1.0, -2.0))
+    assert topics.TRACTION_FORCE.read(traction_force(7, -3.0)) == (7, -3.0)

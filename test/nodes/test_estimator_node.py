@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
+import messages
 import numpy as np
 import pytest
 from conftest import SpinUntil
@@ -23,13 +24,11 @@ from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET, AdhesionLaw
 from adhesion_node.core.physics.train import CRH3, GRAVITY
 from adhesion_node.nodes.estimator import PARAMETERS, Estimator
-from adhesion_node.nodes.ros import messages as convert
 from adhesion_node.nodes.ros import qos
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import ATMOSPHERE_PA
 from adhesion_node.wire.settings import setup_of
-from sim_node.nodes import messages
 from sim_node.train import scenario
 from sim_node.train.plant import Truth
 from sim_node.train.run import run
@@ -54,7 +53,7 @@ class Line:
     heard: dict[topics.Topic, list[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.outputs = {topic: qos.advertise(self.driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.SENSORS}
+        self.outputs = {topic: qos.advertise(self.driver, topic) for topic in topics.ADHESION_INPUTS}
         for topic in (*topics.RESULTS, topics.DIAGNOSTICS):
             self.heard[topic] = []
             qos.subscribe(self.driver, topic, self.heard[topic].append, qos.RESULT)
@@ -147,7 +146,7 @@ def test_every_result_says_the_same_of_one_instant(line: Line) -> None:
     ]
     for topic, mu in expectation:
         message = last[topic]
-        t_ns, read = convert.curve(message)
+        t_ns, _, read = topics.BRAKING_CURVE.read(message)
         expected = braking.curve(CRH3, estimate.speed_mps, mu)
         assert t_ns == estimate.t_ns
         assert message.points[0].positions[0] == pytest.approx(estimate.position_m)

@@ -9,6 +9,7 @@ import signal
 from collections.abc import Iterator
 from functools import partial
 
+import messages
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -23,7 +24,6 @@ from test_two_processes import PATIENCE_S, QUICK, Operator, Program
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
-from sim_node.nodes import messages
 from sim_node.train.messages import Tick
 
 
@@ -62,7 +62,7 @@ def test_a_killed_estimator_is_replaced_by_one_that_inherits_nothing(
     operator, driver = Operator(context), Node("driver", context=context)
     executor.add_node(operator)
     executor.add_node(driver)
-    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.SENSORS}
+    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.ADHESION_INPUTS}
 
     def run_one(run: list[Tick]) -> Program:
         operator.heard.clear()

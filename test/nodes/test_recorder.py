@@ -17,6 +17,7 @@ from typing import Any
 
 import pytest
 from conftest import SpinUntil
+from messages import message_class
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -28,7 +29,7 @@ from rosgraph_msgs.msg import Clock
 from adhesion_node.bag import BagReader
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
-from adhesion_node.nodes.ros.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise, message_class
+from adhesion_node.nodes.ros.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise
 from adhesion_node.wire.topics import (
     BRAKING_CURVE,
     BRAKING_CURVE_NOMINAL,

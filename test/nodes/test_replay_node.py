@@ -16,8 +16,10 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import cdrs
 import pytest
 from conftest import SpinUntil
+from messages import message_class
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -25,10 +27,10 @@ from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from recorded import write_steps
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from adhesion_node.bag import BagReader, BagWriter, Record, select, sensors, serialize, typestore
+from adhesion_node.bag import BagReader, BagWriter, Record, select, serialize, typestore
 from adhesion_node.nodes import player, replay
 from adhesion_node.nodes.player import Replay
-from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, message_class, subscribe
+from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, subscribe
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU, Topic
 
 S = 10**9
@@ -135,7 +137,7 @@ def test_recorded_results_are_not_replayed_and_truth_is(
         for step in range(3):
             writer.write("/truth/mu", MU.type, serialize(typestore().types[MU.type](data=0.1), MU.type), step)
             writer.write("/adhesion/mu", MU.type, serialize(typestore().types[MU.type](data=0.2), MU.type), step)
-            writer.write("/position", POSITION.type, sensors.position(step, 1.0, 1.0), step)
+            writer.write("/position", POSITION.type, cdrs.position(step, 1.0, 1.0), step)
     listener = Listener(context, POSITION, TRUTH_MU, MU)
     executor.add_node(listener)
     with BagReader(tmp_path / "bag") as reader:
@@ -149,10 +151,10 @@ def test_names_follow_the_remapping_and_the_namespace(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     path = tmp_path / "elsewhere"
-    cdrs = [sensors.position(step, float(step), 1.0) for step in range(5)]
+    positions = [cdrs.position(step, float(step), 1.0) for step in range(5)]
     with Writer(path, version=9, storage_plugin=StoragePlugin.SQLITE3) as foreign:
         connection = foreign.add_connection("/odometry/position", POSITION.type, typestore=typestore())
-        for step, cdr in enumerate(cdrs):
+        for step, cdr in enumerate(positions):
             foreign.write(connection, step, cdr)
     listener = Listener(context, Topic("/train2/position", POSITION.type))
     executor.add_node(listener)
@@ -161,7 +163,7 @@ def test_names_follow_the_remapping_and_the_namespace(
         node = Replay(reader, selection, 0.0, context=context, namespace="/train2")
         executor.add_node(node)
         spin_until(executor, lambda: node.finished and len(listener.heard) == 5)
-    assert [cdr for _, cdr in listener.heard] == cdrs
+    assert [cdr for _, cdr in listener.heard] == positions
 
 
 def test_it_waits_for_a_subscriber_and_then_misses_nothing(
@@ -258,7 +260,7 @@ def test_a_best_effort_subscriber_at_full_speed_is_named(
 
 def test_a_bag_without_position_says_what_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with BagWriter(tmp_path / "bag") as writer:
-        writer.write("/gnss", POSITION.type, sensors.position(0, 0.0, 1.0), 0)
+        writer.write("/gnss", POSITION.type, cdrs.position(0, 0.0, 1.0), 0)
     assert replay.main([str(tmp_path / "bag")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line == (

@@ -16,13 +16,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import cdrs
 import pytest
 from conftest import ROOT
 from hypothesis import assume, given
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 
-from adhesion_node.bag import BagReader, BagWriter, Limits, Record, sensors
+from adhesion_node.bag import BagReader, BagWriter, Limits, Record
 from adhesion_node.bag.writer import file_name
 from adhesion_node.core.intake.samples import MAX_POSITION_M
 from adhesion_node.tools import csv_rows, import_csv, recover
@@ -40,8 +41,8 @@ def written() -> list[Record]:
     records = []
     for step in range(40):
         t_ns = step * S // 10
-        records.append(Record("/brake_pressure", BRAKE_PRESSURE.type, sensors.brake_pressure(t_ns, 1e5 + step), t_ns))
-        records.append(Record("/position", POSITION.type, sensors.position(t_ns, step / 3, 0.25), t_ns))
+        records.append(Record("/brake_pressure", BRAKE_PRESSURE.type, cdrs.brake_pressure(t_ns, 1e5 + step), t_ns))
+        records.append(Record("/position", POSITION.type, cdrs.position(t_ns, step / 3, 0.25), t_ns))
     return records
 
 
@@ -224,7 +225,7 @@ def check_rows(rows: list[Row | Refusal]) -> None:
         last_ns = row.t_ns
         assert abs(row.position_m) <= MAX_POSITION_M
         assert all(value is None or math.isfinite(value) for value in row)
-        sensors.position(row.t_ns, row.position_m, row.variance_m2 or 1.0)
+        cdrs.position(row.t_ns, row.position_m, row.variance_m2 or 1.0)
 
 
 NAMES = st.sampled_from([setting.name for setting in SETTINGS])

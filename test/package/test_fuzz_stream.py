@@ -32,9 +32,8 @@ from adhesion_node.core.methods.rail_condition.method import SHORT_S
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire import codecs as reading
-from adhesion_node.wire.codecs import MAX_ABSOLUTE_PA, Reason, Rejected
-from adhesion_node.wire.topics import FRAME, POSITION
+from adhesion_node.wire.codecs import FRAME, MAX_ABSOLUTE_PA, Reason, Rejected
+from adhesion_node.wire.topics import POSITION, SENSORS
 
 S = 10**9
 GOOD = ride([(3.0, 0.0), (9.0, 410e3), (1.0, 0.0), (3.0, 200e3)])
@@ -199,6 +198,8 @@ def fields(name: str, value: Any) -> Any:
     return value
 
 
+SENSED = {topic.name: topic for topic in SENSORS}
+
 HEADERS = st.builds(
     lambda sec, nanosec, frame: SimpleNamespace(stamp=SimpleNamespace(sec=sec, nanosec=nanosec), frame_id=frame),
     st.sampled_from([0, 1, 2, 3, 63, -(2**31), 2**31 - 1]) | st.integers(-(2**31), 2**31 - 1),
@@ -241,7 +242,7 @@ def test_any_messages_are_read_or_refused_with_a_remedy(config: Config, messages
     watched = Watched(config)
     for topic, message in messages:
         try:
-            sample = getattr(reading, topic)(message)
+            sample = SENSED[topic].read(message)
         except Rejected as refusal:
             watched.refuse(topic, refusal)
             continue

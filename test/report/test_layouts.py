@@ -23,7 +23,7 @@ from adhesion_node.bag import typestore
 from adhesion_node.core.atp.config import SupervisionConfig
 from adhesion_node.core.atp.supervision import unsafe
 from adhesion_node.nodes.atp_monitor import status_message
-from adhesion_node.wire.topics import DIAGNOSTICS, RECORDED, RESULTS, SENSORS
+from adhesion_node.wire.topics import BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RECORDED, RESULTS, SPEED
 
 LAYOUTS = ROOT / "adhesion_node" / "layouts"
 TYPES = {f"/{topic.name.lstrip('/')}": topic.type for topic in RECORDED}
@@ -174,7 +174,7 @@ def test_what_matters_is_shown(paths: list[str]) -> None:
 def test_foxglove_shows_every_sensor_and_result() -> None:
     shown = {path.split(".")[0] for path in FOXGLOVE_PATHS}
     nominal = "/adhesion/braking_curve_nominal"  # a plot has one x axis; the safe curve is the one to see
-    assert {f"/{topic.name}" for topic in (*SENSORS, *RESULTS)} - {nominal} <= shown
+    assert {f"/{topic.name}" for topic in (POSITION, BRAKE_PRESSURE, SPEED, *RESULTS)} - {nominal} <= shown
 
 
 def splits(layout: Any) -> list[dict[str, Any]]:

@@ -9,6 +9,8 @@ import struct
 from pathlib import Path
 from typing import Any
 
+import cdrs
+import messages
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
@@ -17,11 +19,10 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 from test_convert import as_rosbags
 
-from adhesion_node.bag import BagReader, BagWriter, sensors
+from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.bag.types import serialize
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.physics.train import Train
-from adhesion_node.nodes.ros import messages as convert
 from adhesion_node.report import picture
 from adhesion_node.report.findings import distances
 from adhesion_node.report.run import Run, distance_to_target, read_run
@@ -56,14 +57,14 @@ def rows(second: int) -> list[tuple[Topic, bytes]]:
     regime = "COASTING" if second < 5 else "ADHESION_LIMITED"
     status = DiagnosticStatus(values=[KeyValue(key="regime", value=regime)])
     plain: tuple[tuple[Topic, Any], ...] = (
-        (TRUTH_STATE, convert.state_message(t_ns, place, 0.0, speed, 0.0)),
+        (TRUTH_STATE, messages.state_message(t_ns, place, 0.0, speed, 0.0)),
         (TRUTH_MU, Float64(data=0.1)),
         (MU, Float64(data=0.09)),
         (MU_LOWER, Float64(data=0.08)),
-        (STATE, convert.state_message(t_ns, place, 1.0, speed, 1.0)),
-        (DIAGNOSTICS, DiagnosticArray(header=convert.header(t_ns), status=[status])),
+        (STATE, messages.state_message(t_ns, place, 1.0, speed, 1.0)),
+        (DIAGNOSTICS, DiagnosticArray(header=messages.header(t_ns), status=[status])),
     )
-    pressure = BRAKE_PRESSURE, sensors.brake_pressure(t_ns, 101_325.0 + 410e3)
+    pressure = BRAKE_PRESSURE, cdrs.brake_pressure(t_ns, 101_325.0 + 410e3)
     return [pressure, *((topic, serialize_message(message)) for topic, message in plain)]
 
 
@@ -144,8 +145,8 @@ def record_with_losses(path: Path, *lost: tuple[Topic, int]) -> Path:
             published: tuple[tuple[Topic, Any], ...] = (
                 (MU, Float64(data=mu)),
                 (MU_LOWER, Float64(data=mu - 0.01)),
-                (DECELERATION, convert.deceleration_message(t_ns, mu, 0.001)),
-                (STATE, convert.state_message(t_ns, 80.0 * second, 1.0, 80.0, 1.0)),
+                (DECELERATION, messages.deceleration_message(t_ns, mu, 0.001)),
+                (STATE, messages.state_message(t_ns, 80.0 * second, 1.0, 80.0, 1.0)),
             )
             for at, (topic, message) in enumerate(published):
                 if (topic, second) not in lost:
@@ -184,7 +185,7 @@ def curve(second: int, length_m: float) -> bytes:
     """Return a braking curve of that second, by hand: as it runs to 60, 40 and 0 m/s, it passes 50 at 2 lengths."""
     speeds = np.array([80.0 - 2.0 * second, 60.0, 40.0, 0.0])
     by_hand = BrakingCurve(length_m * np.array([0.0, 1.0, 3.0, 9.0]), speeds, np.ones(4), np.arange(4.0))
-    message = convert.curve_message(START_NS + second * S, by_hand, 70.0)
+    message = messages.curve_message(START_NS + second * S, by_hand, 70.0)
     return serialize(as_rosbags(message, BRAKING_CURVE.type), BRAKING_CURVE.type)
 
 

@@ -8,14 +8,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import cdrs
+import messages
 import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 
-from adhesion_node.bag import BagReader, BagWriter, sensors
-from adhesion_node.nodes.ros import messages as convert
+from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.report.series import Series, read_series, read_status
 from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE, Topic
 
@@ -31,7 +32,7 @@ def write(path: Path, *rows: tuple[Topic, Any, int]) -> Path:
 
 
 def state(t_ns: int, speed_mps: float) -> Any:
-    return convert.state_message(t_ns, 0.0, 1.0, speed_mps, 1.0)
+    return messages.state_message(t_ns, 0.0, 1.0, speed_mps, 1.0)
 
 
 def speed_of(message: Any) -> float:
@@ -58,7 +59,7 @@ def test_times_increase_even_where_messages_came_late(tmp_path: Path) -> None:
     path = tmp_path / "bag"
     with BagWriter(path) as writer:
         for t_ns, log_ns in ((S, S), (3 * S, 2 * S), (2 * S, 3 * S), (4 * S, 4 * S)):
-            writer.write("/position", POSITION.type, sensors.position(t_ns, t_ns / S, 1.0), log_ns)
+            writer.write("/position", POSITION.type, cdrs.position(t_ns, t_ns / S, 1.0), log_ns)
     with BagReader(path) as reader:
         series = read_series(reader, POSITION, lambda message: message.pose.pose.position.x)
     assert (series.t_ns.tolist(), series.values.tolist()) == ([S, 2 * S, 3 * S, 4 * S], [1.0, 2.0, 3.0, 4.0])
@@ -93,7 +94,7 @@ def test_a_status_is_read_by_its_key(tmp_path: Path) -> None:
     def array(t_ns: int, *pairs: tuple[str, str]) -> Any:
         others = DiagnosticStatus(name="other", values=[KeyValue(key="rate", value="10")])
         ours = DiagnosticStatus(name="ours", values=[KeyValue(key=key, value=value) for key, value in pairs])
-        return DiagnosticArray(header=convert.header(t_ns), status=[others, ours])
+        return DiagnosticArray(header=messages.header(t_ns), status=[others, ours])
 
     path = write(
         tmp_path / "bag",

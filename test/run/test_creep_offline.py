@@ -11,22 +11,23 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import cdrs
+import messages
 import numpy as np
 import pytest
 from conftest import SpinUntil
+from messages import traction_force, wheel_speed
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from adhesion_node.bag import BagWriter, sensors, serialize, typestore
+from adhesion_node.bag import BagWriter, serialize, typestore
 from adhesion_node.core.creep.config import Peak
 from adhesion_node.nodes import replay
-from adhesion_node.nodes.creep_estimator import INPUTS, CreepEstimator
+from adhesion_node.nodes.creep_estimator import CreepEstimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
-from sim_node.nodes import messages
-from sim_node.nodes.messages import traction_force, wheel_speed
 from sim_node.slip import plant as slip
 from sim_node.slip.scenario import find
 
@@ -63,7 +64,7 @@ def write(folder: Path, stream: list[tuple[topics.Topic, int, Any]], *, position
         for topic, t_ns, message in stream:
             writer.write(f"/{topic.name}", topic.type, serialize(rebuilt(message), topic.type), t_ns)
             if position and topic == topics.WHEEL_SPEED:
-                place = sensors.position(t_ns, 8e-9 * t_ns, 0.25)
+                place = cdrs.position(t_ns, 8e-9 * t_ns, 0.25)
                 writer.write(f"/{topics.POSITION.name}", topics.POSITION.type, place, t_ns)
     return folder
 
@@ -100,7 +101,7 @@ def test_live_and_offline_give_one_digest(
     stream = recorded()
     node = CreepEstimator(context=context, parameter_overrides=[Parameter("every", value=7)])
     driver = Node("driver", context=context)
-    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in INPUTS}
+    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.CREEP_INPUTS}
     for each in (node, driver):
         executor.add_node(each)
     spin_until(executor, lambda: all(output.get_subscription_count() for output in outputs.values()))

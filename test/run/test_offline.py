@@ -12,18 +12,19 @@ from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cdrs
+import messages
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
-from adhesion_node.bag import BagWriter, deserialize, sensors, serialize
+from adhesion_node.bag import BagWriter, deserialize, serialize
 from adhesion_node.bag.writer import file_name
 from adhesion_node.command import options as cli
 from adhesion_node.core import Config, Estimate, Measurement, finish, init, step
 from adhesion_node.nodes import replay
 from adhesion_node.wire.settings import setup_of
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, TRUTH_MU, TRUTH_STATE, Topic
-from sim_node.nodes import messages
 from sim_node.train.plant import Truth
 from sim_node.train.run import run
 from sim_node.train.scenario import find
@@ -60,13 +61,13 @@ def encoded(truth: Truth, reading: Reading) -> Iterator[tuple[Topic, bytes]]:
     """Yield the messages of a sample; the truth through the type store, so that equal runs give equal bytes."""
     t_ns = START_NS + truth.t_ns
     for topic, message in (
-        (TRUTH_STATE, messages.truth_state(t_ns, truth)),
-        (TRUTH_MU, messages.truth_mu(truth)),
+        (TRUTH_STATE, messages.state_message(t_ns, truth.position_m, 0.0, truth.speed_mps, 0.0)),
+        (TRUTH_MU, messages.mu_message(truth.mu)),
     ):
         yield topic, serialize(deserialize(serialize_message(message), topic.type), topic.type)
-    yield BRAKE_PRESSURE, sensors.brake_pressure(t_ns, reading.pressure_pa)
+    yield BRAKE_PRESSURE, cdrs.brake_pressure(t_ns, reading.pressure_pa)
     assert reading.position_m is not None
-    yield POSITION, sensors.position(t_ns, reading.position_m, 0.25)
+    yield POSITION, cdrs.position(t_ns, reading.position_m, 0.25)
 
 
 def write_run(
@@ -324,13 +325,13 @@ def test_a_few_bad_messages_are_counted_and_change_nothing(tmp_path: Path, offli
     def spoil(topic: Topic, index: int, cdr: bytes) -> bytes:
         t_ns = START_NS + samples_[index][0].t_ns
         if topic is POSITION and index == 20:
-            return sensors.position(t_ns, float("nan"), 0.25)
+            return cdrs.position(t_ns, float("nan"), 0.25)
         if topic is POSITION and index in (40, 41):
-            return sensors.position(t_ns, 1.0, 0.0)
+            return cdrs.position(t_ns, 1.0, 0.0)
         if topic is POSITION and index == 60:
             return in_frame("", cdr, topic)
         if topic is BRAKE_PRESSURE and index == 10:
-            return sensors.brake_pressure(t_ns, 0.0)
+            return cdrs.brake_pressure(t_ns, 0.0)
         return cdr
 
     samples_ = samples()
@@ -345,7 +346,7 @@ def test_a_few_bad_messages_are_counted_and_change_nothing(tmp_path: Path, offli
 
 def test_a_bag_without_any_estimate_has_failed(tmp_path: Path, offline: Offline) -> None:
     def no_variance(topic: Topic, _: int, cdr: bytes) -> bytes:
-        return sensors.position(START_NS, 1.0, 0.0) if topic is POSITION else cdr
+        return cdrs.position(START_NS, 1.0, 0.0) if topic is POSITION else cdr
 
     write_run(tmp_path / "bad", samples()[:20], edit=no_variance)
     code, result, _, err = offline(tmp_path / "bad")
@@ -366,7 +367,7 @@ def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offl
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--set", "windw=40"], "setting 'windw=40': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+        (["--set", "windw=40"], "setting 'windw=40': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
         (["--set", "window=forty"], "setting window = 'forty': give a value of type int"),
         (["--set", "window=2"], "window = 2: give a value from 3 to 10000"),
         (["--set", "window=10"], "step = 10: choose less than the window, 10"),

@@ -14,14 +14,14 @@ from typing import Any
 
 import pytest
 from conftest import SpinUntil
+from messages import message_class
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
-from adhesion_node.nodes.ros.qos import message_class
-from adhesion_node.wire.topics import CLOCK, SENSORS, TRUTH
+from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH
 from sim_node.nodes.pace import MAX_BURST, due
 from sim_node.nodes.simulator import Simulator
 from sim_node.train.run import run
@@ -180,7 +180,7 @@ class _Listener(Node):
     def __init__(self, context: Context) -> None:
         super().__init__("listener", context=context)
         self.heard: dict[str, list[Any]] = defaultdict(list)
-        for topic in (CLOCK, *TRUTH, *SENSORS):
+        for topic in (CLOCK, *TRUTH, POSITION, BRAKE_PRESSURE, SPEED):
             self.create_subscription(message_class(topic), topic.name, self.heard[topic.name].append, 100)
 
 

@@ -13,8 +13,7 @@ from rclpy.context import Context
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
-from adhesion_node.wire import codecs as reading
-from adhesion_node.wire.topics import CLOCK, CREEP_SENSORS, SPEED, TRUTH_MU
+from adhesion_node.wire.topics import CLOCK, CREEP_INPUTS, SPEED, TRACTION_FORCE, TRUTH_MU, WHEEL_SPEED
 from sim_node.nodes.slip_simulator import SlipSimulator
 from sim_node.slip import plant as slip
 from sim_node.slip.scenario import find
@@ -54,9 +53,9 @@ def test_a_sample_is_published_in_order_with_one_stamp(context: Context, sent: S
     expected = list(zip(range(3), slip.run(find("creep_dry"), 0.01, 3), strict=False))
     for index, (truth, measured) in expected:
         t_ns = 12_500_000_000 + index * 10_000_000
-        assert reading.speed(lists["/speed"][index]) == (t_ns, measured.speed_mps)
-        assert reading.traction_force(lists["/traction_force"][index]) == (t_ns, measured.force_n)
-        assert reading.wheel_speed(lists["/wheel_speed"][index]) == (t_ns, measured.wheel_radps)
+        assert SPEED.read(lists["/speed"][index]) == (t_ns, measured.speed_mps)
+        assert TRACTION_FORCE.read(lists["/traction_force"][index]) == (t_ns, measured.force_n)
+        assert WHEEL_SPEED.read(lists["/wheel_speed"][index]) == (t_ns, measured.wheel_radps)
         assert lists["/truth/mu"][index].data == truth.mu_max
     assert list(lists["/wheel_speed"][0].name) == [f"axle_{number}" for number in range(1, 7)]
     assert lists["/speed"][0].twist.covariance[0] == pytest.approx(0.003**2)
@@ -68,7 +67,7 @@ def test_a_run_ends_and_finishes(context: Context, sent: Sent) -> None:
     assert sum(1 for _ in iter(simulator.tick, False)) == 81
     assert simulator.finished
     assert {topic.lstrip("/") for topic, _ in sent} == {
-        topic.name.lstrip("/") for topic in (CLOCK, TRUTH_MU, SPEED, *CREEP_SENSORS)
+        topic.name.lstrip("/") for topic in (CLOCK, TRUTH_MU, *CREEP_INPUTS)
     }
     simulator.destroy_node()
 

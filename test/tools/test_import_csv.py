@@ -15,7 +15,7 @@ import pytest
 from adhesion_node.bag import BagReader
 from adhesion_node.core.intake.samples import PositionSample
 from adhesion_node.tools import csv_rows, import_csv
-from adhesion_node.wire import codecs as reading
+from adhesion_node.wire.topics import POSITION, SPEED
 
 GOOD = """\
 time,position,variance,brake_pressure,speed
@@ -48,7 +48,7 @@ class Import:
             return [record.message for record in reader.messages([topic])]
 
     def positions(self) -> list[PositionSample]:
-        return [reading.position(message) for message in self.messages("position")]
+        return [POSITION.read(message) for message in self.messages("position")]
 
 
 @pytest.fixture
@@ -73,7 +73,7 @@ def test_a_good_log(importing: Import) -> None:
         (300_000_000, 26.4, 0.25),
     ]
     assert [m.fluid_pressure for m in importing.messages("brake_pressure")] == [101_325.0, 511_325.0]
-    assert [tuple(reading.speed(m)) for m in importing.messages("speed")] == [(100_000_000, 80.0), (200_000_000, 79.9)]
+    assert [tuple(SPEED.read(m)) for m in importing.messages("speed")] == [(100_000_000, 80.0), (200_000_000, 79.9)]
 
 
 def test_order_and_log_times_are_those_of_a_live_run(importing: Import) -> None:
@@ -101,6 +101,8 @@ def test_equal_logs_give_equal_recordings(importing: Import, tmp_path: Path) -> 
         (["--pressure-unit", "bar"], "4.1", 511_325.0),
         (["--pressure-unit", "bar", "--pressure-kind", "absolute"], "5.11325", 511_325.0),
         (["--pressure-kind", "absolute"], "511325", 511_325.0),
+        (["--ambient-pressure", "58000"], "410000", 468_000.0),
+        (["--ambient-pressure", "58000"], "0", 58_000.0),
         ([], "-100", 101_225.0),
     ],
 )
@@ -136,7 +138,7 @@ def test_columns_units_and_delimiter_of_another_log(importing: Import) -> None:
     options = ["--time", "t", "--position", "Weg", "--speed", "v [km/h]", "--delimiter", ";"]
     assert importing(text, *options, "--position-unit", "km", "--speed-unit", "kmh", "--position-std", "2") == 0
     assert importing.positions() == [(10 * 10**9, 1500.0, 4.0), (11 * 10**9, 1575.0, 4.0)]
-    assert [reading.speed(message).speed_mps for message in importing.messages("speed")] == [80.0, 75.0]
+    assert [SPEED.read(message).speed_mps for message in importing.messages("speed")] == [80.0, 75.0]
 
 
 def test_tabs_byte_order_mark_windows_lines_and_blank_lines(importing: Import) -> None:
@@ -179,7 +181,7 @@ FAULTS = [
     (
         "2,1,1,-90000,0",
         "out_of_range",
-        "FILE:3: brake_pressure = '-90000': 11325 is not from 50000 to 5e+06 Pa absolute: ",
+        "FILE:3: brake_pressure = '-90000': 11325 is not from 45000 to 5e+06 Pa absolute: ",
     ),
     ("2,1,1,1e7,0", "out_of_range", "FILE:3: brake_pressure = '1e7': "),
     (

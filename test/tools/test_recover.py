@@ -9,13 +9,14 @@ import json
 from pathlib import Path
 from typing import Any
 
+import cdrs
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import Reader
 from test_recording_survives import file_size_limit
 
-from adhesion_node.bag import BagReader, BagWriter, Limits, sensors
+from adhesion_node.bag import BagReader, BagWriter, Limits
 from adhesion_node.bag.writer import file_name
 from adhesion_node.tools import recover
 from adhesion_node.wire.topics import BRAKING_CURVE, POSITION
@@ -29,7 +30,7 @@ def interrupted(path: Path, steps: int) -> None:
     writer.add_topic("/curve", BRAKING_CURVE.type, latched=True)
     writer.write("/curve", BRAKING_CURVE.type, b"\0\1\0\0", 0)
     for step in range(steps):
-        writer.write("/position", POSITION.type, sensors.position(step * S, step / 3, 0.25), step * S)
+        writer.write("/position", POSITION.type, cdrs.position(step * S, step / 3, 0.25), step * S)
         if step % 100 == 99:
             writer.flush()
     writer.close()
@@ -117,7 +118,7 @@ def test_bad_usage_is_code_2(capsys: pytest.CaptureFixture[str]) -> None:
 def test_it_says_what_is_lost_where_the_metadata_tells(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with BagWriter(tmp_path / "bag", Limits(max_duration_ns=10 * S)) as writer:
         for step in range(40):
-            writer.write("/position", POSITION.type, sensors.position(step * S, step / 3, 0.25), step * S)
+            writer.write("/position", POSITION.type, cdrs.position(step * S, step / 3, 0.25), step * S)
     (tmp_path / "bag" / file_name(1)).unlink()
     cut(tmp_path / "bag" / file_name(3))
     assert recover.main([str(tmp_path / "bag"), "--output", str(tmp_path / "whole"), "--json", "-"]) == 0
@@ -140,7 +141,7 @@ def cut(file: Path) -> None:
 
 def test_a_complete_recording_without_metadata_gets_it(tmp_path: Path) -> None:
     with BagWriter(tmp_path / "bag") as writer:
-        writer.write("/position", POSITION.type, sensors.position(0, 0.0, 0.25), 0)
+        writer.write("/position", POSITION.type, cdrs.position(0, 0.0, 0.25), 0)
     (tmp_path / "bag" / "metadata.yaml").unlink()
     summary = recover.recover(tmp_path / "bag", tmp_path / "whole")
     assert summary["damage"] == [f"{tmp_path / 'bag'} has no readable metadata.yaml: its recording was interrupted"]

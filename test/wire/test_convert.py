@@ -11,6 +11,7 @@ from collections.abc import Callable
 from copy import deepcopy
 from typing import Any
 
+import messages
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseWithCovarianceStamped, TwistWithCovarianceStamped
@@ -21,8 +22,8 @@ from trajectory_msgs.msg import JointTrajectory
 
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
-from adhesion_node.nodes.ros import messages as convert
 from adhesion_node.wire import codecs as reading
+from adhesion_node.wire import topics
 
 T_NS = 12_000_000_034
 ROS = get_typestore(Stores.ROS2_JAZZY)
@@ -36,7 +37,7 @@ def as_rosbags(message: Any, name: str) -> Any:
 
 
 def make_position(x: float = 1234.5, variance: float = 0.25, frame: str = "track") -> PoseWithCovarianceStamped:
-    message = PoseWithCovarianceStamped(header=convert.header(T_NS))
+    message = PoseWithCovarianceStamped(header=messages.header(T_NS))
     message.header.frame_id = frame
     message.pose.pose.position.x = x
     message.pose.covariance[0] = variance
@@ -44,13 +45,13 @@ def make_position(x: float = 1234.5, variance: float = 0.25, frame: str = "track
 
 
 def make_pressure(pa: float = 511_325.0, frame: str = "track") -> FluidPressure:
-    message = FluidPressure(header=convert.header(T_NS), fluid_pressure=pa)
+    message = FluidPressure(header=messages.header(T_NS), fluid_pressure=pa)
     message.header.frame_id = frame
     return message
 
 
 def make_speed(mps: float = 83.3, frame: str = "track") -> TwistWithCovarianceStamped:
-    message = TwistWithCovarianceStamped(header=convert.header(T_NS))
+    message = TwistWithCovarianceStamped(header=messages.header(T_NS))
     message.header.frame_id = frame
     message.twist.twist.linear.x = mps
     return message
@@ -58,68 +59,73 @@ def make_speed(mps: float = 83.3, frame: str = "track") -> TwistWithCovarianceSt
 
 @pytest.mark.parametrize("view", [lambda message, _name: message, as_rosbags], ids=["rclpy", "rosbags"])
 def test_sensor_messages_are_read(view: Callable[[Any, str], Any]) -> None:
-    position = reading.position(view(make_position(), "geometry_msgs/msg/PoseWithCovarianceStamped"))
+    position = topics.POSITION.read(view(make_position(), "geometry_msgs/msg/PoseWithCovarianceStamped"))
     assert position == (12_000_000_034, 1234.5, 0.25)
-    pressure = reading.brake_pressure(view(make_pressure(), "sensor_msgs/msg/FluidPressure"))
+    pressure = topics.BRAKE_PRESSURE.read(view(make_pressure(), "sensor_msgs/msg/FluidPressure"))
     assert pressure == (12_000_000_034, 410_000.0)
-    speed = reading.speed(view(make_speed(), "geometry_msgs/msg/TwistWithCovarianceStamped"))
+    speed = topics.SPEED.read(view(make_speed(), "geometry_msgs/msg/TwistWithCovarianceStamped"))
     assert speed == (12_000_000_034, 83.3)
     assert {type(value) for value in (*position, *pressure, *speed)} == {int, float}
 
 
 def test_a_released_brake_never_pulls() -> None:
-    assert reading.brake_pressure(make_pressure(101_000.0)).pressure_pa == 0.0
+    assert topics.BRAKE_PRESSURE.read(make_pressure(101_000.0)).pressure_pa == 0.0
 
 
 @pytest.mark.parametrize(
-    ("read", "message", "reason", "text"),
+    ("topic", "message", "reason", "text"),
     [
-        (reading.position, make_position(frame="map"), "WRONG_FRAME", r"header\.frame_id = 'map': set .* to 'track'"),
-        (reading.position, make_position(frame=""), "WRONG_FRAME", r"header\.frame_id = ''"),
-        (reading.position, make_position(math.nan), "NOT_FINITE", r"position x = nan: give a finite number"),
-        (reading.position, make_position(-math.inf), "NOT_FINITE", r"position x = -inf"),
-        (reading.position, make_position(1e308), "IMPLAUSIBLE_POSITION", r"position x = 1e\+308: position is in m"),
-        (reading.position, make_position(variance=0.0), "BAD_VARIANCE", r"covariance\[0\] = 0: give covariance"),
-        (reading.position, make_position(variance=-1.0), "BAD_VARIANCE", r"covariance\[0\] = -1"),
-        (reading.position, make_position(variance=1e308), "BAD_VARIANCE", r"covariance\[0\] = 1e\+308"),
-        (reading.position, make_position(variance=5e-324), "BAD_VARIANCE", r"covariance\[0\]"),
-        (reading.position, make_position(variance=math.nan), "NOT_FINITE", r"covariance\[0\] = nan"),
-        (reading.brake_pressure, make_pressure(frame="map"), "WRONG_FRAME", r"'map'"),
-        (reading.brake_pressure, make_pressure(0.0), "IMPLAUSIBLE_PRESSURE", r"= 0: .* absolute.* add 101325 Pa"),
-        (reading.brake_pressure, make_pressure(511.3), "IMPLAUSIBLE_PRESSURE", r"= 511\.3: .*multiply kPa by 1000"),
-        (reading.brake_pressure, make_pressure(1e308), "IMPLAUSIBLE_PRESSURE", r"1e\+308"),
-        (reading.brake_pressure, make_pressure(math.nan), "NOT_FINITE", r"fluid_pressure = nan"),
-        (reading.speed, make_speed(frame="base_link"), "WRONG_FRAME", r"'base_link'"),
-        (reading.speed, make_speed(300.0), "IMPLAUSIBLE_SPEED", r"speed x = 300: speed is in m/s, not km/h"),
-        (reading.speed, make_speed(math.inf), "NOT_FINITE", r"speed x = inf"),
+        (topics.POSITION, make_position(frame="map"), "WRONG_FRAME", r"header\.frame_id = 'map': set .* to 'track'"),
+        (topics.POSITION, make_position(frame=""), "WRONG_FRAME", r"header\.frame_id = ''"),
+        (topics.POSITION, make_position(math.nan), "NOT_FINITE", r"position x = nan: give a finite number"),
+        (topics.POSITION, make_position(-math.inf), "NOT_FINITE", r"position x = -inf"),
+        (topics.POSITION, make_position(1e308), "IMPLAUSIBLE_POSITION", r"position x = 1e\+308: position is in m"),
+        (topics.POSITION, make_position(variance=0.0), "BAD_VARIANCE", r"covariance\[0\] = 0: give covariance"),
+        (topics.POSITION, make_position(variance=-1.0), "BAD_VARIANCE", r"covariance\[0\] = -1"),
+        (topics.POSITION, make_position(variance=1e308), "BAD_VARIANCE", r"covariance\[0\] = 1e\+308"),
+        (topics.POSITION, make_position(variance=5e-324), "BAD_VARIANCE", r"covariance\[0\]"),
+        (topics.POSITION, make_position(variance=math.nan), "NOT_FINITE", r"covariance\[0\] = nan"),
+        (topics.BRAKE_PRESSURE, make_pressure(frame="map"), "WRONG_FRAME", r"'map'"),
+        (
+            topics.BRAKE_PRESSURE,
+            make_pressure(0.0),
+            "IMPLAUSIBLE_PRESSURE",
+            r"= 0: .* add 101325 Pa .*set ambient_pressure_pa",
+        ),
+        (topics.BRAKE_PRESSURE, make_pressure(511.3), "IMPLAUSIBLE_PRESSURE", r"= 511\.3: .*multiply kPa by 1000"),
+        (topics.BRAKE_PRESSURE, make_pressure(1e308), "IMPLAUSIBLE_PRESSURE", r"1e\+308"),
+        (topics.BRAKE_PRESSURE, make_pressure(math.nan), "NOT_FINITE", r"fluid_pressure = nan"),
+        (topics.SPEED, make_speed(frame="base_link"), "WRONG_FRAME", r"'base_link'"),
+        (topics.SPEED, make_speed(300.0), "IMPLAUSIBLE_SPEED", r"speed x = 300: speed is in m/s, not km/h"),
+        (topics.SPEED, make_speed(math.inf), "NOT_FINITE", r"speed x = inf"),
     ],
 )
 def test_bad_messages_are_refused_with_value_and_remedy(
-    read: Callable[[Any], object], message: Any, reason: str, text: str
+    topic: topics.Topic, message: Any, reason: str, text: str
 ) -> None:
     with pytest.raises(reading.Rejected, match=text) as refusal:
-        read(message)
+        topic.read(message)
     assert refusal.value.reason == reason
 
 
 def test_results_hold_hand_computed_numbers() -> None:
-    assert convert.mu_message(0.0726).data == 0.0726
-    message = convert.deceleration_message(T_NS, 0.1, 0.01)
+    assert messages.mu_message(0.0726).data == 0.0726
+    message = messages.deceleration_message(T_NS, 0.1, 0.01)
     assert message.accel.accel.linear.x == pytest.approx(-0.98)
     assert message.accel.covariance[0] == pytest.approx(0.009604)
     assert (message.header.stamp.sec, message.header.stamp.nanosec, message.header.frame_id) == (12, 34, "track")
 
 
 def test_the_state_goes_round() -> None:
-    message = convert.state_message(T_NS, 1500.0, 0.04, 70.0, 0.01)
+    message = messages.state_message(T_NS, 1500.0, 0.04, 70.0, 0.01)
     assert (message.child_frame_id, message.pose.pose.orientation.w) == ("train", 1.0)
     assert (message.pose.covariance[0], message.twist.covariance[0]) == (0.04, 0.01)
-    assert convert.state(message) == (T_NS, 1500.0, 70.0)
-    assert convert.state(as_rosbags(message, "nav_msgs/msg/Odometry")) == (T_NS, 1500.0, 70.0)
+    assert topics.STATE.read(message) == (T_NS, 1500.0, 70.0)
+    assert topics.STATE.read(as_rosbags(message, "nav_msgs/msg/Odometry")) == (T_NS, 1500.0, 70.0)
 
 
 CURVE = braking.curve(CRH3, 80.0, 0.08, target_mps=10.0)
-MESSAGE = convert.curve_message(T_NS, CURVE, 2000.0)
+MESSAGE = messages.curve_message(T_NS, CURVE, 2000.0)
 
 
 def test_a_curve_is_told_in_track_positions() -> None:
@@ -141,8 +147,8 @@ def test_a_curve_is_told_in_track_positions() -> None:
     ids=["built", "rclpy", "rosbags"],
 )
 def test_a_curve_goes_round(carry: Callable[[Any], Any]) -> None:
-    t_ns, read = convert.curve(carry(MESSAGE))
-    assert t_ns == T_NS
+    t_ns, place_m, read = topics.BRAKING_CURVE.read(carry(MESSAGE))
+    assert (t_ns, place_m) == (T_NS, 2000.0)
     np.testing.assert_allclose(read.distance_m, CURVE.distance_m, atol=1e-9)
     np.testing.assert_array_equal(read.speed_mps, CURVE.speed_mps)
     np.testing.assert_array_equal(read.deceleration_mps2, CURVE.deceleration_mps2)
@@ -151,7 +157,7 @@ def test_a_curve_goes_round(carry: Callable[[Any], Any]) -> None:
 
 def test_a_curve_without_length_goes_round() -> None:
     standing = braking.curve(CRH3, 5.0, 0.08, target_mps=10.0)
-    _, read = convert.curve(convert.curve_message(T_NS, standing, 0.0))
+    read = topics.BRAKING_CURVE.read(messages.curve_message(T_NS, standing, 0.0)).curve
     assert read.distance_m[-1] == 0.0
     assert set(read.speed_mps) == {10.0}
 
@@ -181,14 +187,14 @@ def test_a_curve_that_cannot_be_braked_along_is_refused(spoil: Callable[[Any], N
     message = deepcopy(MESSAGE)
     spoil(message)
     with pytest.raises(reading.Rejected, match=text) as refusal:
-        convert.curve(message)
+        topics.BRAKING_CURVE.read(message)
     assert refusal.value.reason == reason
 
 
 def test_a_curve_is_built_and_read_well_within_its_budget() -> None:
     def cost_s() -> float:
         start = time.perf_counter()
-        convert.curve(convert.curve_message(T_NS, CURVE, 2000.0))
+        topics.BRAKING_CURVE.read(messages.curve_message(T_NS, CURVE, 2000.0))
         return time.perf_counter() - start
 
     assert min(cost_s() for _ in range(20)) < 6e-3

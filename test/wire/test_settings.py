@@ -16,6 +16,7 @@ from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.setting import Setting
 from adhesion_node.nodes.estimator import PARAMETERS
+from adhesion_node.wire.codecs import Line
 from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
 
 FREE_TEXTS = {"track", "frame"}
@@ -43,8 +44,10 @@ def another(setting: Setting) -> Any:
 
 def in_use(setup: Setup, name: str) -> Any:
     """Return what a set-up makes of a setting."""
-    if name in ("seed", "frame", "sensor_timeout_s"):
+    if name in ("seed", "sensor_timeout_s"):
         return getattr(setup, name)
+    if name in ("frame", "ambient_pressure_pa"):
+        return getattr(setup.line, name)
     group, _, field = name.rpartition(".")
     return getattr(setup.config.train if group else setup.config, field)
 
@@ -79,7 +82,7 @@ def test_there_is_no_ros_parameter_besides() -> None:
 
 def test_nothing_named_is_the_nominal_set_up() -> None:
     setup = setup_of({})
-    assert setup == Setup(Config(), 1, "track", 0.5)
+    assert setup == Setup(Config(), 1, Line("track", 101_325.0), 0.5)
     assert setup.config.train == CRH3
     assert setup_of({setting.name: setting.default for setting in SETTINGS}) == setup
 
@@ -196,9 +199,9 @@ def test_a_text_becomes_the_settings_type(text: str, expected: tuple[str, Any]) 
         ("window=", "setting window = '': give a value of type int"),
         ("start_mu=0,12", "setting start_mu = '0,12': give a value of type float"),
         ("speed_while_braking=1", "setting speed_while_braking = '1': give a value of type bool"),
-        ("windw=40", "setting 'windw=40': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
-        ("window", "setting 'window': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
-        ("", "setting '': write NAME=VALUE with one of seed, frame, sensor_timeout_s"),
+        ("windw=40", "setting 'windw=40': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
+        ("window", "setting 'window': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
+        ("", "setting '': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
     ],
 )
 def test_a_text_that_does_not_fit_is_refused_by_name(text: str, message: str) -> None:

@@ -6,13 +6,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
-
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from typing import Any, NamedTuple
 
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.wire.results import Status
+from adhesion_node.wire.topics import DIAGNOSTICS
 
-from . import messages as convert
+from .types import new
 
 JUMP_NS = 60_000_000_000
 """A stamp further back than this belongs to another time; within it stamps must not go back."""
@@ -25,16 +25,11 @@ class Finding(NamedTuple):
     text: str
 
 
-def status_message(t_ns: int, name: str, findings: Iterable[Finding], values: Mapping[str, str]) -> DiagnosticArray:
+def status_message(t_ns: int, name: str, findings: Iterable[Finding], values: Mapping[str, str]) -> Any:
     """Build the status of `name` at `t_ns`: as bad as the worst finding, which its message begins with."""
     sorted_ = sorted(findings, key=lambda finding: -finding.severity)
-    status = DiagnosticStatus(
-        level=bytes([sorted_[0].severity]),
-        name=name,
-        message="; ".join(finding.text for finding in sorted_),
-        values=[KeyValue(key=key, value=value) for key, value in values.items()],
-    )
-    return DiagnosticArray(header=convert.header(t_ns), status=[status])
+    text = "; ".join(finding.text for finding in sorted_)
+    return DIAGNOSTICS.build(new, t_ns, Status(name, sorted_[0].severity, text, values))
 
 
 def next_stamp(t_ns: int, before_ns: int) -> int:

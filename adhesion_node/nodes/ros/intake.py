@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Protocol
 
 from rclpy.clock import ROSClock
@@ -15,15 +15,12 @@ from rclpy.node import Node
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import NS, Reason, Rejected
+from adhesion_node.wire.codecs import NS, Line, Reason, Rejected
 from adhesion_node.wire.topics import Topic
 
 from . import qos
 from .diagnostics import Finding
 from .silence import Silence
-
-Read = Callable[[Any, str], Any]
-"""Reads a message that must be in a frame; raises Rejected."""
 
 
 class Listener(Protocol):
@@ -43,26 +40,24 @@ class Listener(Protocol):
 
 
 class Intake:
-    """Subscribes the sensors in `readers`; the last one of them must not fall silent for longer than `timeout_s`.
+    """Subscribes `inputs`; the last one of them must not fall silent for longer than `timeout_s`.
 
     `heard` counts the messages by topic, refused ones included. While `enabled` is False all are refused.
     """
 
-    def __init__(
-        self, node: Node, listener: Listener, readers: Mapping[Topic, Read], frame: str, timeout_s: float
-    ) -> None:
+    def __init__(self, node: Node, listener: Listener, inputs: Sequence[Topic], line: Line, timeout_s: float) -> None:
         self.heard: Counter[Topic] = Counter()
         self.enabled = True
-        self._node, self._listener, self._frame = node, listener, frame
+        self._node, self._listener, self._line = node, listener, line
         self._newest_ns = 0
         self._counts: Counter[str] = Counter()
         self._refusals: dict[str, str] = {}
         self._events: dict[str, str] = {}
-        self._watched = list(readers)[-1]
+        self._watched = inputs[-1]
         self._watched_name = node.resolve_topic_name(self._watched.name)
         self._silence = Silence(node, timeout_s, self._on_silence)
-        for topic, read in readers.items():
-            qos.subscribe(node, topic, self._receiver(topic, read), qos.SENSOR_SUBSCRIPTION, tell=self.tell)
+        for topic in inputs:
+            qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
         node.get_logger().info(f"ready: waiting for {self._watched_name}")
 
     @property
@@ -118,14 +113,14 @@ class Intake:
         simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
         return self._node.count_publishers(topics.CLOCK.name) if simulated else 0
 
-    def _receiver(self, topic: Topic, read: Read) -> Callable[[Any], None]:
+    def _receiver(self, topic: Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             self.heard[topic] += 1
             if topic == self._watched:
                 self._silence.heard()
                 self._events.pop(self._watched_name, None)
             try:
-                sample = self._sample(read, message)
+                sample = self._sample(topic, message)
             except Rejected as refusal:
                 self._listener.refuse(topic, refusal)
                 self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
@@ -137,7 +132,7 @@ class Intake:
 
         return receive
 
-    def _sample(self, read: Read, message: Any) -> Any:
+    def _sample(self, topic: Topic, message: Any) -> Any:
         if not self.enabled:
             raise Rejected(Reason.DISABLED, "disabled")
-        return read(message, self._frame)
+        return topic.read(message, self._line)

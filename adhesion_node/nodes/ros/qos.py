@@ -1,14 +1,13 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Quality of service of the topics, and the two functions that open a topic by its entry in `topics`."""
+"""The profiles for the table's words on quality of service, and the two functions that open a topic by its entry."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy
-from importlib import import_module
-from typing import Any
+from typing import NamedTuple
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
@@ -19,9 +18,10 @@ from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPo
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 from rclpy.subscription import Subscription
 
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.topics import Quality, Topic
 
 from .qos_events import Tell, of_publisher, of_subscription
+from .types import message_class
 
 MAX_DEPTH = 10_000
 """Longest queue that an override may ask for: minutes of a 100 Hz sensor."""
@@ -42,6 +42,20 @@ EXPIRING = QoSProfile(
     lifespan=Duration(seconds=5.0),
 )
 """The same, but no longer than this: who comes later than that must not get an old braking curve."""
+
+
+class Ends(NamedTuple):
+    """The profiles of the two ends of a topic."""
+
+    publisher: QoSProfile
+    subscription: QoSProfile
+
+
+PROFILES = {
+    Quality.SENSOR: Ends(SENSOR_PUBLISHER, SENSOR_SUBSCRIPTION),
+    Quality.RESULT: Ends(RESULT, RESULT),
+    Quality.EXPIRING: Ends(EXPIRING, LATCHED),
+}
 
 
 def _check(profile: QoSProfile) -> SetParametersResult:
@@ -69,21 +83,24 @@ def subscribe(
     node: Node,
     topic: Topic,
     callback: Callable[..., None],
-    profile: QoSProfile,
+    profile: QoSProfile | None = None,
     *,
     raw: bool = False,
     tell: Tell | None = None,
 ) -> Subscription:
-    """Subscribe `node` to `topic`, parameters overriding `profile`; ValueError when an override is bad.
+    """Subscribe `node` to `topic`, parameters overriding its profile; ValueError when an override is bad.
 
-    `tell` hears of the events of DDS; without it rclpy logs what does not fit.
+    `profile` takes the place of the one that the table gives the topic. `tell` hears of the events of DDS; without it
+    rclpy logs what does not fit.
     """
     try:
         return node.create_subscription(
-            message_class(topic),
+            message_class(topic.type),
             topic.name,
             callback,
-            copy(profile),  # rclpy writes the overrides of this topic into the profile it is given
+            copy(
+                profile or PROFILES[topic.quality].subscription
+            ),  # rclpy writes the overrides of this topic into the profile it is given
             qos_overriding_options=OVERRIDES,
             raw=raw,
             event_callbacks=tell and of_subscription(node.resolve_topic_name(topic.name), tell),
@@ -92,25 +109,18 @@ def subscribe(
         raise ValueError(_refusal(node, topic, "subscription")) from error
 
 
-def advertise(node: Node, topic: Topic, profile: QoSProfile, *, tell: Tell | None = None) -> Publisher:
+def advertise(node: Node, topic: Topic, profile: QoSProfile | None = None, *, tell: Tell | None = None) -> Publisher:
     """Open `topic` for publishing from `node`, as `subscribe` does."""
     try:
         return node.create_publisher(
-            message_class(topic),
+            message_class(topic.type),
             topic.name,
-            copy(profile),
+            copy(profile or PROFILES[topic.quality].publisher),
             qos_overriding_options=OVERRIDES,
             event_callbacks=tell and of_publisher(node.resolve_topic_name(topic.name), tell),
         )
     except _BAD_OVERRIDE as error:
         raise ValueError(_refusal(node, topic, "publisher")) from error
-
-
-def message_class(topic: Topic) -> type[Any]:
-    """Return the Python class of a topic's messages."""
-    package, _, name = topic.type.split("/")
-    found: type[Any] = getattr(import_module(f"{package}.msg"), name)
-    return found
 
 
 _BAD_OVERRIDE = (AssertionError, AttributeError, TypeError, RuntimeError, InvalidQosOverridesError, ParameterException)

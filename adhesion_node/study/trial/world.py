@@ -22,10 +22,7 @@ from ...core import Config, Measurement, Sample
 from ...core.estimator import paired
 from ...core.physics.track import Track
 from ...core.physics.train import Array
-from ...run.offline import READERS
-from ...wire.codecs import Rejected
-from ...wire.topics import FRAME
-from ..robust.plain import plain
+from ...wire.codecs import Rejected, plain
 
 PERIOD_S = 0.1
 """Of every published figure."""
@@ -131,6 +128,7 @@ def simulate(world: World, seed: int) -> SimulatedRun:
 
 def _received(message: SensorMessage) -> Sample | Refusal:
     try:
-        return READERS[message.topic.name](plain(message), FRAME)
+        sample: Sample = message.topic.read(message.build(plain))
+        return sample
     except Rejected as refusal:
         return Refusal(message.topic.name, refusal.reason)

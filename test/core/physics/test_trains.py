@@ -14,6 +14,7 @@ from typing import Any
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticArray
 from faulty import READERS, S
+from messages import message_of
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -27,7 +28,6 @@ from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import setup_of
 from sim_node.faults.plan import Plan, faulty_run
-from sim_node.nodes.messages import message_of
 from sim_node.train.messages import SensorMessage
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings

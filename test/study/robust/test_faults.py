@@ -11,19 +11,18 @@ from typing import Any
 
 import numpy as np
 import pytest
+from messages import message_of
 
-from adhesion_node.run.offline import READERS
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.robust import faults
 from adhesion_node.study.robust.cases import FAULTS as CASES
 from adhesion_node.study.robust.cases import Case
 from adhesion_node.study.robust.faults import row
-from adhesion_node.study.robust.plain import plain
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results
 from adhesion_node.study.trial.world import World
-from adhesion_node.wire import codecs as reading
+from adhesion_node.wire.codecs import Rejected, plain
+from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import FAULTS, Plan
-from sim_node.nodes.messages import message_of
 from sim_node.train.messages import SensorMessage
 from sim_node.train.sensors import SensorSettings
 
@@ -34,8 +33,8 @@ STEP = Case("a fault from 10 to 12 s", World("tunnel_entry", plan=Plan("dropout"
 def read(sent: SensorMessage, message: Any) -> Any:
     """Return what the estimator takes of a message: the sample, or why it is refused."""
     try:
-        return READERS[sent.topic.name](message, "track")
-    except reading.Rejected as refusal:
+        return sent.topic.read(message)
+    except Rejected as refusal:
         return str(refusal)
 
 
@@ -43,8 +42,8 @@ def read(sent: SensorMessage, message: Any) -> Any:
 def test_plain_messages_are_read_as_those_of_ros(fault: str) -> None:
     world = World("cruise", ALL_SENSORS, Plan(fault, 1.0))
     sent = [message for _, messages in world.of_plant.ticks(world, 1) for message in messages][:400]
-    assert {message.topic.name for message in sent} == set(READERS)
-    assert [read(m, plain(m)) for m in sent] == [read(m, message_of(m)) for m in sent]
+    assert {message.topic for message in sent} == set(ADHESION_INPUTS)
+    assert [read(m, m.build(plain)) for m in sent] == [read(m, message_of(m)) for m in sent]
 
 
 def test_every_fault_of_the_simulator_stands_in_the_table() -> None:

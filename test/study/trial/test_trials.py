@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from adhesion_node.core import Config
-from adhesion_node.run.offline import READERS
 from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning
 from adhesion_node.study.trial.estimators import WAYS, Estimator
 from adhesion_node.study.trial.running import Arrays, Running, file_name, load, save
 from adhesion_node.study.trial.trials import ROW, Trials, grouped
 from adhesion_node.study.trial.world import Refusal, World, simulate
+from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import Plan
 from sim_node.train.sensors import SensorSettings
 
@@ -146,7 +146,7 @@ def test_a_run_holds_what_is_received_and_refused_at_its_time() -> None:
     run = simulate(World("cruise", plan=Plan("nan", 2.0, fault_share=1.0)), 1)
     refused = [(t_s, item) for t_s, received in run.sent for item in received if isinstance(item, Refusal)]
     assert {item.reason for _, item in refused} == {"NOT_FINITE"}
-    assert {item.topic for _, item in refused} <= set(READERS)
+    assert {item.topic for _, item in refused} <= {topic.name for topic in ADHESION_INPUTS}
     assert refused[0][0] == 2.0
     assert len(refused) == 2 * 581  # pressure and position, 2 to 60 s
     assert len(run.measurements) == 601

@@ -1,0 +1,102 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The codec of the braking curves."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..core.intake.samples import MAX_POSITION_M
+from ..core.physics.braking import BrakingCurve
+from ..core.physics.train import Array
+from .codecs import NS, TRAIN, Codec, Fields, Line, New, Reason, Rejected, header, stamp_ns
+
+if TYPE_CHECKING:  # see results.py
+    from ..core.prediction import Prediction
+
+
+class PlacedCurve(NamedTuple):
+    """A braking curve, the time it was made for, and the place, m, at which it begins."""
+
+    t_ns: int
+    position_m: float
+    curve: BrakingCurve
+
+
+def read_curve(message: Any, _line: Line) -> PlacedCurve:
+    """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected."""
+    points = message.points
+    if list(message.joint_names) != [TRAIN] or len(points) < 2:
+        raise Rejected(Reason.BAD_CURVE, f"braking curve joints = {list(message.joint_names)}, points = {len(points)}")
+    if any(not len(p.positions) == len(p.velocities) == len(p.accelerations) == 1 for p in points):
+        raise Rejected(Reason.BAD_CURVE, "braking curve: a point without exactly one value of each kind")
+    rows = np.array([_row(point) for point in points])
+    usable = (np.abs(rows) <= 10 * MAX_POSITION_M).all(axis=1)  # False for NaN
+    if not usable.all():
+        index = int(np.argmin(usable))
+        raise Rejected(Reason.NOT_FINITE, f"braking curve point {index} = {rows[index].tolist()}")
+    place, velocity, acceleration, time = np.ascontiguousarray(rows.T)
+    curve = BrakingCurve(place - place[0], velocity, -acceleration, time)
+    _check_course(curve)
+    return PlacedCurve(stamp_ns(message.header), float(place[0]), curve)
+
+
+def write_curve(new: New, t_ns: int, position_m: float, curve: BrakingCurve) -> Fields:
+    """Write a braking curve that begins at a place: where the train will be, how fast, when."""
+    columns = (
+        (position_m + curve.distance_m).tolist(),
+        curve.speed_mps.tolist(),
+        (-curve.deceleration_mps2).tolist(),
+        *(part.tolist() for part in np.divmod(np.rint(curve.time_s * NS).astype(np.int64), NS)),
+    )
+    points = [
+        new(
+            "trajectory_msgs/msg/JointTrajectoryPoint",
+            positions=(place,),
+            velocities=(velocity,),
+            accelerations=(acceleration,),
+            effort=(),
+            time_from_start=new("builtin_interfaces/msg/Duration", sec=seconds, nanosec=rest),
+        )
+        for place, velocity, acceleration, seconds, rest in zip(*columns, strict=True)
+    ]
+    return {"header": header(new, t_ns), "joint_names": [TRAIN], "points": points}
+
+
+def write_safe_curve(new: New, prediction: Prediction) -> Fields | None:
+    """Write the curve on mu_lower; None where there is none."""
+    return _written(new, prediction, prediction.safe)
+
+
+def write_nominal_curve(new: New, prediction: Prediction) -> Fields | None:
+    """Write the curve on mu; None where there is none."""
+    return _written(new, prediction, prediction.nominal)
+
+
+def _written(new: New, prediction: Prediction, curve: BrakingCurve | None) -> Fields | None:
+    estimate = prediction.estimate
+    return None if curve is None else write_curve(new, estimate.t_ns, estimate.position_m, curve)
+
+
+def _row(point: Any) -> tuple[float, float, float, float]:
+    after = point.time_from_start
+    return point.positions[0], point.velocities[0], point.accelerations[0], after.sec + after.nanosec / NS
+
+
+def _check_course(curve: BrakingCurve) -> None:
+    courses: tuple[tuple[str, Array], ...] = (
+        ("position", np.diff(curve.distance_m)),
+        ("time", np.diff(curve.time_s)),
+        ("speed", -np.diff(curve.speed_mps)),
+    )
+    for what, steps in courses:
+        if steps.min() < 0:
+            raise Rejected(Reason.BAD_CURVE, f"braking curve: {what} turns at point {int(np.argmin(steps)) + 1}")
+    if curve.speed_mps[-1] < 0 or curve.deceleration_mps2.min() <= 0:
+        raise Rejected(Reason.BAD_CURVE, "braking curve: a negative speed or no deceleration")
+
+
+SAFE, NOMINAL = Codec(read_curve, write_safe_curve), Codec(read_curve, write_nominal_curve)

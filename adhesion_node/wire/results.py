@@ -1,0 +1,177 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The codecs of what the nodes find out, of the simulator's truth and of the clock; `curves` has the braking curves.
+
+A writer returns None where there is nothing to publish.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from ..core.atp.supervision import TrainState
+from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
+from ..core.physics.train import GRAVITY
+from .codecs import (
+    TRAIN,
+    Codec,
+    Fields,
+    Line,
+    New,
+    Reason,
+    covariance,
+    finite,
+    header,
+    moment,
+    nanoseconds,
+    plausible,
+    pose,
+    stamp_ns,
+    twist,
+    vector,
+)
+
+if TYPE_CHECKING:  # the simulator uses these codecs, too, and must not know the estimators
+    from ..core.creep.estimator import CreepEstimate
+    from ..core.prediction import Prediction
+
+
+class Deceleration(NamedTuple):
+    """An acceleration along the track, below 0 for a braking train, m/s^2, and its variance."""
+
+    t_ns: int
+    acceleration_mps2: float
+    variance: float
+
+
+class Status(NamedTuple):
+    """One entry of a diagnostics message; `level` as in DiagnosticStatus, 0 is OK."""
+
+    name: str
+    level: int
+    message: str
+    values: Mapping[str, str]
+
+
+class Statuses(NamedTuple):
+    """A diagnostics message."""
+
+    t_ns: int
+    entries: tuple[Status, ...]
+
+
+def read_number(message: Any, _line: Line) -> float:
+    """Read a Float64; raises Rejected."""
+    return finite("data", message.data)
+
+
+def write_number(_new: New, value: float) -> Fields:
+    """Write a Float64."""
+    return {"data": value}
+
+
+def write_mu(_new: New, prediction: Prediction) -> Fields | None:
+    """Write mu; None while nothing is known of it."""
+    return None if prediction.estimate.withheld else {"data": prediction.estimate.mu}
+
+
+def write_mu_lower(_new: New, prediction: Prediction) -> Fields | None:
+    """Write the lower bound of mu; None while nothing is known of it."""
+    return None if prediction.estimate.withheld else {"data": prediction.estimate.mu_lower}
+
+
+def write_creep_mu_max(_new: New, estimate: CreepEstimate) -> Fields | None:
+    """Write the peak of the adhesion over the creep; None while the data cannot tell it."""
+    return {"data": estimate.mu_max} if estimate.known else None
+
+
+def write_creep_lambda_m(_new: New, estimate: CreepEstimate) -> Fields | None:
+    """Write the creep at the peak; None while the data cannot tell it."""
+    return {"data": estimate.lambda_m} if estimate.known else None
+
+
+def read_deceleration(message: Any, _line: Line) -> Deceleration:
+    """Read an acceleration along the track from an AccelWithCovarianceStamped; raises Rejected."""
+    accel = message.accel
+    along, variance = finite("accel x", accel.accel.linear.x), finite("accel covariance[0]", accel.covariance[0])
+    return Deceleration(stamp_ns(message.header), along, variance)
+
+
+def write_deceleration(new: New, prediction: Prediction) -> Fields | None:
+    """Write the largest deceleration, -mu g along x, and its variance (g mu_std)^2."""
+    if prediction.estimate.withheld:
+        return None
+    estimate = prediction.estimate
+    along = new("geometry_msgs/msg/Accel", linear=vector(new, -estimate.mu * GRAVITY), angular=vector(new, 0.0))
+    spread = covariance((GRAVITY * estimate.mu_std) ** 2)
+    accel = new("geometry_msgs/msg/AccelWithCovariance", accel=along, covariance=spread)
+    return {"header": header(new, estimate.t_ns), "accel": accel}
+
+
+def read_state(message: Any, _line: Line) -> TrainState:
+    """Read the train's state, m and m/s, from an Odometry; raises Rejected."""
+    return TrainState(
+        stamp_ns(message.header),
+        plausible("position x", message.pose.pose.position.x, MAX_POSITION_M, Reason.IMPLAUSIBLE_POSITION),
+        plausible("speed x", message.twist.twist.linear.x, MAX_SPEED_MPS, Reason.IMPLAUSIBLE_SPEED),
+    )
+
+
+def write_state(
+    new: New, t_ns: int, position_m: float, speed_mps: float, position_var: float = 0.0, speed_var: float = 0.0
+) -> Fields:
+    """Write position and speed along the track with their variances, m^2 and (m/s)^2; 0 is exact."""
+    return {
+        "header": header(new, t_ns),
+        "child_frame_id": TRAIN,
+        "pose": pose(new, position_m, position_var),
+        "twist": twist(new, speed_mps, speed_var),
+    }
+
+
+def write_estimated_state(new: New, prediction: Prediction) -> Fields:
+    """Write the state that an estimate found."""
+    e = prediction.estimate
+    return write_state(new, e.t_ns, e.position_m, e.speed_mps, e.position_std_m**2, e.speed_std_mps**2)
+
+
+def read_statuses(message: Any, _line: Line) -> Statuses:
+    """Read all entries of a DiagnosticArray."""
+    entries = (
+        Status(
+            entry.name,
+            entry.level[0] if isinstance(entry.level, bytes) else int(entry.level),
+            entry.message,
+            {pair.key: pair.value for pair in entry.values},
+        )
+        for entry in message.status
+    )
+    return Statuses(stamp_ns(message.header), tuple(entries))
+
+
+def write_status(new: New, t_ns: int, status: Status) -> Fields:
+    """Write a DiagnosticArray of one entry."""
+    values = [new("diagnostic_msgs/msg/KeyValue", key=key, value=value) for key, value in status.values.items()]
+    fields = {**status._asdict(), "level": bytes([status.level]), "hardware_id": "", "values": values}
+    return {"header": header(new, t_ns), "status": [new("diagnostic_msgs/msg/DiagnosticStatus", **fields)]}
+
+
+def read_clock(message: Any, _line: Line) -> int:
+    """Read the time, ns, from a Clock."""
+    return nanoseconds(message.clock)
+
+
+def write_clock(new: New, t_ns: int) -> Fields:
+    """Write a Clock."""
+    return {"clock": moment(new, t_ns)}
+
+
+NUMBER = Codec(read_number, write_number)
+MU, MU_LOWER = Codec(read_number, write_mu), Codec(read_number, write_mu_lower)
+CREEP_MU_MAX, CREEP_LAMBDA_M = Codec(read_number, write_creep_mu_max), Codec(read_number, write_creep_lambda_m)
+DECELERATION = Codec(read_deceleration, write_deceleration)
+STATE, ESTIMATED_STATE = Codec(read_state, write_state), Codec(read_state, write_estimated_state)
+STATUS = Codec(read_statuses, write_status)
+CLOCK = Codec(read_clock, write_clock)

@@ -1,0 +1,17 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Messages of sensors as recordings hold them, for tests, from plain numbers."""
+
+from __future__ import annotations
+
+from adhesion_node.bag import encode
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
+
+
+def position(t_ns: int, position_m: float, variance_m2: float) -> bytes:
+    return encode(POSITION, t_ns, (position_m,), variance_m2)
+
+
+def brake_pressure(t_ns: int, absolute_pa: float) -> bytes:
+    return encode(BRAKE_PRESSURE, t_ns, (absolute_pa,))
