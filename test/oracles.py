@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Independent oracles for the core: numpy only, textbook form, with model matrices of their own.
+"""Independent oracles for the core: numpy and scipy only, textbook form, with model matrices of their own.
 
 The oracle's train has a resistance that is affine in speed, so that its motion is exactly linear and the Kalman
 filter and the Rauch-Tung-Striebel smoother are the exact answers.
@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from adhesion_node.core import Config, Estimate, State, finish, init, step
 from adhesion_node.core.belief.gaussian import Gaussian
@@ -124,26 +125,26 @@ def dense_information(model: Linear, prior: Gaussian, window: Window, mu: float)
     return float(h @ np.linalg.solve(c, h))
 
 
-class ExactSmoother(NamedTuple):
+class ExactEStep(NamedTuple):
     """The E-step of the oracle's train without any sampling: I2 is quadratic, so smoothed means are enough."""
 
     model: Linear
+    prior: Gaussian
+    window: Window
 
-    def __call__(
-        self, motion: Motion, prior: Gaussian, window: Window, mu: float, rng: np.random.Generator
-    ) -> Expectation:
-        """Statistics of Q from the exact smoother."""
-        del motion, rng
-        exact = rts(self.model, prior, window, mu)
+    def __call__(self, mu: Array) -> Expectation:
+        """Statistics of Q from the exact smoother of this one window."""
+        exact = rts(self.model, self.prior, self.window, float(mu[0]))
         used, weight = [], []
-        for k in range(window.steps):
-            dt = float(window.dt_s[k])
+        for k in range(self.window.steps):
+            dt = float(self.window.dt_s[k])
             per_mu = self.model.push(dt, 1.0) - self.model.push(dt, 0.0)
             moved = exact.mean[k + 1] - self.model.matrix(dt) @ exact.mean[k] - self.model.push(dt, 0.0)
             precision = np.linalg.inv(self.model.noise(dt))
             weight.append(per_mu @ precision @ per_mu)
             used.append(per_mu @ precision @ moved / weight[-1])
-        return Expectation(np.array(used), np.array(weight), window.brake, exact.log_likelihood, math.inf)
+        likelihood, ess = np.array([exact.log_likelihood]), np.array([math.inf])
+        return Expectation(np.array([used]), np.array([weight]), self.window.brake[None], likelihood, ess)
 
 
 def make_window(
@@ -182,6 +183,22 @@ def literal_pairwise(filter_weights: Array, densities: Array, last: Array) -> tu
         pairs.insert(0, pair)
         marginals.insert(0, np.array([sum(pair[i]) for i in range(count)]))
     return pairs, marginals
+
+
+def log_densities(states: Array, motion: Motion, window: Window, mu: float, per_mille: float = 0.0) -> Array:
+    """ln p(x^j_t+1 | x^i_t) of states (2, K + 1, N), shape (K, N, N), spelled out for the CRH3 on a grade."""
+    steps, count = window.steps, states.shape[2]
+    log_density = np.empty((steps, count, count))
+    for t in range(steps):
+        dt = float(window.dt_s[t])
+        s, v = states[:, t]
+        slower = v - dt * G * (min(mu, float(window.brake[t])) + specific_resistance(v) + per_mille / 1000.0)
+        moved = s + dt * (v + slower) / 2
+        std_s, std_v = math.sqrt(motion.position_noise_rate * dt), math.sqrt(motion.speed_noise_rate * dt)
+        for i in range(count):
+            by_s = stats.norm(moved[i], std_s).logpdf(states[0, t + 1])
+            log_density[t, i] = by_s + stats.norm(slower[i], std_v).logpdf(states[1, t + 1])
+    return log_density
 
 
 def specific_resistance(speed_mps: Array) -> Array:

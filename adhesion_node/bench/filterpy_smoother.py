@@ -12,11 +12,9 @@ from filterpy.kalman import KalmanFilter
 
 from ..core.belief.gaussian import Gaussian
 from ..core.belief.window import Window
-from ..core.methods.particle_em.em import expectation, maximise
-from ..core.methods.particle_em.particles import Particles, Smoothed
 from ..core.physics.motion import Motion
 from ..core.physics.train import Array
-from .scene import Update
+from .scene import Scene, Update, maximised
 
 SPEED_STEP_MPS = 1e-3
 
@@ -50,22 +48,16 @@ def rts_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> La
     return Laws(path + mean[:, :, 0], covariance)
 
 
-def em(motion: Motion, prior: Gaussian, window: Window, start: float, iterations: int, tolerance: float) -> Update:
+def em(scene: Scene, start: float, iterations: int, tolerance: float) -> Update:
     """EM with `rts_window` as its E-step; stops when mu moves no more than the tolerance."""
+    windows = scene.windows
     mu, moved, done, laws = start, np.inf, 0, Laws(np.empty(0), np.empty(0))
     while done < iterations and moved > tolerance:
-        laws = rts_window(motion, prior, window, mu)
-        mu, before = _maximised(motion, window, laws), mu
+        laws = rts_window(*scene, mu)
+        # Of laws this narrow the means are enough: one particle.
+        mu, before = maximised(scene.motion, windows, laws.mean.T[:, :, None], np.ones((len(laws.mean), 1)), mu), mu
         moved, done = abs(mu - before), done + 1
     return Update(mu, laws.mean[:, 1], done)
-
-
-def _maximised(motion: Motion, window: Window, laws: Laws) -> float:
-    """M-step; of laws this narrow the means are enough: one particle."""
-    position, speed = laws.mean.T[:, :, None]
-    weights, nothing = np.ones_like(position), np.empty((0, 0, 0))
-    particles = Particles(position, speed, 0.0 * weights, 0.0, 1.0)
-    return maximise(expectation(motion, particles, Smoothed(weights, nothing, nothing), window), 0.0)
 
 
 def _noise_free(motion: Motion, window: Window, start: Array, mu: float) -> Array:

@@ -44,7 +44,7 @@ def compare(steps: int, rounds: int, seed: int) -> list[dict[str, Any]]:
     from . import filterpy_smoother
 
     scene = braking_window(steps, np.random.default_rng(seed))
-    em = partial(filterpy_smoother.em, *scene, START_MU)
+    em = partial(filterpy_smoother.em, scene, START_MU)
     timed = interleave(
         [
             Contender(OURS, partial(_ours, scene), rounds),

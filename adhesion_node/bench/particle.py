@@ -3,8 +3,9 @@
 
 """Particle E and M step of one window: ours, with exact pairwise smoothing, beside the package `particles`.
 
-All use the same model, window, number of particles and M-step. The peers draw trajectories where ours has weights;
-that all of them smooth to the same speeds, within their Monte-Carlo error, is part of the table.
+All use the same model, window, number of particles and M-step; ours is prepared once, as EM does for all its steps.
+The peers draw trajectories where ours has weights; that all of them smooth to the same speeds, within their
+Monte-Carlo error, is part of the table.
 """
 
 from __future__ import annotations
@@ -16,10 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.methods.particle_em.em import expectation, maximise
-from ..core.methods.particle_em.particles import Particles, Smoothed, particle_filter, particle_smoother
+from ..core.methods.particle_em.em import ParticleEStep, maximise
 from ..core.physics.train import Array
-from .scene import MU, Scene, braking_window
+from .scene import MU, Scene, braking_window, maximised
 from .timing import Contender, Timed, figures, interleave
 
 OURS, MCMC, EXACT = "ours, exact", "particles, MCMC O(N)", "particles, exact O(N^2)"
@@ -43,7 +43,7 @@ def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, An
     rng = np.random.default_rng(seed)
     scene = braking_window(steps, rng)
     contenders = (
-        Contender(OURS, partial(_ours, scene, count, rng), rounds),
+        Contender(OURS, partial(_ours, ParticleEStep(scene.motion, count, scene.windows, [rng])), rounds),
         Contender(MCMC, partial(_sampled, scene, count, particles_smoother.mcmc), rounds),
         Contender(EXACT, partial(_sampled, scene, count, particles_smoother.exact), math.ceil(rounds / SLOW)),
     )
@@ -51,22 +51,18 @@ def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, An
     return [{"method": name, **_row(timed[name], timed[OURS])} for name in timed]
 
 
-def _ours(scene: Scene, count: int, rng: np.random.Generator) -> Result:
-    particles = particle_filter(*scene, MU, count, rng)
-    smoothed = particle_smoother(scene.motion, particles, scene.window, MU)
-    return _maximised(scene, particles, smoothed.marginal)
+def _ours(e_step: ParticleEStep) -> Result:
+    expected = e_step(np.array([MU]))
+    speed = np.einsum("krn,krn->k", e_step.smoother.marginal, e_step.filter.states[1])
+    return Result(float(maximise(expected, np.zeros(1))[0]), speed)
 
 
 def _sampled(scene: Scene, count: int, smoother: Callable[[Scene, float, int], Array]) -> Result:
-    position, speed = np.moveaxis(smoother(scene, MU, count), 2, 0)
-    flat = np.zeros_like(position)
-    return _maximised(scene, Particles(position, speed, flat, 0.0, 0.0), np.full_like(flat, 1.0 / count))
-
-
-def _maximised(scene: Scene, particles: Particles, marginal: Array) -> Result:
-    nothing = np.empty((0, 0, 0))
-    expected = expectation(scene.motion, particles, Smoothed(marginal, nothing, nothing), scene.window)
-    return Result(maximise(expected, 0.0), np.einsum("kn,kn->k", marginal, particles.speed_mps))
+    states = np.moveaxis(smoother(scene, MU, count), 2, 0)
+    return Result(
+        maximised(scene.motion, scene.windows, states, np.full(states.shape[1:], 1.0 / count), MU),
+        states[1].mean(axis=1),
+    )
 
 
 def _row(timed: Timed[Result], ours: Timed[Result]) -> dict[str, Any]:

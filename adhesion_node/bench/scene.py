@@ -18,6 +18,9 @@ from ..core.belief.gaussian import Gaussian
 from ..core.belief.window import Window
 from ..core.config import Config
 from ..core.intake.samples import PositionSample, PressureSample
+from ..core.methods.particle_em.em import expectation, maximise
+from ..core.methods.particle_em.particles import Particles
+from ..core.methods.particle_em.windows import Windows, stack
 from ..core.physics.adhesion import WET
 from ..core.physics.motion import Motion
 from ..core.physics.train import GRAVITY, KMH, Array, Train
@@ -40,6 +43,11 @@ class Scene(NamedTuple):
     prior: Gaussian
     window: Window
 
+    @property
+    def windows(self) -> Windows:
+        """The window, side by side with no other."""
+        return stack([self.prior], [self.window])
+
 
 class Update(NamedTuple):
     """What the Gaussian update of a window finds."""
@@ -50,6 +58,15 @@ class Update(NamedTuple):
     iterations: int
 
 
+def maximised(motion: Motion, windows: Windows, states: Array, marginal: Array, mu: float) -> float:
+    """M-step with what a peer smoothed at `mu`: particles, (2, K + 1, N), and their weights, (K + 1, N)."""
+    places, unknown = states[:, :, None, :], np.zeros(1)
+    stepped = np.stack(motion.advance(places[0, :-1], places[1, :-1], windows.dt_s, windows.brake, mu))
+    particles = Particles(places, stepped, np.zeros(places.shape[1:]), unknown, unknown)
+    expected = expectation(motion, windows, np.array([mu]), particles, marginal[:, None, :])
+    return float(maximise(expected, np.zeros(1))[0])
+
+
 def braking_window(steps: int, rng: np.random.Generator) -> Scene:
     """So many steps of 0.1 s at the nominal noise, behind a prior as earlier windows leave it."""
     motion = Config().motion
@@ -57,7 +74,8 @@ def braking_window(steps: int, rng: np.random.Generator) -> Scene:
     dt, brake = 0.1 * full, motion.train.specific_brake(motion.train.full_pressure_pa) * full
     prior = Gaussian(np.array([0.0, FASTEST_MPS]), np.array([[0.015, 0.002], [0.002, 0.0017]]))
     noise = np.sqrt(np.stack(motion.noise(dt))) * rng.standard_normal((2, steps))
-    state, positions = prior.draw(1, rng)[0], np.empty(steps)
+    state = prior.mean + np.linalg.cholesky(prior.covariance) @ rng.standard_normal(2)
+    positions = np.empty(steps)
     for k in range(steps):
         state = np.stack(motion.advance(state[0], state[1], dt[k], brake[k], MU)) + noise[:, k]
         positions[k] = state[0]

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -25,9 +25,9 @@ from oracles import ride
 from adhesion_node.core import Config, Measurement, Outcome
 from adhesion_node.core.intake import stream
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample
-from adhesion_node.core.methods.particle_em.em import Search
-from adhesion_node.core.methods.particle_em.method import Evaluation, ParticleEm, ParticleWindow, evaluate
-from adhesion_node.core.methods.protocol import MethodWindow
+from adhesion_node.core.methods.particle_em import method as particle_em
+from adhesion_node.core.methods.particle_em.method import ParticleWindow, evaluate
+from adhesion_node.core.methods.protocol import Context, MethodWindow, Verdict
 from adhesion_node.core.methods.rail_condition.method import SHORT_S
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
@@ -269,13 +269,13 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
     """No more windows than the accepted measurements allow, no more in memory than the inbox may hold."""
     evaluations = Counter[str]()
 
-    def counted(config: Config, window: ParticleWindow, search: Search, rng: np.random.Generator) -> Evaluation:
+    def counted(config: Config, windows: Sequence[ParticleWindow], contexts: Sequence[Context]) -> list[Verdict]:
         evaluations["done"] += 1
-        return evaluate(config, window, search, rng)
+        return evaluate(config, windows, contexts)
 
+    monkeypatch.setattr(particle_em, "evaluate", counted)
     monkeypatch.setattr(stream, "MOST", 500)
     pipeline = Pipeline(Config(method="particle_em", iterations=1, particles=2, window=30, step=20), 1)
-    pipeline.state = pipeline.state._replace(method=ParticleEm(counted))
     rng = np.random.default_rng(1)
     sizes = []
     for number in range(6_000):

@@ -29,10 +29,6 @@ class Sample(NamedTuple):
     """Speed of the wheels' rims; NaN where none was measured."""
 
 
-Observation = tuple[int, float, float]
-"""Index of the observed state (0 position, 1 speed), value and variance."""
-
-
 @dataclass(frozen=True)
 class Window:
     """K steps and the measurement at the end of each; every array has shape (K,)."""
@@ -64,27 +60,6 @@ class Window:
     def information(self) -> Array:
         """Their inverse variances, shape (K, 2); 0 where no speed was measured."""
         return 1.0 / np.stack((self.variance_m2, self.speed_variance), axis=1)
-
-    @cached_property
-    def observations(self) -> list[list[Observation]]:
-        """What was measured at the end of each step: the position, and the speed where there is one."""
-        observed = [
-            [(0, s, r), (1, v, q)]
-            for s, r, v, q in zip(
-                *(
-                    column.tolist()
-                    for column in (self.position_m, self.variance_m2, self.speed_mps, self.speed_variance)
-                ),
-                strict=True,
-            )
-        ]
-        return [[item for item in items if math.isfinite(item[2])] for items in observed]
-
-    @cached_property
-    def log_constant(self) -> float:
-        """The part of ln p(y|x), summed over the window, that does not depend on x."""
-        variances = [variance for observed in self.observations for _, _, variance in observed]
-        return -0.5 * sum(math.log(2.0 * math.pi * variance) for variance in variances)
 
 
 def window_of(samples: Sequence[Sample], noise: float = 1.0) -> Window:

@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The state-space model x = (s, v): step (2)(3), Jacobian, noise and log densities, Xie et al. 2019.
+"""The state-space model x = (s, v): step (2)(3), Jacobian and noise, Xie et al. 2019.
 
     s' = s + T (v + v')/2 + w_s          w_s ~ N(0, q_s T)
     v' = v - T (min(F, B) + R)/M + w_v   w_v ~ N(0, q_v T)
@@ -13,15 +13,13 @@ and brake B/(M g) broadcast against it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .track import Track
 from .train import GRAVITY, Array, Train
-
-LOG_2PI = math.log(2.0 * math.pi)
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,26 +51,18 @@ class Motion:
         resistance = self.resistance(np.asarray(position_m), np.asarray(speed_mps))
         return np.asarray(self.train.used_adhesion(np.inf, brake, resistance))
 
-    def jacobian(self, speed_mps: float, dt_s: float, brake_limits: bool) -> Array:
-        """Derivative of the step with respect to (s, v), shape (2, 2), the track's profile held fixed."""
-        slope = float(self.train.resistance_slope(np.asarray(speed_mps)))
-        if brake_limits:  # M (1 + rho) a = B + R
-            slope /= 1.0 + self.train.rotating_mass_fraction
+    def jacobian(self, speed_mps: float | Array, dt_s: float | Array, brake_limits: bool | NDArray[np.bool_]) -> Array:
+        """Derivative of the step with respect to (s, v), shape (..., 2, 2), the track's profile held fixed."""
+        slope = self.train.resistance_slope(np.asarray(speed_mps))
+        # M (1 + rho) a = B + R while the brake limits
+        slope = np.where(brake_limits, slope / (1.0 + self.train.rotating_mass_fraction), slope)
         kept = 1.0 - dt_s * GRAVITY * slope
-        return np.array([[1.0, 0.5 * dt_s * (1.0 + kept)], [0.0, kept]])
+        jacobian = np.zeros((*kept.shape, 2, 2))
+        jacobian[..., 0, 0] = 1.0
+        jacobian[..., 0, 1] = 0.5 * dt_s * (1.0 + kept)
+        jacobian[..., 1, 1] = kept
+        return jacobian
 
     def noise(self, dt_s: float | Array) -> tuple[float | Array, float | Array]:
         """Variances of w_s, m^2, and w_v, (m/s)^2, over a step of `dt_s`."""
         return self.position_noise_rate * dt_s, self.speed_noise_rate * dt_s
-
-    def transition_log_density(self, position_error: Array, speed_error: Array, dt_s: float | Array) -> Array:
-        """``ln p(x'|x)`` of the deviations of x' from the noise-free step (11)."""
-        var_s, var_v = self.noise(dt_s)
-        return -0.5 * (
-            position_error**2 / var_s + speed_error**2 / var_v + np.log(var_s) + np.log(var_v) + 2.0 * LOG_2PI
-        )
-
-
-def measurement_log_density(position_m: Array, measured_m: float | Array, variance_m2: float | Array) -> Array:
-    """``ln p(y|x)`` of a measured position (11)."""
-    return -0.5 * ((measured_m - position_m) ** 2 / variance_m2 + np.log(variance_m2) + LOG_2PI)

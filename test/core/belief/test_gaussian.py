@@ -6,55 +6,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from oracles import Linear, dense_information, make_window, ride, rts
+from oracles import Linear, make_window, rts
 from scipy import stats
 
-from adhesion_node.core import Config, Measurement
+from adhesion_node.core import Measurement
 from adhesion_node.core.belief import tracker
-from adhesion_node.core.belief.gaussian import Gaussian, coast, filter_window, observe
-from adhesion_node.core.belief.window import Sample, Window, window_of
-from adhesion_node.core.methods.particle_em.em import Search
-from adhesion_node.core.methods.particle_em.method import ParticleWindow, evaluate
-from adhesion_node.core.physics.motion import Motion
-from adhesion_node.core.physics.track import LEVEL
-from adhesion_node.core.physics.train import CRH3
+from adhesion_node.core.belief.gaussian import Gaussian, coast, observe
 
 PRIOR = Gaussian(np.array([100.0, 80.0]), np.array([[0.09, 0.01], [0.01, 0.04]]))
-MODELS = pytest.mark.parametrize("model", [Linear(), Linear(c0=0.79, c1=0.3)], ids=["free", "affine resistance"])
-
-
-def _uneven(window: Window, rng: np.random.Generator) -> Window:
-    """The window with steps, brakes and variances of all sizes and a speed at every third measurement."""
-    k = window.steps
-    speed_variance = np.where(np.arange(k) % 3 == 0, 0.04, math.inf)
-    return replace(
-        window,
-        dt_s=rng.uniform(0.05, 0.4, k),
-        brake=rng.choice([0.03, 0.0952], k),
-        variance_m2=rng.uniform(0.1, 2.0, k),
-        speed_mps=80.0 + rng.standard_normal(k),
-        speed_variance=speed_variance,
-    )
-
-
-def test_log_density_against_scipy() -> None:
-    states = PRIOR.mean + np.random.default_rng(0).standard_normal((3, 4, 2))
-    expected = stats.multivariate_normal(PRIOR.mean, PRIOR.covariance).logpdf(states)
-    assert PRIOR.log_density(states) == pytest.approx(expected, rel=1e-12)
-
-
-def test_draws_have_the_law() -> None:
-    count = 100_000
-    x = PRIOR.draw(count, np.random.default_rng(1))
-    assert x.shape == (count, 2)
-    errors = (x.mean(axis=0) - PRIOR.mean) / np.sqrt(np.diag(PRIOR.covariance) / count)
-    assert np.all(np.abs(errors) < 4)  # standard errors
-    assert np.cov(x.T) == pytest.approx(PRIOR.covariance, rel=0.03, abs=1e-3)  # their s.e. is below 0.5 %
-    assert (PRIOR.position_std, PRIOR.speed_std) == pytest.approx((0.3, 0.2))
 
 
 def test_coast_by_hand() -> None:
@@ -88,65 +50,6 @@ def test_observe_stays_positive_with_a_near_perfect_sensor() -> None:
     np.linalg.cholesky(law.covariance)
     assert law.covariance[0, 1] == law.covariance[1, 0]
     assert law.covariance[0, 0] == pytest.approx(1e-10, rel=1e-3)
-
-
-@MODELS
-@pytest.mark.parametrize("mu", [0.0, 0.05, 0.2])
-def test_filter_window_is_the_kalman_filter(model: Linear, mu: float) -> None:
-    rng = np.random.default_rng(2)
-    window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
-    filtered, exact = filter_window(model.motion, PRIOR, window, mu), rts(model, PRIOR, window, mu)
-    for k, law in enumerate(filtered.laws):
-        assert law.mean == pytest.approx(exact.filtered_mean[k + 1], rel=1e-10)
-        assert law.covariance == pytest.approx(exact.filtered_cov[k + 1], rel=1e-8)
-    assert len(filtered.laws) == window.steps
-
-
-@MODELS
-@pytest.mark.parametrize("mu", [0.05, 0.09, 0.2])
-def test_information_is_the_dense_formula(model: Linear, mu: float) -> None:
-    rng = np.random.default_rng(3)
-    window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
-    window = replace(window, speed_variance=np.full(window.steps, math.inf))
-    information = filter_window(model.motion, PRIOR, window, mu).information
-    assert information == pytest.approx(dense_information(model, PRIOR, window, mu), rel=1e-9)
-    if mu == 0.2:
-        assert information == 0.0  # above every brake: nothing is seen
-
-
-def test_information_is_the_curvature_of_the_log_likelihood() -> None:
-    model, rng, h = Linear(c0=0.79), np.random.default_rng(4), 1e-3
-    window = replace(_uneven(make_window(model, PRIOR, 0.07, rng), rng), brake=np.full(20, 0.0952))  # speeds too
-    below, here, above = (rts(model, PRIOR, window, 0.05 + d).log_likelihood for d in (-h, 0.0, h))
-    curvature = (below - 2 * here + above) / h**2
-    assert filter_window(model.motion, PRIOR, window, 0.05).information == pytest.approx(-curvature, rel=1e-5)
-
-
-@MODELS
-@pytest.mark.parametrize("mu", [0.02, 0.06])  # below both brakes, between them
-def test_sensitivity_by_finite_differences(model: Linear, mu: float) -> None:
-    rng, h = np.random.default_rng(5), 1e-5
-    window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
-    low, high = (filter_window(model.motion, PRIOR, window, mu + d).laws[-1].mean for d in (-h, h))
-    sensitivity = filter_window(model.motion, PRIOR, window, mu).sensitivity
-    assert sensitivity == pytest.approx((high - low) / (2 * h), rel=1e-6)
-
-
-def test_extended_filter_with_the_published_resistance() -> None:
-    """The one curved thing is c2 v^2; the covariance's second-order effect of it is far below the tolerance."""
-    motion = Motion(CRH3, LEVEL, Linear().q_s, Linear().q_v)
-    rng, h = np.random.default_rng(6), 1e-5
-    window = make_window(Linear(c0=13.06), PRIOR, 0.07, rng, steps=50)
-    low, high = (filter_window(motion, PRIOR, window, 0.07 + d).laws[-1].mean for d in (-h, h))
-    filtered = filter_window(motion, PRIOR, window, 0.07)
-    assert filtered.sensitivity == pytest.approx((high - low) / (2 * h), rel=1e-4)
-    # the oracle linearised at 79 m/s: d/dv (c1 3.6 v + c2 12.96 v^2) = 0.02304 + 0.0029808 v -> 0.2585 per mille
-    slope = 0.0064 * 3.6 + 2 * 0.000115 * 12.96 * 79.0
-    linear = Linear(c0=0.79 + 0.0064 * 3.6 * 79 + 0.000115 * 12.96 * 79**2 - slope * 79, c1=slope / 3.6)
-    exact = rts(linear, PRIOR, window, 0.07)
-    assert filtered.laws[-1].mean == pytest.approx(exact.filtered_mean[-1], abs=2e-3)
-    assert filtered.laws[-1].covariance == pytest.approx(exact.filtered_cov[-1], rel=1e-3)
-    assert filtered.information == pytest.approx(dense_information(linear, PRIOR, window, 0.07), rel=1e-3)
 
 
 def test_the_oracle_itself_is_the_dense_gaussian_posterior() -> None:
@@ -189,21 +92,3 @@ def test_the_tracker_settles_where_its_riccati_equation_does(sigma_m: float, per
     assert tracker.is_settled(law, rate)
     # continuous limit: sqrt(2) q^(3/4) (r T)^(1/4) with q = 1
     assert law.covariance[1, 1] == pytest.approx(math.sqrt(2.0) * rate**0.25, rel=0.45)
-
-
-def test_the_state_of_a_window_includes_what_mu_leaves_open() -> None:
-    samples = [Sample(m.t_ns, 0.0952, m.position_m, 0.25, 0.0, math.inf) for m in ride([(2.5, 410e3)])]
-    config = Config(window=20, step=5, particles=8, iterations=8)
-    prior = Gaussian(np.array([0.0, 80.0]), np.diag([0.01, 0.01]))
-    evaluation = evaluate(config, ParticleWindow(prior, tuple(samples)), Search(0.07, 8, 0.0), np.random.default_rng(0))
-    arrays, mu = window_of(samples), evaluation.identified.mu
-    filtered = filter_window(config.motion, prior, arrays, mu)
-    moved = filter_window(config.motion, prior, arrays, mu + 1e-4).laws[-1].mean - filtered.laws[-1].mean
-    open_ = moved / 1e-4 * min(evaluation.std, config.unknown_std)
-    expected = filtered.laws[-1].covariance + np.outer(open_, open_)
-    assert evaluation.belief.covariance == pytest.approx(expected, rel=1e-3)
-    assert np.all(np.outer(open_, open_) > 0.2 * filtered.laws[-1].covariance)  # it matters
-    # 25 samples where S is 20 and L is 5: ten are spent, and the prior is the law at the eleventh
-    assert evaluation.following.samples == tuple(samples[10:])
-    assert np.array_equal(evaluation.following.prior.covariance, filtered.laws[9].covariance)
-    assert np.array_equal(evaluation.following.prior.mean, filtered.laws[9].mean)

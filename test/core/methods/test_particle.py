@@ -15,18 +15,14 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from oracles import Linear, literal_pairwise, make_window, rts, specific_resistance
+from oracles import Linear, literal_pairwise, log_densities, make_window, rts, specific_resistance
 from scipy import stats
 
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.window import Window
-from adhesion_node.core.methods.particle_em.particles import (
-    Particles,
-    expected_log_likelihood,
-    pairwise_errors,
-    particle_filter,
-    particle_smoother,
-)
+from adhesion_node.core.methods.particle_em.particles import ParticleFilter, systematic
+from adhesion_node.core.methods.particle_em.smoother import MarginalSmoother
+from adhesion_node.core.methods.particle_em.windows import stack
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL
 from adhesion_node.core.physics.train import CRH3
@@ -46,23 +42,45 @@ def _window() -> Window:
     return replace(window, speed_mps=np.full(8, 79.5), speed_variance=speed_variance)
 
 
+class Smoothed(NamedTuple):
+    """One run's particles and weights, without the axis of runs."""
+
+    states: Array
+    """(2, K + 1, N)."""
+    weights: Array
+    """Filtered, (K + 1, N)."""
+    marginal: Array
+    """Smoothed, (K + 1, N)."""
+    log_likelihood: float
+    ess: float
+
+
+def _smooth(  # as `motion` steps, or as another one does
+    motion: Motion, prior: Gaussian, window: Window, mu: float, count: int, seed: int, other: Motion | None = None
+) -> Smoothed:
+    windows = stack([prior], [window])
+    particles = ParticleFilter(motion, windows, count).run(np.array([mu]), [np.random.default_rng(seed)])
+    marginal = MarginalSmoother(other or motion, windows.dt_s, count).run(particles)
+    weights = np.exp(particles.log_weights - particles.log_weights.max(axis=2, keepdims=True))
+    return Smoothed(
+        particles.states[:, :, 0],
+        (weights / weights.sum(axis=2, keepdims=True))[:, 0],
+        marginal[:, 0],
+        float(particles.log_likelihood[0]),
+        float(particles.smallest_ess[0]),
+    )
+
+
 def _within(samples: Array, exact: Array) -> None:
     """Mean over the first axis within K standard errors of the exact value, element by element."""
     errors = np.std(samples, axis=0, ddof=1) / math.sqrt(len(samples))
     assert np.all(np.abs(np.mean(samples, axis=0) - exact) < K * errors)
 
 
-def _moments(weights: Array, particles: Particles) -> Array:
+def _moments(weights: Array, states: Array) -> Array:
     """Means and variances of s and v at every time, shape (K + 1, 4)."""
-    mean_s, mean_v = (np.sum(weights * x, axis=1) for x in (particles.position_m, particles.speed_mps))
-    var_s = np.sum(weights * (particles.position_m - mean_s[:, None]) ** 2, axis=1)
-    var_v = np.sum(weights * (particles.speed_mps - mean_v[:, None]) ** 2, axis=1)
-    return np.stack([mean_s, mean_v, var_s, var_v], axis=1)
-
-
-def _weights(particles: Particles) -> Array:
-    weights = np.exp(particles.log_weights - particles.log_weights.max(axis=1, keepdims=True))
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    means = np.sum(weights * states, axis=2)
+    return np.concatenate([means, np.sum(weights * (states - means[:, :, None]) ** 2, axis=2)]).T
 
 
 @pytest.mark.parametrize("mu", [0.04, 0.2])
@@ -71,11 +89,10 @@ def test_filter_and_smoother_are_exact_up_to_monte_carlo_error(mu: float) -> Non
     exact = rts(LOUD, PRIOR, window, mu)
     filtered, smoothed, likelihood = [], [], []
     for seed in range(RUNS):
-        particles = particle_filter(LOUD.motion, PRIOR, window, mu, count, np.random.default_rng(seed))
-        weights = particle_smoother(LOUD.motion, particles, window, mu).marginal
-        filtered.append(_moments(_weights(particles), particles))
-        smoothed.append(_moments(weights, particles))
-        likelihood.append(math.exp(particles.log_likelihood - exact.log_likelihood))
+        found = _smooth(LOUD.motion, PRIOR, window, mu, count, seed)
+        filtered.append(_moments(found.weights, found.states))
+        smoothed.append(_moments(found.marginal, found.states))
+        likelihood.append(math.exp(found.log_likelihood - exact.log_likelihood))
     for samples, mean, cov in (
         (filtered, exact.filtered_mean, exact.filtered_cov),
         (smoothed, exact.mean, exact.cov),
@@ -95,9 +112,9 @@ def test_log_likelihood_over_many_resamplings() -> None:
     exact = rts(LOUD, PRIOR, window, 0.07).log_likelihood
     ratios, least = [], []
     for seed in range(2 * RUNS):
-        particles = particle_filter(LOUD.motion, PRIOR, window, 0.07, 1000, np.random.default_rng(seed))
-        ratios.append(math.exp(particles.log_likelihood - exact))
-        least.append(particles.smallest_ess)
+        found = _smooth(LOUD.motion, PRIOR, window, 0.07, 1000, seed)
+        ratios.append(math.exp(found.log_likelihood - exact))
+        least.append(found.ess)
     _within(np.array(ratios), np.array(1.0))
     assert np.std(ratios) < 0.5
     assert max(least) < 500  # below half of them: it did resample
@@ -108,81 +125,24 @@ def test_likelihood_of_a_few_particles_is_without_bias() -> None:
     """Whatever N: so the resampling is without bias as well. 20 particles, 1000 runs."""
     window = make_window(LOUD, PRIOR, 0.07, np.random.default_rng(9), steps=6, sigma_m=0.3)
     exact = rts(LOUD, PRIOR, window, 0.07).log_likelihood
-    runs = [particle_filter(LOUD.motion, PRIOR, window, 0.07, 20, np.random.default_rng(seed)) for seed in range(1000)]
-    _within(np.array([math.exp(p.log_likelihood - exact) for p in runs]), np.array(1.0))
-    assert np.mean([p.smallest_ess < 10 for p in runs]) > 0.5
+    windows, rngs = stack([PRIOR] * 1000, [window] * 1000), [np.random.default_rng(seed) for seed in range(1000)]
+    runs = ParticleFilter(LOUD.motion, windows, 20).run(np.full(1000, 0.07), rngs)
+    _within(np.exp(runs.log_likelihood - exact), np.array(1.0))
+    assert np.mean(runs.smallest_ess < 10) > 0.5
 
 
-@pytest.mark.parametrize("count", [2, 20])
-def test_weights_are_laws_and_pairs_sum_to_the_marginals(count: int) -> None:
-    window = _window()
-    particles = particle_filter(CRH3_LOUD, PRIOR, window, 0.07, count, np.random.default_rng(0))
-    smoothed = particle_smoother(CRH3_LOUD, particles, window, 0.07)
-    assert smoothed.kernel.shape == (8, count, count)
-    assert smoothed.kernel.sum(axis=1) == pytest.approx(np.ones((8, count)))
-    assert smoothed.marginal.sum(axis=1) == pytest.approx(np.ones(9))
-    assert np.all(smoothed.marginal >= 0)
-    assert smoothed.pairwise.sum(axis=2) == pytest.approx(smoothed.marginal[:-1])
-    assert smoothed.pairwise.sum(axis=1) == pytest.approx(smoothed.marginal[1:])
-
-
-def _densities(particles: Particles, window: Window, motion: Motion, mu: float) -> Array:
-    """p(x^j_t+1 | x^i_t), shape (K, N, N), spelled out for the CRH3."""
-    steps, count = window.steps, particles.position_m.shape[1]
-    densities = np.empty((steps, count, count))
-    for t in range(steps):
-        dt = float(window.dt_s[t])
-        s, v = particles.position_m[t], particles.speed_mps[t]
-        slower = v - dt * 9.8 * (min(mu, float(window.brake[t])) + specific_resistance(v))
-        moved = s + dt * (v + slower) / 2
-        std_s, std_v = math.sqrt(motion.position_noise_rate * dt), math.sqrt(motion.speed_noise_rate * dt)
-        for i in range(count):
-            by_s = stats.norm(moved[i], std_s).pdf(particles.position_m[t + 1])
-            densities[t, i] = by_s * stats.norm(slower[i], std_v).pdf(particles.speed_mps[t + 1])
-    return densities
-
-
+@pytest.mark.parametrize("count", [2, 6])
 @pytest.mark.parametrize("from_m", [0.0, 1e5])
 @pytest.mark.parametrize("mu", [0.05, 0.3])
-def test_vectorised_weights_equal_27_as_printed(mu: float, from_m: float) -> None:
+def test_vectorised_weights_equal_27_as_printed(mu: float, from_m: float, count: int) -> None:
     window = _window()
     window = replace(window, position_m=window.position_m + from_m)
     prior = PRIOR._replace(mean=PRIOR.mean + from_m * np.array([1.0, 0.0]))
     window = replace(window, dt_s=np.linspace(0.05, 0.2, 8), brake=np.linspace(0.04, 0.0952, 8))
-    particles = particle_filter(CRH3_LOUD, prior, window, mu, 6, np.random.default_rng(1))
-    smoothed = particle_smoother(CRH3_LOUD, particles, window, mu)
-    weights = _weights(particles)
-    pairs, marginals = literal_pairwise(weights, _densities(particles, window, CRH3_LOUD, mu), weights[-1])
-    assert smoothed.pairwise == pytest.approx(np.array(pairs), rel=1e-8, abs=1e-15)
-    assert smoothed.marginal == pytest.approx(np.array(marginals), rel=1e-8, abs=1e-15)
-
-
-def test_parts_of_q_24_25_26_as_printed() -> None:
-    window, mu = _window(), 0.06
-    particles = particle_filter(CRH3_LOUD, PRIOR, window, 0.05, 6, np.random.default_rng(2))
-    smoothed = particle_smoother(CRH3_LOUD, particles, window, 0.05)
-    densities = _densities(particles, window, CRH3_LOUD, mu)
-    states = np.stack([particles.position_m[0], particles.speed_mps[0]], axis=1)
-    i1 = smoothed.marginal[0] @ stats.multivariate_normal(PRIOR.mean, PRIOR.covariance).logpdf(states)
-    i2 = i3 = 0.0
-    for t in range(8):
-        i2 += float(np.sum(smoothed.pairwise[t] * np.log(densities[t])))
-        s, v = particles.position_m[t + 1], particles.speed_mps[t + 1]
-        log_measured = stats.norm(s, 0.5).logpdf(window.position_m[t])
-        if t == 5:
-            log_measured = log_measured + stats.norm(v, 0.3).logpdf(79.5)
-        i3 += float(smoothed.marginal[t + 1] @ log_measured)
-    ours = expected_log_likelihood(CRH3_LOUD, PRIOR, particles, smoothed, window, mu)
-    assert ours == pytest.approx((float(i1), i2, i3), rel=1e-9)
-
-
-def test_pairwise_errors_are_those_of_j_from_i() -> None:
-    window = _window()
-    particles = particle_filter(CRH3_LOUD, PRIOR, window, 0.07, 5, np.random.default_rng(3))
-    error_s, error_v = pairwise_errors(CRH3_LOUD, particles, window, 0.07)
-    s, v = CRH3_LOUD.advance(particles.position_m[2, 1], particles.speed_mps[2, 1], 0.1, 0.0952, 0.07)
-    assert error_s[2, 1, 4] == pytest.approx(particles.position_m[3, 4] - s)
-    assert error_v[2, 1, 4] == pytest.approx(particles.speed_mps[3, 4] - v)
+    found = _smooth(CRH3_LOUD, prior, window, mu, count, 1)
+    densities = np.exp(log_densities(found.states, CRH3_LOUD, window, mu))
+    _, marginals = literal_pairwise(found.weights, densities, found.weights[-1])
+    assert found.marginal == pytest.approx(np.array(marginals), rel=1e-8, abs=1e-15)
 
 
 class Grid(NamedTuple):
@@ -236,10 +196,9 @@ def test_smoother_equals_a_brute_force_grid(offset_m: float) -> None:
     grid = _grid_posterior(motion, prior, window, 0.06)
     means, ratios = [], []
     for seed in range(RUNS):
-        particles = particle_filter(motion, prior, window, 0.06, 1000, np.random.default_rng(seed))
-        smoothed = particle_smoother(motion, particles, window, 0.06)
-        means.append(_moments(smoothed.marginal, particles)[:, :2])
-        ratios.append(math.exp(particles.log_likelihood - grid.log_likelihood))
+        found = _smooth(motion, prior, window, 0.06, 1000, seed)
+        means.append(_moments(found.marginal, found.states)[:, :2])
+        ratios.append(math.exp(found.log_likelihood - grid.log_likelihood))
     _within(np.array(means), grid.mean)
     _within(np.array(ratios), np.array(1.0))
 
@@ -248,28 +207,31 @@ def test_smoother_equals_a_brute_force_grid(offset_m: float) -> None:
 def test_a_measurement_that_no_particle_explains_leaves_laws(offset_m: float) -> None:
     window = _window()
     window = replace(window, position_m=window.position_m + offset_m * (np.arange(8) == 3))
-    particles = particle_filter(CRH3_LOUD, PRIOR, window, 0.07, 20, np.random.default_rng(4))
-    smoothed = particle_smoother(CRH3_LOUD, particles, window, 0.07)
-    assert math.isfinite(particles.log_likelihood)
-    assert smoothed.marginal.sum(axis=1) == pytest.approx(np.ones(9))
-    assert np.all(np.isfinite(smoothed.kernel))
-    assert 1.0 <= particles.smallest_ess < 2.0
+    found = _smooth(CRH3_LOUD, PRIOR, window, 0.07, 20, 4)
+    assert math.isfinite(found.log_likelihood)
+    assert found.marginal.sum(axis=1) == pytest.approx(np.ones(9))
+    assert np.all(found.marginal >= 0.0)
+    assert 1.0 <= found.ess < 2.0
 
 
 def test_smoother_with_a_step_far_beyond_the_noise() -> None:
     """Hardly any process noise: all densities but one per column underflow, the columns are laws all the same."""
     quiet = Motion(CRH3, LEVEL, 1e-12, 1e-12)
-    particles = particle_filter(CRH3_LOUD, PRIOR, _window(), 0.07, 10, np.random.default_rng(5))
-    smoothed = particle_smoother(quiet, particles, _window(), 0.07)
-    assert smoothed.kernel.sum(axis=1) == pytest.approx(np.ones((8, 10)))
-    assert smoothed.marginal.sum(axis=1) == pytest.approx(np.ones(9))
-    assert smoothed.pairwise.sum(axis=2) == pytest.approx(smoothed.marginal[:-1])
+    found = _smooth(CRH3_LOUD, PRIOR, _window(), 0.07, 10, 5, quiet)
+    assert found.marginal.sum(axis=1) == pytest.approx(np.ones(9))
+    assert np.all(found.marginal >= 0.0)
+
+
+def test_resampling_is_systematic() -> None:
+    """N weights, one offset: the numbers (j + offset)/N fall on the particles whose cumulated weight reaches them."""
+    weights, offset = np.random.default_rng(0).exponential(size=12) * (np.arange(12) % 5 != 0), 0.3
+    upto = np.cumsum(weights / weights.sum())
+    expected = [next(i for i in range(12) if upto[i] >= (j + offset) / 12) for j in range(12)]
+    assert systematic(weights[None], np.array([offset])).tolist() == [expected]
 
 
 def test_same_generator_same_particles() -> None:
-    one, two, other = (
-        particle_filter(CRH3_LOUD, PRIOR, _window(), 0.07, 20, np.random.default_rng(seed)) for seed in (6, 6, 7)
-    )
-    assert np.array_equal(one.position_m, two.position_m)
+    one, two, other = (_smooth(CRH3_LOUD, PRIOR, _window(), 0.07, 20, seed) for seed in (6, 6, 7))
+    assert np.array_equal(one.states, two.states)
     assert one.log_likelihood == two.log_likelihood
-    assert not np.array_equal(one.position_m, other.position_m)
+    assert not np.array_equal(one.states, other.states)

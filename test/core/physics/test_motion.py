@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The state-space model, (2)(3)(5)(11): steps by hand, finite differences, scipy's densities; the window's data."""
+"""The state-space model, (2)(3)(5): steps by hand and finite differences; the window's data."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from adhesion_node.core.belief.window import Sample, window_of
-from adhesion_node.core.physics.motion import Motion, measurement_log_density
+from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL, Grade, Track, Tunnel
 from adhesion_node.core.physics.train import CRH3
 
@@ -80,27 +79,16 @@ def test_jacobian_by_finite_differences(speed: float, rho: float, mu: float) -> 
     assert motion.jacobian(speed, dt, brake_limits) == pytest.approx(np.array(columns).T, abs=1e-9)
 
 
+def test_jacobians_of_many_states_are_those_of_each() -> None:
+    motion = Motion(replace(CRH3, rotating_mass_fraction=0.1), LEVEL, Q_S, Q_V)
+    speed, dt, limits = np.array([10.0, 50.0, 85.0]), np.array([0.1, 0.2, 0.3]), np.array([True, False, True])
+    each = [motion.jacobian(float(v), float(t), bool(b)) for v, t, b in zip(speed, dt, limits, strict=True)]
+    assert np.array_equal(motion.jacobian(speed, dt, limits), np.array(each))
+
+
 def test_noise_grows_with_the_step() -> None:
     assert MOTION.noise(0.1) == pytest.approx((4e-4, (0.02 / 3.6) ** 2))
     assert MOTION.noise(0.4) == pytest.approx((1.6e-3, 4 * (0.02 / 3.6) ** 2))
-
-
-def test_transition_density_11_against_scipy() -> None:
-    rng = np.random.default_rng(3)
-    dt = 0.2
-    law = stats.multivariate_normal([0.0, 0.0], np.diag([Q_S * dt, Q_V * dt]))
-    errors = rng.standard_normal((5, 3, 2)) * [0.05, 0.02]
-    ours = MOTION.transition_log_density(errors[..., 0], errors[..., 1], dt)
-    assert ours == pytest.approx(law.logpdf(errors), rel=1e-12)
-
-
-def test_measurement_density_11_against_scipy() -> None:
-    rng = np.random.default_rng(4)
-    positions, variance = rng.standard_normal(6), np.array([0.25, 0.25, 1.0, 4.0, 0.01, 1e-4])
-    ours = measurement_log_density(positions, 0.3, variance)
-    assert ours == pytest.approx(stats.norm(positions, np.sqrt(variance)).logpdf(0.3), rel=1e-12)
-    # at the measured place: -ln(0.5 sqrt(2 pi)) = 0.693147 - 0.918939 = -0.225791
-    assert float(measurement_log_density(np.array(0.3), 0.3, 0.25)) == pytest.approx(-0.2257914, abs=1e-7)
 
 
 def test_a_window_keeps_times_brakes_and_measurements_together() -> None:
@@ -113,8 +101,8 @@ def test_a_window_keeps_times_brakes_and_measurements_together() -> None:
     assert window.steps == 2
     assert window.dt_s == pytest.approx([0.1, 0.25])
     assert window.brake.tolist() == [0.01, 0.02]  # of the step's start
-    assert window.observations[0] == [(0, 8.0, 0.36), (1, 80.0, 0.09)]
-    assert window.observations[1] == [(0, 28.0, 0.49)]
+    assert window.measured.tolist() == [[8.0, 80.0], [28.0, 0.0]]
+    assert window.information.tolist() == [[1 / 0.36, 1 / 0.09], [1 / 0.49, 0.0]]
 
 
 def test_a_window_keeps_nanoseconds_of_an_epoch() -> None:

@@ -1,9 +1,9 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Expectation maximisation of the adhesion in one window, Xie et al. 2019, (18)-(34).
+"""Expectation maximisation of the adhesion in R windows of K steps, Xie et al. 2019, (18)-(34).
 
-The E-step comes in behind the `Smoother` protocol. What the M-step needs of it is small: while adhesion limits,
+The E-step comes in behind the `EStep` protocol. What the M-step needs of it is small: while adhesion limits,
 the model is linear in mu, so Q(mu, mu_k) depends on mu through
 
     Q = const - 1/2 sum_t c_t (min(mu, limit_t) - u_t)^2
@@ -14,20 +14,20 @@ is a parabola between two limits, so its maximum is found exactly where the pape
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ...belief.gaussian import Gaussian
-from ...belief.window import Window
 from ...physics.motion import Motion
 from ...physics.train import GRAVITY, Array
-from .particles import Particles, Smoothed, particle_filter, particle_smoother
+from .particles import ParticleFilter, Particles
+from .smoother import MarginalSmoother
+from .windows import Windows
 
 
 class Expectation(NamedTuple):
-    """Result of an E-step: the statistics of Q that depend on mu, each of shape (K,), and diagnostics."""
+    """Result of an E-step: the statistics of Q that depend on mu, each of shape (R, K), and diagnostics, (R,)."""
 
     used: Array
     """u_t, smoothed adhesion used in each step."""
@@ -35,31 +35,34 @@ class Expectation(NamedTuple):
     """c_t, its information: the complete-data information on mu."""
     limit: Array
     """Largest adhesion the brake could use in each step."""
-    log_likelihood: float
-    ess: float
+    log_likelihood: Array
+    ess: Array
 
 
-class Smoother(Protocol):
-    """An E-step: smooths the window at adhesion `mu` from the law of its first state."""
+class EStep(Protocol):
+    """An E-step, prepared for windows: smooths each at its adhesion in `mu`, shape (R,)."""
 
-    def __call__(
-        self, motion: Motion, prior: Gaussian, window: Window, mu: float, rng: np.random.Generator
-    ) -> Expectation: ...
+    def __call__(self, mu: Array) -> Expectation: ...
 
 
-@dataclass(frozen=True, slots=True)
-class ParticleSmoother:
+Prepare = Callable[[Windows, Sequence[np.random.Generator]], EStep]
+"""Prepares an E-step for windows and the generators of their runs."""
+
+
+class ParticleEStep:
     """The paper's E-step: bootstrap filter and marginal smoother with so many particles."""
 
-    particles: int
+    def __init__(self, motion: Motion, count: int, windows: Windows, rngs: Sequence[np.random.Generator]) -> None:
+        self.filter, self.smoother = (
+            ParticleFilter(motion, windows, count),
+            MarginalSmoother(motion, windows.dt_s, count),
+        )
+        self.motion, self.windows, self.rngs = motion, windows, rngs
 
-    def __call__(
-        self, motion: Motion, prior: Gaussian, window: Window, mu: float, rng: np.random.Generator
-    ) -> Expectation:
+    def __call__(self, mu: Array) -> Expectation:
         """Filter, smooth and reduce to the statistics of Q."""
-        particles = particle_filter(motion, prior, window, mu, self.particles, rng)
-        smoothed = particle_smoother(motion, particles, window, mu)
-        return expectation(motion, particles, smoothed, window)
+        particles = self.filter.run(mu, self.rngs)
+        return expectation(self.motion, self.windows, mu, particles, self.smoother.run(particles))
 
 
 class Search(NamedTuple):
@@ -88,81 +91,80 @@ class Identified(NamedTuple):
     ess: float
 
 
-def expectation(motion: Motion, particles: Particles, smoothed: Smoothed, window: Window) -> Expectation:
-    """Reduce the smoothed particles to the statistics of I2 (26) that depend on mu.
+def expectation(motion: Motion, windows: Windows, mu: Array, particles: Particles, marginal: Array) -> Expectation:
+    """Reduce particles, filtered at `mu`, (R,), and their smoothed weights to the statistics of I2 (26).
 
     I2 is quadratic in the step's deviations and these are sums of a term in x_t and a term in x_t+1, so the
-    double sum over pairs collapses to the marginal weights.
+    double sum over pairs collapses to the marginal weights (K + 1, R, N). As the particles' steps used
+    min(mu, limit), what the smoother adds to it is what they missed.
     """
-    dt = window.dt_s
-    resistance = motion.resistance(particles.position_m[:-1], particles.speed_mps[:-1])
-    unbraked_v = particles.speed_mps[:-1] - GRAVITY * dt[:, None] * resistance
-    unbraked_s = particles.position_m[:-1] + 0.5 * dt[:, None] * (particles.speed_mps[:-1] + unbraked_v)
-    position, speed, before_s, before_v, mean_resistance = (
-        np.einsum("tn,tn->t", weights, values)
-        for weights, values in (
-            (smoothed.marginal[1:], particles.position_m[1:]),
-            (smoothed.marginal[1:], particles.speed_mps[1:]),
-            (smoothed.marginal[:-1], unbraked_s),
-            (smoothed.marginal[:-1], unbraked_v),
-            (smoothed.marginal[:-1], resistance),
-        )
-    )
-    effect_v, effect_s = GRAVITY * dt, 0.5 * GRAVITY * dt**2
-    var_s, var_v = motion.noise(dt)
-    weight = effect_v**2 / var_v + effect_s**2 / var_s
-    lost = effect_v * (before_v - speed) / var_v + effect_s * (before_s - position) / var_s
-    return Expectation(
-        used=lost / weight,
-        weight=weight,
-        limit=np.broadcast_to(motion.train.used_adhesion(np.inf, window.brake, mean_resistance), dt.shape),
-        log_likelihood=particles.log_likelihood,
-        ess=particles.smallest_ess,
-    )
+    states, stepped, before = particles.states, particles.stepped, marginal[:-1]
+    missed = np.einsum("ckrn,krn->ckr", stepped, before) - np.einsum("ckrn,krn->ckr", states[:, 1:], marginal[1:])
+    resistance = motion.resistance(states[0, :-1], states[1, :-1])
+    used = motion.train.used_adhesion(mu[:, None], windows.brake, resistance)
+    used = np.einsum("krn,krn->kr", before, np.broadcast_to(used, before.shape))
+    dt, brake = windows.dt_s[..., 0], windows.brake[..., 0]
+    limit = motion.train.used_adhesion(np.inf, brake, np.einsum("krn,krn->kr", before, resistance))
+    effect = GRAVITY * dt * np.stack([0.5 * dt, np.ones_like(dt)])
+    variance = np.stack(motion.noise(dt))
+    weight = np.sum(effect**2 / variance, axis=0)
+    used = used + np.sum(effect * missed / variance, axis=0) / weight
+    return Expectation(used.T, weight.T, limit.T, particles.log_likelihood, particles.smallest_ess)
 
 
-def gradient(expected: Expectation, mu: float) -> float:
-    """dQ/dmu (29)-(32): only I2 depends on mu, and only through the steps that adhesion limits."""
-    active = expected.limit > mu
-    return float(np.sum((expected.weight * (expected.used - mu))[active]))
+def gradient(expected: Expectation, mu: Array) -> Array:
+    """dQ/dmu (29)-(32) at `mu`, (R,): only I2 depends on mu, and only through the steps that adhesion limits."""
+    active = expected.limit > mu[:, None]
+    return np.asarray(np.sum(expected.weight * (expected.used - mu[:, None]), axis=1, where=active))
 
 
-def maximise(expected: Expectation, lowest: float) -> float:
-    """Adhesion of at least `lowest` that maximises Q, the goal of (33): exact, also at the kink.
+def maximise(expected: Expectation, lowest: Array) -> Array:
+    """Adhesions, (R,), of at least `lowest`, (R,), that maximise Q, the goal of (33): exact, also at the kink.
 
     Between two neighbouring limits Q is a parabola; beyond the largest limit it is flat, so the answer never
     exceeds that limit: "at least this much adhesion".
     """
-    order = np.argsort(expected.limit)
-    limit, used, weight = expected.limit[order], expected.used[order], expected.weight[order]
+    runs, least = np.arange(len(lowest)), lowest[:, None]
+    order = np.argsort(expected.limit, axis=1)
+    used, weight, limit = (column[runs[:, None], order] for column in expected[:3])
+    limit = np.maximum(limit, least)  # what depends on mu from there on is the same
     # With the j lowest limits below mu, the steps j.. are active and the others keep their limit.
-    active_weight = np.cumsum(weight[::-1])[::-1]
-    active_moment = np.cumsum((weight * used)[::-1])[::-1]
-    bottoms = np.maximum(np.concatenate(([lowest], limit[:-1])), lowest)
-    tops = np.maximum(limit, lowest)
-    candidates = np.clip(active_moment / active_weight, bottoms, tops)
-    deviation = np.minimum(candidates[:, None], limit) - used
-    return float(candidates[np.argmax(-np.sum(weight * deviation**2, axis=1))])
+    moments = np.stack((weight, weight * used, weight * used**2))
+    active = np.cumsum(moments[:, :, ::-1], axis=2)[:, :, ::-1]
+    kept = weight * (limit - used) ** 2
+    mu = np.clip(active[1] / active[0], np.concatenate((least, limit[:, :-1]), axis=1), limit)
+    loss = np.cumsum(kept, axis=1) - kept + active[2] - mu * (2.0 * active[1] - mu * active[0])
+    return np.asarray(mu[runs, np.argmin(loss, axis=1)])
 
 
 def identify(
-    smoother: Smoother, motion: Motion, prior: Gaussian, window: Window, search: Search, rng: np.random.Generator
-) -> Identified:
-    """Alternate E and M steps until they move mu by no more than the tolerance (34)."""
-    mu, moved, done = search.start, np.inf, 0
-    while done < search.iterations and moved > search.tolerance:
-        expected = smoother(motion, prior, window, mu, rng)
-        previous, mu = mu, maximise(expected, search.lowest)
+    prepare: Prepare, windows: Windows, searches: Sequence[Search], rngs: Sequence[np.random.Generator]
+) -> list[Identified]:
+    """Alternate E and M steps in every window until they move its mu by no more than the tolerance (34)."""
+    found: dict[int, Identified] = {}
+    mu, iterations, tolerance, lowest = (np.array(column) for column in zip(*searches, strict=True))
+    going, done, prepared = np.arange(len(searches)), 0, 0
+    while going.size:
+        if prepared != going.size:
+            e_step, prepared = prepare(windows.of(going), [rngs[int(run)] for run in going]), going.size
+        expected = e_step(mu[going])
+        previous, mu[going] = mu[going], maximise(expected, lowest[going])
         # At either end of its range mu stands still for the end's sake, not because EM has arrived.
-        inside = search.lowest < mu < float(np.max(expected.limit))
-        moved = abs(mu - previous) if inside else np.inf
+        top = expected.limit.max(axis=1)
+        inside = (lowest[going] < mu[going]) & (mu[going] < top)
+        moved = np.where(inside, np.abs(mu[going] - previous), np.inf)
         done += 1
-    return Identified(
-        mu=mu,
-        iterations=done,
-        converged=bool(moved <= search.tolerance),
-        weight=float(np.sum(expected.weight[expected.limit >= mu])),
-        limit=float(np.max(expected.limit)),
-        log_likelihood=expected.log_likelihood,
-        ess=expected.ess,
-    )
+        ended = (moved <= tolerance[going]) | (done >= iterations[going])
+        for i in np.flatnonzero(ended):
+            run = int(going[i])
+            found[run] = Identified(
+                mu=float(mu[run]),
+                iterations=done,
+                converged=bool(moved[i] <= tolerance[run]),
+                weight=float(np.sum(expected.weight[i][expected.limit[i] >= mu[run]])),
+                limit=float(top[i]),
+                log_likelihood=float(expected.log_likelihood[i]),
+                ess=float(expected.ess[i]),
+            )
+        going = going[~ended]
+    return [found[run] for run in range(len(searches))]

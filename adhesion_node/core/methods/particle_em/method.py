@@ -1,23 +1,27 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The paper's method for one window: mu constant, identified by EM with particles, Xie et al. 2019."""
+"""The paper's method: mu constant in a window, identified by EM with particles, Xie et al. 2019."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, Protocol
+from functools import partial
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from scipy.special import ndtri
 
-from ...belief.gaussian import Gaussian, filter_window
+from ...belief.gaussian import Gaussian
 from ...belief.rail import Finding, Rail, kept_of_start, learn, learn_bound
 from ...belief.regime import Regime
 from ...belief.window import Sample, window_of
 from ..protocol import Context, Fit, Verdict, spent
-from .em import Identified, ParticleSmoother, Search, identify
+from .em import Identified, ParticleEStep, Search, identify
+from .kalman import Filtered, filter_windows
+from .windows import stack
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -33,51 +37,10 @@ class ParticleWindow(NamedTuple):
     samples: tuple[Sample, ...]
 
 
-class Evaluation(NamedTuple):
-    """What a window says."""
-
-    identified: Identified
-    std: float
-    """Standard deviation of mu from this window alone, from the observed information."""
-    kept: float
-    """Share of the EM's start that is left in mu."""
-    belief: Gaussian
-    """Filtered belief of (s, v) at the newest sample, the uncertainty of mu included."""
-    following: ParticleWindow
-    """The window to go on with."""
-
-
-class Evaluate(Protocol):
-    """Evaluates a window: `evaluate`, or what stands for it where many estimators run side by side."""
-
-    def __call__(
-        self, config: Config, window: ParticleWindow, search: Search, rng: np.random.Generator
-    ) -> Evaluation: ...
-
-
-def evaluate(config: Config, window: ParticleWindow, search: Search, rng: np.random.Generator) -> Evaluation:
-    """Identify mu in the window by EM and filter the state with the result.
-
-    A full window moves on so far that L more measurements fill it again. The filtered belief at its new first sample
-    holds nothing of the samples behind it, so the overlap is not counted twice.
-    """
-    motion, arrays = config.motion, window_of(window.samples)
-    identified = identify(ParticleSmoother(config.particles), motion, window.prior, arrays, search, rng)
-    filtered = filter_window(motion, window.prior, arrays, identified.mu)
-    std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
-    kept = kept_of_start(filtered.information, identified.weight, identified.iterations)
-    spread = filtered.sensitivity * min(std, config.unknown_std)
-    last = filtered.laws[-1]
-    gone = spent(config, window.samples)
-    following = ParticleWindow(filtered.laws[gone - 1], window.samples[gone:]) if gone else window
-    return Evaluation(identified, std, kept, Gaussian(last.mean, last.covariance + np.outer(spread, spread)), following)
-
-
 @dataclass(frozen=True, slots=True)
 class ParticleEm:
-    """The method; `evaluator` makes an `Evaluation` of a window and may be another where runs share a batch."""
+    """The method."""
 
-    evaluator: Evaluate = evaluate
     summary: str = "constant mu, the paper's"
 
     def open(self, prior: Gaussian, sample: Sample) -> ParticleWindow:
@@ -90,25 +53,58 @@ class ParticleEm:
 
     def evaluate(self, config: Config, window: ParticleWindow, context: Context) -> Verdict:
         """Identify mu by EM from that of the last window on, and judge what limits the motion."""
-        start = config.start_mu if context.mu is None else context.mu
-        search = Search(start, config.iterations, config.tolerance, context.lowest_mu)
-        evaluation = self.evaluator(config, window, search, context.rng)
-        identified = evaluation.identified
-        regime, rail = judge(config, evaluation, context, start)
-        fit = Fit(
-            window=len(window.samples),
-            iterations=identified.iterations,
-            converged=identified.converged,
-            log_likelihood=identified.log_likelihood,
-            ess=identified.ess,
-        )
-        return Verdict(regime, rail, evaluation.belief, evaluation.following, mu=identified.mu, fit=fit)
+        (verdict,) = evaluate(config, [window], [context])
+        return verdict
 
 
-def judge(config: Config, evaluation: Evaluation, context: Context, start: float) -> tuple[Regime, Rail]:
+def evaluate(config: Config, windows: Sequence[ParticleWindow], contexts: Sequence[Context]) -> list[Verdict]:
+    """Judge windows of equal length side by side: identify mu by EM and filter the states with the result."""
+    stacked = stack([window.prior for window in windows], [window_of(window.samples) for window in windows])
+    searches = [_search(config, context) for context in contexts]
+    e_step = partial(ParticleEStep, config.motion, config.particles)
+    found = identify(e_step, stacked, searches, [context.rng for context in contexts])
+    filtered = filter_windows(config.motion, stacked, np.array([identified.mu for identified in found]))
+    return [
+        _verdict(config, window, context, identified, filtered.of(run))
+        for run, (window, context, identified) in enumerate(zip(windows, contexts, found, strict=True))
+    ]
+
+
+def _search(config: Config, context: Context) -> Search:
+    start = config.start_mu if context.mu is None else context.mu
+    return Search(start, config.iterations, config.tolerance, context.lowest_mu)
+
+
+def _verdict(
+    config: Config, window: ParticleWindow, context: Context, identified: Identified, filtered: Filtered
+) -> Verdict:
+    """Judge a window by what was identified in it and the filter's pass with that.
+
+    A full window moves on so far that L more measurements fill it again. The filtered belief at its new first sample
+    holds nothing of the samples behind it, so the overlap is not counted twice.
+    """
+    std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
+    kept = kept_of_start(float(filtered.information), identified.weight, identified.iterations)
+    start = min(_search(config, context).start, identified.limit)
+    regime, rail = judge(config, Finding(identified.mu, std, start, kept), identified.limit, context)
+    spread = filtered.sensitivity * min(std, config.unknown_std)
+    gone = spent(config, window.samples)
+    following = ParticleWindow(filtered.belief(gone - 1), window.samples[gone:]) if gone else window
+    mean, covariance = filtered.belief(-1)
+    belief = Gaussian(mean, covariance + np.outer(spread, spread))
+    fit = Fit(
+        window=len(window.samples),
+        iterations=identified.iterations,
+        converged=identified.converged,
+        log_likelihood=identified.log_likelihood,
+        ess=identified.ess,
+    )
+    return Verdict(regime, rail, belief, following, mu=identified.mu, fit=fit)
+
+
+def judge(config: Config, finding: Finding, limit: float, context: Context) -> tuple[Regime, Rail]:
     """What the window shows, no brake, the brake's limit, or the adhesion, and what is known of the rail then."""
-    limit, before = evaluation.identified.limit, context.rail
-    finding = Finding(evaluation.identified.mu, evaluation.std, min(start, limit), evaluation.kept)
+    before = context.rail
     learnt = learn(before, finding, float(ndtri(config.confidence)))
     if not context.pressure_measured and learnt.mu <= 2.0 * learnt.std:
         return Regime.COASTING, before
