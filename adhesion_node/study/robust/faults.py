@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..trial.running import Running
-from ..trial.score import of, score
+from ..trial.score import score, statistic
 from ..trial.text import Column
 from ..trial.trials import Results, Rows, each_trial, grouped
 from .cases import FAULTS, Case
@@ -79,7 +79,7 @@ def row(case: Case, found: Results, b: Results) -> dict[str, Any]:
         **_told(start_s, found),
         "resets": float(np.mean(found.runs["resets"])),
         "finite": bool(np.all(found.runs["finite"])),
-        "identical": of(np.mean, np.isin(known[ESTIMATE], b.rows[ESTIMATE])),
+        "identical": statistic(np.mean, np.isin(known[ESTIMATE], b.rows[ESTIMATE])),
     }
 
 
@@ -97,9 +97,9 @@ def _differences(window: int, known: Rows, against: Rows) -> dict[str, float | N
     difference = (known["mu"] - against["mu"]) / np.maximum(known["std"], against["std"])
     settled = np.abs(difference[_settled(known, window)])
     return {
-        "largest_difference_std": of(np.max, settled),
-        "within_3_std": of(np.mean, settled <= NEAR),
-        "lowest_difference_std": of(np.min, difference[known["limited"]]),
+        "largest_difference_std": statistic(np.max, settled),
+        "within_3_std": statistic(np.mean, settled <= NEAR),
+        "lowest_difference_std": statistic(np.min, difference[known["limited"]]),
     }
 
 

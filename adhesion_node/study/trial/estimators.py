@@ -26,7 +26,7 @@ class Lane(NamedTuple):
     start_mu: float
 
 
-class Seen(NamedTuple):
+class Output(NamedTuple):
     """A prediction, when it came out, how much had been accepted by then, and whether the end of the data gave it."""
 
     prediction: Prediction
@@ -35,10 +35,10 @@ class Seen(NamedTuple):
     at_end: bool = False
 
 
-class Course(NamedTuple):
+class LaneResult(NamedTuple):
     """What came out of a lane."""
 
-    seen: list[Seen]
+    outputs: list[Output]
     resets: int = 0
     accepted_before: int = 0
     """Measurements accepted before the fault was over."""
@@ -48,10 +48,10 @@ class Course(NamedTuple):
     """When the first one was."""
 
 
-class Tried(NamedTuple):
-    """The courses of all lanes."""
+class LaneResults(NamedTuple):
+    """The results of all lanes."""
 
-    courses: list[Course]
+    results: list[LaneResult]
     window_ms: list[float]
     """Time per window, all included: of each lane, or of each moment's windows together."""
 
@@ -79,32 +79,32 @@ class Estimator(NamedTuple):
         """Seed for a lane."""
         return lane.run.seed + self.seed_shift
 
-    def run(self, lanes: Sequence[Lane]) -> Tried:
+    def run(self, lanes: Sequence[Lane]) -> LaneResults:
         """Run through all lanes."""
         return WAYS[self.way].run(self, lanes)
 
 
-def _by_pipeline(estimator: Estimator, lane: Lane) -> Course:
+def _by_pipeline(estimator: Estimator, lane: Lane) -> LaneResult:
     """Sample by sample through the pipeline, as the live node and the replay run."""
     pipeline = Pipeline(estimator.config_in(lane), estimator.seed_in(lane))
-    seen, first_s = list[Seen](), dict[str, float]()
+    outputs, first_s = list[Output](), dict[str, float]()
     now_s, before = 0.0, 0
     for now_s, received in lane.run.sent:
         for sample in received:
             if isinstance(sample, Refusal):
                 pipeline.refuse(*sample)
             else:
-                seen += [Seen(prediction, now_s, pipeline.accepted) for prediction in pipeline.push(sample)]
+                outputs += [Output(prediction, now_s, pipeline.accepted) for prediction in pipeline.push(sample)]
         if received:
             first_s = dict.fromkeys(pipeline.dropped, now_s) | first_s
         before = pipeline.accepted if now_s < lane.run.world.over_s else before
-    seen += [Seen(prediction, now_s, pipeline.accepted, at_end=True) for prediction in pipeline.finish()]
+    outputs += [Output(prediction, now_s, pipeline.accepted, at_end=True) for prediction in pipeline.finish()]
     dropped = pipeline.dropped
     dropped_s = {reason: first_s.get(reason, now_s) for reason in dropped}
-    return Course(seen, pipeline.resets, before, dropped, dropped_s)
+    return LaneResult(outputs, pipeline.resets, before, dropped, dropped_s)
 
 
-def _by_core(estimator: Estimator, lane: Lane) -> Course:
+def _by_core(estimator: Estimator, lane: Lane) -> LaneResult:
     """Measurement by measurement through the core alone: no curves."""
     config = estimator.config_in(lane)
     state, estimates = init(config, estimator.seed_in(lane)), list[Estimate]()
@@ -114,7 +114,7 @@ def _by_core(estimator: Estimator, lane: Lane) -> Course:
     return _estimated([*estimates, *finish(config, state)[1]])
 
 
-def _by_ekf(estimator: Estimator, lane: Lane) -> Course:
+def _by_ekf(estimator: Estimator, lane: Lane) -> LaneResult:
     """Measurement by measurement through the extended Kalman filter."""
     config = EkfConfig(estimator.config_in(lane), estimator.tuning)
     state, estimates = ekf_init(config, estimator.seed_in(lane)), list[Estimate]()
@@ -124,34 +124,34 @@ def _by_ekf(estimator: Estimator, lane: Lane) -> Course:
     return _estimated(estimates)
 
 
-def _estimated(estimates: Iterable[Estimate]) -> Course:
+def _estimated(estimates: Iterable[Estimate]) -> LaneResult:
     """What came out where nothing is known but the estimates."""
-    return Course([Seen(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
+    return LaneResult([Output(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
 
 
-def _one_by_one(run: Callable[[Estimator, Lane], Course]) -> Callable[[Estimator, Sequence[Lane]], Tried]:
-    def tried(estimator: Estimator, lanes: Sequence[Lane]) -> Tried:
-        courses, window_ms = list[Course](), list[float]()
+def _one_by_one(run: Callable[[Estimator, Lane], LaneResult]) -> Callable[[Estimator, Sequence[Lane]], LaneResults]:
+    def tried(estimator: Estimator, lanes: Sequence[Lane]) -> LaneResults:
+        results, window_ms = list[LaneResult](), list[float]()
         for lane in lanes:
             started = time.perf_counter()
-            courses.append(run(estimator, lane))
-            window_ms.append(1e3 * (time.perf_counter() - started) / max(len(courses[-1].seen), 1))
-        return Tried(courses, window_ms)
+            results.append(run(estimator, lane))
+            window_ms.append(1e3 * (time.perf_counter() - started) / max(len(results[-1].outputs), 1))
+        return LaneResults(results, window_ms)
 
     return tried
 
 
-def _in_lockstep(estimator: Estimator, lanes: Sequence[Lane]) -> Tried:
+def _in_lockstep(estimator: Estimator, lanes: Sequence[Lane]) -> LaneResults:
     """All lanes side by side through the core, their windows evaluated together."""
     window_ms = list[float]()
     runs = [lockstep.Run(estimator.config_in(lane), estimator.seed_in(lane), lane.run.measurements) for lane in lanes]
-    return Tried([_estimated(estimates) for estimates in lockstep.drive(runs, window_ms)], window_ms)
+    return LaneResults([_estimated(estimates) for estimates in lockstep.drive(runs, window_ms)], window_ms)
 
 
 class Way(NamedTuple):
     """How an estimator runs through its lanes."""
 
-    run: Callable[[Estimator, Sequence[Lane]], Tried]
+    run: Callable[[Estimator, Sequence[Lane]], LaneResults]
     weight: float
     """Work of a lane, in that of a Kalman filter, about."""
     lanes: int = 200

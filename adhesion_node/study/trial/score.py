@@ -44,24 +44,24 @@ def score(found: Results) -> dict[str, Any]:
     changes, hours = _sum(known, changes_told), _sum(rows, _braked_s) / 3600.0
     return {
         "runs": np.unique(found.runs["seed"]).size,
-        "mean_abs_error": of(np.mean, of_runs(counted, lambda own: np.abs(own["mu"] - own["true_mu"]))),
-        "mean_error": of(np.mean, of_runs(counted, lambda own: own["mu"] - own["true_mu"])),
-        "mean_relative_error_percent": of(np.mean, relative),
-        "std_relative_error_percent": of(np.std, relative),
-        "p5_relative_error_percent": of(lambda values: np.percentile(values, 5), relative),
-        "p95_relative_error_percent": of(lambda values: np.percentile(values, 95), relative),
+        "mean_abs_error": statistic(np.mean, of_runs(counted, lambda own: np.abs(own["mu"] - own["true_mu"]))),
+        "mean_error": statistic(np.mean, of_runs(counted, lambda own: own["mu"] - own["true_mu"])),
+        "mean_relative_error_percent": statistic(np.mean, relative),
+        "std_relative_error_percent": statistic(np.std, relative),
+        "p5_relative_error_percent": statistic(lambda values: np.percentile(values, 5), relative),
+        "p95_relative_error_percent": statistic(lambda values: np.percentile(values, 95), relative),
         "converged_kmh": converged_kmh(over_speed(found)),
-        "coverage90": of(np.mean, off <= TWO_SIDED_90 * counted["std"]),
-        "coverage95": of(np.mean, off <= TWO_SIDED_95 * counted["std"]),
-        "lower_bound_holds": of(np.mean, known["lower"] <= known["true_mu"]),
-        "lower_bound_holds_scored": of(np.mean, counted["lower"] <= counted["true_mu"]),
-        "safe_curve_holds": of(np.mean, curves["safe_m"] >= curves["true_stopping_m"]),
-        "shortest_safe_curve": of(np.min, moving["safe_m"] / moving["true_stopping_m"]),
-        "without_safe_curve": of(np.mean, np.isnan(rows["safe_m"])),
-        "claimed_while_the_brake_limits": of(np.mean, brake_limits["claimed"]),
+        "coverage90": statistic(np.mean, off <= TWO_SIDED_90 * counted["std"]),
+        "coverage95": statistic(np.mean, off <= TWO_SIDED_95 * counted["std"]),
+        "lower_bound_holds": statistic(np.mean, known["lower"] <= known["true_mu"]),
+        "lower_bound_holds_scored": statistic(np.mean, counted["lower"] <= counted["true_mu"]),
+        "safe_curve_holds": statistic(np.mean, curves["safe_m"] >= curves["true_stopping_m"]),
+        "shortest_safe_curve": statistic(np.min, moving["safe_m"] / moving["true_stopping_m"]),
+        "without_safe_curve": statistic(np.mean, np.isnan(rows["safe_m"])),
+        "claimed_while_the_brake_limits": statistic(np.mean, brake_limits["claimed"]),
         "changes_told": int(changes),
         "changes_per_hour": changes / hours if hours else None,
-        "longest_silence_s": of(np.max, _silences(rows)),
+        "longest_silence_s": statistic(np.max, _silences(rows)),
     }
 
 
@@ -83,7 +83,7 @@ def of_runs(rows: Rows, value: Callable[[Rows], NDArray[Any]]) -> NDArray[np.flo
     return np.array([np.mean(values) for values in by_seed.values()])
 
 
-def of(what: Callable[[Any], Any], values: NDArray[Any] | Sequence[float]) -> float | None:
+def statistic(what: Callable[[Any], Any], values: NDArray[Any] | Sequence[float]) -> float | None:
     """A statistic of values; None where there are none."""
     return float(what(values)) if len(values) else None
 
@@ -100,7 +100,7 @@ def over_speed(found: Results) -> Curve:
 
 def converged_kmh(curve: Curve) -> float | None:
     """Speed at which the error first falls below `CONVERGED_PERCENT`; None where it does not."""
-    return of(lambda speeds: speeds[0], curve.speed_kmh[curve.relative_error_percent < CONVERGED_PERCENT])
+    return statistic(lambda speeds: speeds[0], curve.speed_kmh[curve.relative_error_percent < CONVERGED_PERCENT])
 
 
 def _sum(rows: Rows, value: Callable[[Rows], float]) -> float:

@@ -18,7 +18,7 @@ from sim_node.train.plant import ADHESION_LIMITED
 from ...core import Config, Regime
 from ...core.prediction import Prediction
 from ...run.score import CONVERGED_AFTER_MPS
-from .estimators import WAYS, Course, Estimator, Lane
+from .estimators import WAYS, Estimator, Lane, LaneResult
 from .running import Arrays, Running, run_all
 from .world import World, simulate
 
@@ -76,7 +76,7 @@ class Trials(NamedTuple):
         runs = [simulate(self.world, seed) for seed in range(self.first_seed, self.first_seed + self.seeds)]
         lanes = [Lane(run, start) for run in runs for start in self.starts]
         tried = self.estimator.run(lanes)
-        parts = [_arrays(lane, course) for lane, course in zip(lanes, tried.courses, strict=True)]
+        parts = [_arrays(lane, result) for lane, result in zip(lanes, tried.results, strict=True)]
         arrays = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         seconds = np.array([time.perf_counter() - started])
         return {**arrays, "window_ms": np.array(tried.window_ms), "seconds": seconds}
@@ -132,36 +132,36 @@ def _together(parts: Sequence[Arrays]) -> Results:
     return Results(*(np.concatenate([part[name] for part in parts]) for name in Results._fields))
 
 
-def _arrays(lane: Lane, course: Course) -> Arrays:
+def _arrays(lane: Lane, result: LaneResult) -> Arrays:
     """Arrays of `ROW`, `TRIAL` and `DROP`."""
     seed, start = lane.run.seed, lane.start_mu
-    numbers = (value for seen in course.seen for value in seen.prediction.estimate if isinstance(value, float))
-    drops = [(seed, reason, count, course.dropped_s[reason]) for reason, count in course.dropped.items()]
+    numbers = (value for output in result.outputs for value in output.prediction.estimate if isinstance(value, float))
+    drops = [(seed, reason, count, result.dropped_s[reason]) for reason, count in result.dropped.items()]
     return {
-        "rows": _rows(lane, course),
-        "runs": np.array([(seed, start, course.resets, all(map(math.isfinite, numbers)))], dtype=TRIAL),
+        "rows": _rows(lane, result),
+        "runs": np.array([(seed, start, result.resets, all(map(math.isfinite, numbers)))], dtype=TRIAL),
         "drops": np.array(drops, dtype=DROP),
     }
 
 
-def _rows(lane: Lane, course: Course) -> Rows:
+def _rows(lane: Lane, result: LaneResult) -> Rows:
     """Estimates under the brake, an array of `ROW`."""
     born = lane.run.born
-    braked = [(seen, born[seen.prediction.estimate.t_ns]) for seen in course.seen]
-    braked = [(seen, truth) for seen, truth in braked if truth.pressure_pa > 0.0]
+    braked = [(output, born[output.prediction.estimate.t_ns]) for output in result.outputs]
+    braked = [(output, truth) for output, truth in braked if truth.pressure_pa > 0.0]
     onset = next((truth.speed_mps for truth in born.values() if truth.pressure_pa > 0.0), 0.0)
     rows = np.array(
         [
             (
-                *(lane.run.seed, lane.start_mu, truth.t_ns, seen.out_s),
+                *(lane.run.seed, lane.start_mu, truth.t_ns, output.out_s),
                 *(truth.position_m, truth.speed_mps, truth.mu, math.nan),
-                *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, _length(seen.prediction)),
+                *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, _length(output.prediction)),
                 *(truth.regime == ADHESION_LIMITED, False, e.regime is Regime.ADHESION_LIMITED),
-                *(e.withheld, seen.at_end),
-                *(e.window, seen.accepted - course.accepted_before, e.changes),
+                *(e.withheld, output.at_end),
+                *(e.window, output.accepted - result.accepted_before, e.changes),
             )
-            for seen, truth in braked
-            for e in (seen.prediction.estimate,)
+            for output, truth in braked
+            for e in (output.prediction.estimate,)
         ],
         dtype=ROW,
     )

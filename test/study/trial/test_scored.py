@@ -13,7 +13,7 @@ import pytest
 from adhesion_node.core import Config, Estimate, Regime
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.score import Truth, mean_relative_error_percent
-from adhesion_node.study.trial.estimators import Course, Lane, Seen
+from adhesion_node.study.trial.estimators import Lane, LaneResult, Output
 from adhesion_node.study.trial.score import Curve, converged_kmh, of_runs, over_speed, relative_percent, score
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results, Rows, _arrays, each_trial
 from adhesion_node.study.trial.world import World, simulate
@@ -118,8 +118,8 @@ def test_the_error_is_that_of_an_offline_replay() -> None:
     for t_ns, true in run.born.items():
         truth.mu[t_ns], truth.speed_mps[t_ns], truth.pressure_pa[t_ns] = true.mu, true.speed_mps, true.pressure_pa
     expected = mean_relative_error_percent(config, truth, estimates)
-    course = Course([Seen(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
-    arrays: Any = _arrays(Lane(run, 0.0), course)
+    result = LaneResult([Output(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
+    arrays: Any = _arrays(Lane(run, 0.0), result)
     found = score(Results(**arrays, window_ms=np.zeros(1), seconds=np.zeros(1)))
     assert found["mean_relative_error_percent"] == pytest.approx(expected)
 
