@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
 from ..wire import parameter_file
-from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.topics import CREEP_INPUTS, WHEEL_SPEED
 from .creep_pipeline import SETTINGS, CreepPipeline, setup_of
-from .offline import messages
+from .offline import feed, messages
 
 NODE = "creep_estimator"
 
@@ -33,24 +32,12 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         raise ValueError(f"bag = {reader.path}: holds no {WHEEL_SPEED.name}, without which there is no creep")
     setup = setup_of(parameter_file.given(options, NODE, SETTINGS))
     pipeline = CreepPipeline(setup.config)
-    replay(pipeline, progress(messages(reader, selection), "messages"), setup.line)
+    for _ in feed(pipeline, progress(messages(reader, selection), "messages"), CREEP_INPUTS, setup.line):
+        pass
+    pipeline.finish()
     result = summary(pipeline)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return FAILED if pipeline.last is None else DONE
-
-
-def replay(pipeline: CreepPipeline, recorded: Iterable[tuple[str, Any, int]], line: Line = NOMINAL) -> None:
-    """Feed recorded messages, each with our name of its topic and its log time, to the pipeline."""
-    inputs = {topic.name: topic for topic in CREEP_INPUTS}
-    for name, message, _ in recorded:
-        if name in inputs:
-            try:
-                sample = inputs[name].read(message, line)
-            except Rejected as refusal:
-                pipeline.refuse(name, refusal.reason)
-            else:
-                pipeline.push(sample)
-    pipeline.finish()
 
 
 def summary(pipeline: CreepPipeline) -> dict[str, Any]:

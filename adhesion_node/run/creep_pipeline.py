@@ -68,6 +68,10 @@ class CreepPipeline(EstimatorPipeline[CreepState, CreepEstimate, CreepEstimate])
     def _output(self, estimate: CreepEstimate) -> CreepEstimate:
         return estimate
 
+    def stamp_ns(self, output: CreepEstimate) -> int:
+        """When it was so."""
+        return output.t_ns
+
     def _bytes(self, output: CreepEstimate) -> bytes:
         whole = struct.pack("<2q", output.t_ns, output.samples)
         reals = [value for value in output if isinstance(value, float)]

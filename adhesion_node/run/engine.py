@@ -128,6 +128,10 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
         return outputs
 
     @abstractmethod
+    def stamp_ns(self, output: Output) -> int:
+        """When it was so."""
+
+    @abstractmethod
     def _output(self, estimate: E) -> Output:
         """What is published of an estimate."""
 

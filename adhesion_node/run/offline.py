@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -19,12 +19,15 @@ from ..core.prediction import Prediction
 from ..wire import parameter_file
 from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.settings import SEED, SETTINGS, setup_of
-from ..wire.topics import ADHESION_INPUTS, POSITION, TRUTH, TRUTH_MU
+from ..wire.topics import ADHESION_INPUTS, POSITION, TRUTH_MU, TRUTH_STATE, Topic
+from .engine import EstimatorPipeline
 from .pipeline import Pipeline
 from .score import Truth, mean_relative_error_percent
 
-READ = {topic.name: topic for topic in (*ADHESION_INPUTS, *TRUTH)}
-"""The topics that are used, by name."""
+Recorded = tuple[str, Any, int]
+"""Our name of a message's topic, the message, its log time in ns."""
+
+Output = TypeVar("Output")
 
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
@@ -53,40 +56,46 @@ class Replayed(NamedTuple):
     """How long each full window took, estimate and curves included."""
 
 
-def replay(
-    pipeline: Pipeline, truth: Truth, recorded: Iterable[tuple[str, Any, int]], line: Line = NOMINAL
-) -> Replayed:
-    """Feed recorded messages to the pipeline, and the simulator's truth to `truth`.
-
-    A message comes with our name of its topic and its log time in ns; sensor messages are those of `line`.
-    """
+def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[Recorded], line: Line = NOMINAL) -> Replayed:
+    """Feed recorded messages to the pipeline, and the simulator's truth to `truth`."""
     replayed = Replayed([], [])
-    for name, message, log_ns in recorded:
-        if name not in READ:
-            continue
-        try:
-            read = READ[name].read(message, line)
-        except Rejected as refusal:
-            pipeline.refuse(name, refusal.reason)
-        else:
-            if READ[name] not in TRUTH:
-                _take_sample(pipeline, truth, replayed, read)
-            elif name == TRUTH_MU.name:
-                truth.mu[log_ns] = read
-            else:
-                truth.speed_mps[read.t_ns] = read.speed_mps
+    for sample, predictions, took_s in feed(pipeline, _noting(truth, recorded), ADHESION_INPUTS, line):
+        if isinstance(sample, PressureSample):
+            truth.pressure_pa[sample.t_ns] = sample.pressure_pa
+        if any(prediction.estimate.window >= pipeline.config.window for prediction in predictions):
+            replayed.window_ms.append(1e3 * took_s)
+        replayed.predictions.extend(predictions)
     replayed.predictions.extend(pipeline.finish())
     return replayed
 
 
-def _take_sample(pipeline: Pipeline, truth: Truth, replayed: Replayed, sample: Sample) -> None:
-    if isinstance(sample, PressureSample):
-        truth.pressure_pa[sample.t_ns] = sample.pressure_pa
-    started = time.perf_counter()
-    predictions = pipeline.push(sample)
-    if any(prediction.estimate.window >= pipeline.config.window for prediction in predictions):
-        replayed.window_ms.append(1e3 * (time.perf_counter() - started))
-    replayed.predictions.extend(predictions)
+def feed(
+    pipeline: EstimatorPipeline[Any, Any, Output], recorded: Iterable[Recorded], inputs: Sequence[Topic], line: Line
+) -> Iterator[tuple[Sample, list[Output], float]]:
+    """Push the messages of `inputs`; yield each sample, what it completed and how long that took, s."""
+    topics = {topic.name: topic for topic in inputs}
+    for name, message, _ in recorded:
+        if name not in topics:
+            continue
+        try:
+            sample = topics[name].read(message, line)
+        except Rejected as refusal:
+            pipeline.refuse(name, refusal.reason)
+        else:
+            started = time.perf_counter()
+            outputs = pipeline.push(sample)
+            yield sample, outputs, time.perf_counter() - started
+
+
+def _noting(truth: Truth, recorded: Iterable[Recorded]) -> Iterator[Recorded]:
+    """Pass the messages on, and note what the simulator knew."""
+    for name, message, log_ns in recorded:
+        if name == TRUTH_MU.name:
+            truth.mu[log_ns] = TRUTH_MU.read(message)
+        elif name == TRUTH_STATE.name:
+            state = TRUTH_STATE.read(message)
+            truth.speed_mps[state.t_ns] = state.speed_mps
+        yield name, message, log_ns
 
 
 def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, Any]:
@@ -111,7 +120,7 @@ def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, A
     return result
 
 
-def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[tuple[str, Any, int]]:
+def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[Recorded]:
     """Yield the recorded messages of `selection` under our names."""
     for record in reader.messages(selection):
         yield selection[record.topic], record.message, record.log_ns

@@ -34,6 +34,10 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         self.windows += estimate.window > 0
         return predict(self.config, estimate)
 
+    def stamp_ns(self, output: Prediction) -> int:
+        """When it was so."""
+        return output.estimate.t_ns
+
     def _bytes(self, output: Prediction) -> bytes:
         return _prediction_bytes(output)
 

@@ -22,7 +22,7 @@ from rclpy.parameter import Parameter
 
 from adhesion_node.core.creep.config import CreepConfig, Peak
 from adhesion_node.core.intake.samples import ForceSample, SpeedSample, WheelSample
-from adhesion_node.nodes.creep_estimator import OUTPUTS, PARAMETERS, CreepEstimator
+from adhesion_node.nodes.creep_estimator import PARAMETERS, CreepEstimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.run.creep_pipeline import CreepPipeline
 from adhesion_node.wire import topics
@@ -32,6 +32,8 @@ from sim_node.slip.scenario import DRY, WET, SlipScenario, find
 INPUTS = topics.CREEP_INPUTS
 PERIOD_S = 0.05
 """20 Hz: these tests compare runs, not accuracy."""
+
+OUTPUTS = (*topics.CREEP_RESULTS, topics.DIAGNOSTICS)
 
 
 @dataclass

@@ -34,6 +34,7 @@ from sim_node.train.plant import Truth
 from sim_node.train.run import run
 from sim_node.train.sensors import Reading
 
+S = 10**9
 FAST = {"iterations": 3, "particles": 10}
 """EM that is quick rather than good: these tests compare runs, not accuracy."""
 
@@ -232,3 +233,30 @@ def test_parameters_reach_the_configuration(context: Context) -> None:
     assert config.low_adhesion == "wet"
     assert len({spec.name for spec in PARAMETERS}) == len(PARAMETERS)
     node.destroy_node()
+
+
+def test_two_clocks_in_one_topic_are_told(line: Line) -> None:
+    """Positions of a second source, 4000 s ahead: each is counted, /diagnostics names the sensor and its distance."""
+    for _, reading in samples("tunnel_entry", 15.0, 18.0):
+        line.send_sample(reading)
+        assert reading.position_m is not None
+        line.send(topics.POSITION, messages.position(reading.t_ns + 4000 * S, reading.position_m, 0.5))
+    line.hear_all()
+    told = [array.status[0].message for array in line.heard[topics.DIAGNOSTICS]]
+    assert any("PositionSample" in text and "+4000 s from all others" in text for text in told)
+    values = line.values()
+    assert int(values["dropped.STRAY"]) >= 28
+    assert values["resets"] == "0"
+    assert line.estimator.latest is not None
+
+
+def test_silence_ends_the_wait_for_a_pressure(line: Line) -> None:
+    """The last positions come without a pressure, then nothing: they are used when the sensor counts as silent."""
+    readings = [reading for _, reading in samples("tunnel_entry", 15.0, 16.0)]
+    for reading in readings[:-2]:
+        line.send_sample(reading)
+    for reading in readings[-2:]:
+        assert reading.position_m is not None
+        line.send(topics.POSITION, messages.position(reading.t_ns, reading.position_m, 0.5))
+    assert line.estimator.pipeline.accepted < len(readings)
+    line.spin_until(line.executor, lambda: line.estimator.pipeline.accepted == len(readings))

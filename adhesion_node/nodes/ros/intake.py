@@ -32,8 +32,8 @@ class Listener(Protocol):
     def refuse(self, topic: Topic, refusal: Rejected) -> None:
         """Count a message that was refused."""
 
-    def settle(self) -> None:
-        """Use what waits for others of its time: the sensor has fallen silent."""
+    def settle(self, silent_s: float) -> None:
+        """Use what waits for others of its time: the sensor has been silent for so long."""
 
     def report(self) -> None:
         """Publish the state of affairs in /diagnostics."""
@@ -105,7 +105,7 @@ class Intake:
         return f"{name}: nothing received yet, publishers: {publishers}: is the sensor running, its topic remapped?"
 
     def _on_silence(self) -> None:
-        self._listener.settle()
+        self._listener.settle(self._silence.for_s or 0.0)
         self._listener.report()
 
     def _clocks(self) -> int:

@@ -1,0 +1,151 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""An estimator as a node: every message goes through its pipeline, as in an offline replay.
+
+Stamps drive the work. The one timer watches for silence: it ends waits and speaks in /diagnostics, no more.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Generic, NamedTuple, TypeVar
+
+from rclpy.node import Node
+from std_srvs.srv import SetBool, Trigger
+
+from adhesion_node.core import Event
+from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.run.engine import EstimatorPipeline
+from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import Line, Rejected
+from adhesion_node.wire.topics import Topic
+
+from . import qos
+from .diagnostics import Finding, next_stamp, status_message
+from .intake import Intake
+from .params import Spec, declare
+from .types import new
+
+P = TypeVar("P", bound=EstimatorPipeline[Any, Any, Any])
+
+
+class SetUp(NamedTuple, Generic[P]):
+    """What the parameters make of a node."""
+
+    pipeline: P
+    line: Line
+    sensor_timeout_s: float
+
+
+class Kind(NamedTuple, Generic[P]):
+    """What tells one estimator's node from another's."""
+
+    name: str
+    entry: str
+    """Of /diagnostics, behind the node's name."""
+    parameters: Sequence[Spec]
+    set_up: Callable[[Mapping[str, Any]], SetUp[P]]
+    inputs: Sequence[Topic]
+    """The last one must not fall silent."""
+    results: Sequence[Topic]
+    findings: Callable[[P], list[Finding]]
+    """How the estimation stands, in words, and the numbers behind it."""
+    values: Callable[[P], dict[str, str]]
+
+
+class EstimatingNode(Node, Generic[P]):
+    """`heard` counts the messages received by topic, refused ones included; `published` those sent."""
+
+    def __init__(self, kind: Kind[P], **kwargs: Any) -> None:
+        super().__init__(kind.name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        self._kind = kind
+        self.pipeline, line, timeout_s = kind.set_up(declare(self, kind.parameters))
+        self._reported_ns = 0
+        self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/{kind.entry}"
+        self.published: Counter[Topic] = Counter()
+        self._intake = Intake(self, self, kind.inputs, line, timeout_s)
+        outputs = (*kind.results, topics.DIAGNOSTICS)
+        self._outputs = {topic: qos.advertise(self, topic, tell=self._intake.tell) for topic in outputs}
+        self.create_service(Trigger, "~/reset", self._on_reset)
+        self.create_service(SetBool, "~/set_enabled", self._on_set_enabled)
+
+    @property
+    def heard(self) -> Counter[Topic]:
+        """Messages received by topic."""
+        return self._intake.heard
+
+    @property
+    def latest(self) -> Any:
+        """The newest estimate, withheld or not."""
+        return self.pipeline.last
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over every number so far, the same as that of an offline replay."""
+        return self.pipeline.digest
+
+    def close(self) -> None:
+        """Use what still waits and publish what it gives."""
+        self._publish(self.pipeline.finish())
+        counts = f"{self.pipeline.measurements} measurements, {self.pipeline.accepted} accepted"
+        self.get_logger().info(f"{counts}, dropped {self.pipeline.dropped or 'none'}, digest {self.digest}")
+
+    def take(self, sample: Any) -> tuple[Event, ...]:
+        """Use a sample and publish what it completes."""
+        outputs = self.pipeline.push(sample)
+        events = self.pipeline.events
+        self._publish(outputs)
+        return events
+
+    def settle(self, silent_s: float) -> None:
+        """Publish what has waited for others of its time; late ones may still come within the lag."""
+        if silent_s * 1e9 >= self.pipeline.state.gate.max_lag_ns:
+            self._publish(self.pipeline.settle())
+
+    def refuse(self, topic: Topic, refusal: Rejected) -> None:
+        """Count a refused message."""
+        self.pipeline.refuse(topic.name, refusal.reason)
+
+    def report(self) -> None:
+        """Publish the state of affairs in /diagnostics."""
+        self._report(self._intake.now_ns)
+
+    def _report(self, t_ns: int) -> None:
+        self._reported_ns = next_stamp(t_ns, self._reported_ns)
+        found = [*self._intake.findings(), *self._kind.findings(self.pipeline)]
+        suspect = self.pipeline.state.inbox.suspect
+        if suspect is not None:
+            text = f"{type(suspect).__name__} of {suspect.t_ns * 1e-9:.12g} s is set aside until a second stamp agrees"
+            found.append(Finding(Severity.WARN, text))
+        message = status_message(self._reported_ns, self._entry, found, self._kind.values(self.pipeline))
+        self._send(topics.DIAGNOSTICS, message)
+
+    def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._publish(self.pipeline.reset())
+        return self._answered(response, "reset", "started anew")
+
+    def _on_set_enabled(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
+        if self._intake.enabled and not request.data:
+            self._publish(self.pipeline.reset())
+        self._intake.enabled = request.data
+        return self._answered(response, "set_enabled", "enabled" if request.data else "disabled: nothing is identified")
+
+    def _answered(self, response: Any, service: str, message: str) -> Any:
+        response.success, response.message = True, message
+        self.get_logger().info(f"~/{service}: {message}")
+        self.report()
+        return response
+
+    def _publish(self, outputs: Sequence[Any]) -> None:
+        for output in outputs:
+            for topic in self._kind.results:
+                message = topic.build(new, output)
+                if message is not None:
+                    self._send(topic, message)
+            self._report(self.pipeline.stamp_ns(output))
+
+    def _send(self, topic: Topic, message: Any) -> None:
+        self._outputs[topic].publish(message)
+        self.published[topic] += 1
