@@ -15,7 +15,7 @@ from ...core import Config, Estimate, finish, init, step
 from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
 from ..baselines.ekf import TUNED, EkfConfig, Tuning, ekf_init, ekf_step
-from ..xie import lockstep
+from . import lockstep
 from .world import Refusal, SimulatedRun
 
 

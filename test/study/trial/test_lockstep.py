@@ -12,7 +12,7 @@ import numpy as np
 from oracles import drive, ride
 
 from adhesion_node.core import Config, Estimate
-from adhesion_node.study.xie import lockstep
+from adhesion_node.study.trial import lockstep
 
 CONFIG = Config(method="particle_em", iterations=5, window=20, step=6)
 
