@@ -53,7 +53,7 @@ class LaneResults(NamedTuple):
 
     results: list[LaneResult]
     window_ms: list[float]
-    """Time per window, all included: of each lane, or of each moment's windows together."""
+    """Time per window, all included, or per estimate without windows: of each lane, or of a moment's windows."""
 
 
 class Estimator(NamedTuple):
@@ -135,7 +135,9 @@ def _one_by_one(run: Callable[[Estimator, Lane], LaneResult]) -> Callable[[Estim
         for lane in lanes:
             started = time.perf_counter()
             results.append(run(estimator, lane))
-            window_ms.append(1e3 * (time.perf_counter() - started) / max(len(results[-1].outputs), 1))
+            spent_ms, outputs = 1e3 * (time.perf_counter() - started), results[-1].outputs
+            windows = sum(output.prediction.estimate.window > 0 for output in outputs)
+            window_ms.append(spent_ms / max(windows or len(outputs), 1))
         return LaneResults(results, window_ms)
 
     return tried
