@@ -286,7 +286,7 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
         pipeline.push(PositionSample(START_NS + after_ns, place, 0.25))
         if number % 2_000 == 1_999:
             inbox = pipeline.state.inbox
-            kept = (pipeline.state.window, inbox.anchors, [*inbox.others.values()], inbox.suspect)
+            kept = (pipeline.state.window, inbox.anchors, [*inbox.others.values()], inbox.suspects)
             sizes.append(len(pickle.dumps(kept)))
     steps = pipeline.accepted / pipeline.config.step
     assert evaluations["done"] <= steps + pipeline.state.counts[Outcome.RESET] + 1

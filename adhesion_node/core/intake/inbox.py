@@ -5,11 +5,14 @@
 
 One sensor is the anchor: its samples are released in order, each with what the others measured at its time
 (`pairing`). A stamp far from all others is set aside until a second one agrees with it: a single wrong stamp stops
-nothing. Only stamps decide, never a clock: a live node and an offline replay pair alike.
+nothing. A sensor in order clears only what it has set aside itself, and no time begins anew without an anchor: the
+wrong clock of another sensor stops nothing either. Only stamps decide, never a clock: a live node and an offline replay
+pair alike.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -31,21 +34,27 @@ class Pushed(NamedTuple):
 
 def push(gate: Gate, inbox: Inbox, sample: Sample) -> Pushed:
     """Take one sample; return what is complete now."""
-    t_ns, now_ns, suspect = sample.t_ns, inbox.now_ns, inbox.suspect
+    t_ns, now_ns, suspects = sample.t_ns, inbox.now_ns, inbox.suspects
+    of_kind = tuple(each for each in suspects if type(each) is type(sample))
+    of_others = tuple(each for each in suspects if type(each) is not type(sample))
     if now_ns is None or now_ns - gate.reset_ns <= t_ns <= now_ns + gate.far_ns:
-        return _with(_stray(inbox), _take(gate, inbox._replace(suspect=None), sample))
-    if suspect is None:
-        return Pushed(inbox._replace(suspect=sample))
-    if t_ns == suspect.t_ns and type(sample) is type(suspect):
+        return _with(_strays(now_ns, of_kind), _take(gate, inbox._replace(suspects=of_others), sample))
+    if any(each.t_ns == t_ns for each in of_kind):
         return Pushed(inbox, events=(_doubled(sample),))
-    if abs(t_ns - suspect.t_ns) >= abs(t_ns - now_ns):
-        return Pushed(inbox._replace(suspect=sample), events=_stray(inbox))
-    return _jump(gate, inbox._replace(suspect=None), *sorted((suspect, sample), key=lambda each: each.t_ns))
+    near_ns = min(abs(t_ns - now_ns), gate.reset_ns)
+    agreeing = [each for each in suspects if abs(each.t_ns - t_ns) < near_ns]
+    together = sorted((*agreeing, sample), key=lambda each: each.t_ns)
+    is_gap = now_ns <= together[0].t_ns and together[-1].t_ns <= now_ns + gate.reset_ns
+    if agreeing and (is_gap or any(isinstance(each, gate.anchor | Measurement) for each in together)):
+        left = tuple(each for each in suspects if each not in agreeing)
+        return _jump(gate, inbox._replace(suspects=left), is_gap, together)
+    return Pushed(inbox._replace(suspects=(*of_others, sample)), events=_strays(now_ns, of_kind))
 
 
 def drain(gate: Gate, inbox: Inbox) -> Pushed:
     """End of the data: all that waits, with what is known so far; what is set aside was stray."""
-    return _with(_stray(inbox), settle(gate, inbox._replace(suspect=None)))
+    strays = _strays(inbox.now_ns, inbox.suspects)
+    return _with(strays, settle(gate, inbox._replace(suspects=())))
 
 
 def settle(gate: Gate, inbox: Inbox) -> Pushed:
@@ -63,9 +72,10 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
         of_others = Outcome.REPEATED if refused is Outcome.DUPLICATE else refused
         return Pushed(inbox, events=(Event(of_others, _named(sample)),))
     in_order, stream = not stream.has_reached(sample.t_ns), stream.added(sample)
-    passed_ns = (inbox.released_ns or 0) - gate.kept_ns
-    # what comes out of order may belong to a time that is about to begin anew
-    stream = stream.since(passed_ns if in_order else stream.samples[0].t_ns)
+    first_ns = stream.samples[0].t_ns  # what comes out of order may belong to a time that is about to begin anew
+    if in_order and inbox.released_ns is not None:
+        first_ns = inbox.released_ns - gate.kept_ns
+    stream = stream.since(first_ns)
     inbox = inbox._replace(now_ns=_newest(inbox.now_ns, sample)).with_stream(type(sample), stream)
     return Pushed(*release(gate, inbox, due(gate, inbox)))
 
@@ -74,12 +84,12 @@ def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     t_ns, newest_ns, released_ns = anchor.t_ns, inbox.anchors.newest_ns, inbox.released_ns
     if t_ns == released_ns:
         return Pushed(inbox, events=(_doubled(anchor),))
-    if newest_ns is not None and t_ns < max(newest_ns - gate.max_lag_ns, released_ns or t_ns):
+    if newest_ns is not None and t_ns < max(newest_ns - gate.max_lag_ns, t_ns if released_ns is None else released_ns):
         return _late(gate, inbox, anchor, newest_ns)
     refused = inbox.anchors.refusal(t_ns)
     if refused is not None:
         return Pushed(inbox, events=(Event(refused, _named(anchor)),))
-    begins = newest_ns is None or t_ns > newest_ns + gate.far_ns
+    begins = newest_ns is None or t_ns > newest_ns + gate.far_ns or 0 < inbox.begun_ns - t_ns <= gate.far_ns
     inbox = inbox._replace(
         now_ns=_newest(inbox.now_ns, anchor),
         anchors=inbox.anchors.added(anchor),
@@ -90,22 +100,23 @@ def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
 
 
 def _late(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> Pushed:
-    """Drop a late anchor; after enough of them in a row, each after the other, begin anew with it."""
+    """Drop a late anchor; after enough of them in a row begin anew with the next that is after the one before."""
     count, before_ns = inbox.late
-    count = count + 1 if anchor.t_ns > before_ns else 1
-    if count >= gate.late_run:
+    count = count + 1
+    if count >= gate.late_run and anchor.t_ns > before_ns:
         return _anew(gate, inbox, anchor)
     event = Event(Outcome.LATE, f"{_named(anchor)}, {(newest_ns - anchor.t_ns) / S:g} s behind the newest")
     return Pushed(inbox._replace(late=(count, anchor.t_ns)), events=(event,))
 
 
-def _jump(gate: Gate, inbox: Inbox, first: Any, second: Any) -> Pushed:
-    """Two stamps agree that time has jumped: a gap, or where it is long or back, another time."""
-    now_ns = inbox.now_ns or 0
-    gap = now_ns <= first.t_ns <= now_ns + gate.reset_ns
-    one = _take(gate, inbox, first) if gap else _anew(gate, inbox, first)
-    two = _take(gate, one.inbox, second)
-    return Pushed(two.inbox, one.matched + two.matched, one.events + two.events, one.ended + two.ended)
+def _jump(gate: Gate, inbox: Inbox, is_gap: bool, samples: Sequence[Any]) -> Pushed:
+    """Stamps agree that time has jumped: a gap, or where it is long or back, another time."""
+    first, *others = samples
+    pushed = _take(gate, inbox, first) if is_gap else _anew(gate, inbox, first)
+    for sample in others:
+        inbox, matched, events, ended = _take(gate, pushed.inbox, sample)
+        pushed = Pushed(inbox, pushed.matched + matched, pushed.events + events, pushed.ended + ended)
+    return pushed
 
 
 def _anew(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
@@ -113,7 +124,7 @@ def _anew(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     low, high = sample.t_ns - gate.reset_ns, sample.t_ns + gate.far_ns
     others = {kind: stream.between(low, high) for kind, stream in inbox.others.items()}
     newest = [stream.newest_ns for stream in others.values() if stream.newest_ns is not None]
-    fresh = Inbox(max(newest, default=None), others=MappingProxyType(others))
+    fresh = Inbox(max(newest, default=None), others=MappingProxyType(others), suspects=inbox.suspects)
     event = Event(Outcome.RESET, f"stamps went from {(inbox.now_ns or 0) / S:.12g} to {sample.t_ns / S:.12g} s")
     return _with((event,), _take(gate, fresh, sample))._replace(ended=settle(gate, inbox).matched)
 
@@ -130,12 +141,10 @@ def _doubled(sample: Any) -> Event:
     return Event(Outcome.DUPLICATE, _named(sample))
 
 
-def _stray(inbox: Inbox) -> tuple[Event, ...]:
-    """What becomes of a sample set aside with which none agrees."""
-    if inbox.suspect is None:
-        return ()
-    apart_s = (inbox.suspect.t_ns - (inbox.now_ns or 0)) / S
-    return (Event(Outcome.STRAY, f"{_named(inbox.suspect)}, {apart_s:+g} s from all others"),)
+def _strays(now_ns: int | None, suspects: Iterable[Any]) -> tuple[Event, ...]:
+    """What becomes of samples set aside with which none agrees."""
+    apart_s = [(each, (each.t_ns - (now_ns or 0)) / S) for each in suspects]
+    return tuple(Event(Outcome.STRAY, f"{_named(each)}, {apart:+g} s from all others") for each, apart in apart_s)
 
 
 def _with(events: tuple[Event, ...], pushed: Pushed) -> Pushed:

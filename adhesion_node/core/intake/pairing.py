@@ -49,7 +49,7 @@ class Gate(NamedTuple):
     reset_ns: int
     """So is one further back. A jump of the time further than this, or back, begins anew."""
     late_run: int
-    """So many late anchors in a row, each after the other, show that the time has gone back."""
+    """So many late anchors in a row show that the time has gone back."""
 
     @property
     def kept_ns(self) -> int:
@@ -76,8 +76,8 @@ class Inbox(NamedTuple):
     anchors: Stream = Stream()
     """Anchors that wait."""
     others: Mapping[type[Any], Stream] = MappingProxyType({})
-    suspect: Any | None = None
-    """A sample stamped far from all others, set aside."""
+    suspects: tuple[Any, ...] = ()
+    """Samples stamped far from all others, set aside: at most one of each sensor."""
     late: tuple[int, int] = (0, 0)
     """Late anchors in a row, and the stamp of the last one."""
 

@@ -115,8 +115,7 @@ class EstimatingNode(Node, Generic[P]):
     def _report(self, t_ns: int) -> None:
         self._reported_ns = next_stamp(t_ns, self._reported_ns)
         found = [*self._intake.findings(), *self._kind.findings(self.pipeline)]
-        suspect = self.pipeline.state.inbox.suspect
-        if suspect is not None:
+        for suspect in self.pipeline.state.inbox.suspects:
             text = f"{type(suspect).__name__} of {suspect.t_ns * 1e-9:.12g} s is set aside until a second stamp agrees"
             found.append(Finding(Severity.WARN, text))
         message = status_message(self._reported_ns, self._entry, found, self._kind.values(self.pipeline))

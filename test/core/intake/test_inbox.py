@@ -184,16 +184,59 @@ def test_a_jump_brings_no_old_pressure_and_loses_no_position(jump_s: float) -> N
 def test_a_single_stray_stamp_is_set_aside_then_dropped() -> None:
     feeder = running()
     feeder.push(position(31.0))
-    assert feeder.inbox.suspect == position(31.0)
+    assert feeder.inbox.suspects == (position(31.0),)
     feeder.push(pressure(1.1, 1.0), position(1.1))
     assert feeder.outcomes == [Outcome.STRAY]
-    assert feeder.inbox.suspect is None
+    assert not feeder.inbox.suspects
 
 
 def test_a_stray_stamp_sent_twice_does_not_agree_with_itself() -> None:
     feeder = running()
     feeder.push(position(31.0), position(31.0), position(1.1))
     assert feeder.outcomes == [Outcome.DUPLICATE, Outcome.STRAY]
+
+
+@pytest.mark.parametrize("per_position", [1, 3])
+@pytest.mark.parametrize("off_s", [-3600.0, -100.0, -3.0, 3.0, 100.0, 3600.0])
+@pytest.mark.parametrize("first", [0, 50])
+def test_the_wrong_clock_of_a_pressure_keeps_no_position_back(first: int, off_s: float, per_position: int) -> None:
+    """It comes before the first position or later, as often or more often."""
+    feeder = Feeder()
+    for tick in range(100):
+        if tick >= first:
+            feeder.push(*(pressure(5000 + tick / 10 + k / 100 + off_s, 1.0) for k in range(per_position)))
+        feeder.push(position(5000 + tick / 10))
+    feeder.drain()
+    assert [each.anchor.t_ns for each in feeder.matched] == [round((5000 + tick / 10) * S) for tick in range(100)]
+    assert feeder.outcomes.count(Outcome.RESET) <= 1
+
+
+def test_wild_stamps_do_not_agree_with_each_other() -> None:
+    feeder = running()
+    feeder.push(position(6.0), position(4000.0), pressure(9000.0, 1.0), position(1.1))
+    assert feeder.outcomes == [Outcome.STRAY] * 2
+    assert feeder.inbox.suspects == (pressure(9000.0, 1.0),)
+
+
+def test_a_loop_of_fewer_anchors_than_a_late_run_begins_anew_too() -> None:
+    feeder = Feeder(gate_of(Config(max_outliers=20)))
+    for _ in range(6):
+        feeder.push(*(position(k) for k in range(12)))
+    assert feeder.outcomes.count(Outcome.RESET) == 2
+
+
+def test_stamps_before_the_epoch_are_paired_as_all_others() -> None:
+    samples = [sample for k in range(-1000, -900) for sample in (pressure(k / 10, k), position(k / 10))]
+    feeder = Feeder()
+    feeder.push(*samples)
+    feeder.drain()
+    assert pressures(feeder.matched) == list(range(-1000, -900))
+
+
+def test_the_first_anchor_that_is_sorted_in_has_its_pressure() -> None:
+    feeder = Feeder(gate_of(Config(max_lag_s=0.5)))
+    feeder.push(pressure(1.0, 1.0), pressure(1.1, 2.0), position(1.1), position(1.0))
+    assert pressures(feeder.drain()) == [1.0, 2.0]
 
 
 def test_late_anchors_in_a_row_are_a_step_back_in_time() -> None:
@@ -261,7 +304,7 @@ def test_silence_ends_every_wait_but_that_of_a_stray_stamp() -> None:
     feeder.push(position(1.1), position(31.0))
     settled = settle(feeder.gate, feeder.inbox)
     assert [each.anchor for each in settled.matched] == [position(1.1)]
-    assert settled.inbox.suspect == position(31.0)
+    assert settled.inbox.suspects == (position(31.0),)
 
 
 class TestCreep:
