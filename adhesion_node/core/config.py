@@ -42,6 +42,45 @@ class Config:
     change_threshold: float = setting(
         3.5, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
     )
+    change_edge: int = setting(
+        5, "Steps at either end of a window in which a change is not looked for", low=1, high=1000
+    )
+    change_margin: float = setting(
+        2.0,
+        "By how much the log odds of a changed rail must exceed those of a step of the positions, or fall below them; "
+        "else the next windows decide",
+        low=0.0,
+        high=1e6,
+    )
+    position_step_std_m: float = setting(
+        3.0, "By how much a balise may correct the positions, standard deviation", "m", 1e-3, 1e4
+    )
+    position_step_log_odds: float = setting(
+        5.0, "Log odds that such a step needs beyond change_threshold; heavy tails look like one", low=0.0, high=1e6
+    )
+    position_step_spacing_m: float = setting(
+        200.0, "Distance behind such a step within which there is no other one", "m", 0.0, 1e6
+    )
+    restart_sigma: float = setting(
+        5.0,
+        "Difference of its speed from the tracker's, in standard deviations, at which a window has lost the train",
+        low=3.0,
+        high=1e6,
+    )
+    restart_s: float = setting(2.0, "Time after which such a window begins anew at the tracker", "s", 0.0, 60.0)
+    limit_margin_sigma: float = setting(
+        2.0,
+        "Standard deviations by which the rail condition must stay below the brake's limit for a step to tell of it",
+        low=0.0,
+        high=100.0,
+    )
+    shortest_window_s: float = setting(
+        4.5,
+        "Time up to which a window grows beyond S while it cannot tell adhesion from the brake's limit",
+        "s",
+        0.0,
+        60.0,
+    )
     tail_dof: float = setting(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
     identify_noise: bool = setting(
         False, "Identify the variance of the positions by the same EM, from the given one on"

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .belief import tracker
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail, age, ignorance
 from .belief.regime import Regime
@@ -61,6 +62,8 @@ class Knowledge(NamedTuple):
     t_ns: int = 0
     position_m: float = 0.0
     """When and where the rail was known so."""
+    astray_ns: int | None = None
+    """Since when the speed of the windows has been away from the tracker's; None: it is not."""
 
     def aged(self, config: Config, t_ns: int, belief: Gaussian) -> Rail:
         """The rail as it was known, aged to `t_ns` and the belief of (s, v); ignorance before the first window."""
@@ -91,11 +94,17 @@ def judge(
     belief: Gaussian,
     window: MethodWindow | None,
     knowledge: Knowledge,
-) -> Verdict:
-    """Evaluate the window, if there is one, on top of what was known; `belief` is the tracker's at `newest`."""
-    rail = knowledge.aged(config, newest.t_ns, belief)
+) -> tuple[Verdict, Knowledge]:
+    """Evaluate the window, if there is one, on top of what was known; `belief` is the tracker's at `newest`.
+
+    The tracker knows less but assumes less. Windows whose speed has been `restart_sigma` away from its own for
+    `restart_s` have lost the train, be it by steps of the positions that were none: what they taught is forgotten, and
+    a new one begins at the tracker's belief. For a moment it is the tracker that is off, behind a true step.
+    """
+    t_ns, rail = newest.t_ns, knowledge.aged(config, newest.t_ns, belief)
     if window is None or len(window.samples) < 2:
-        return Verdict(Regime.COASTING, rail, belief, window)
+        verdict = Verdict(Regime.COASTING, rail, belief, window)
+        return verdict, knowledge.after(t_ns, verdict)
     measured = newest.brake_pressure_pa is not None
     context = Context(
         rail=rail,
@@ -104,7 +113,17 @@ def judge(
         lowest_mu=0.0 if measured else LOWEST_NET_ADHESION,
         rng=np.random.default_rng([seed, knowledge.windows]),
     )
-    return method.evaluate(config, window, context)
+    verdict = method.evaluate(config, window, context)
+    known = knowledge.after(t_ns, verdict)
+    if tracker.speed_apart(belief, verdict.belief) < config.restart_sigma:
+        return verdict, known
+    since = t_ns if knowledge.astray_ns is None else knowledge.astray_ns
+    if t_ns - since < config.restart_s * 1e9:
+        return verdict, known._replace(astray_ns=since)
+    anew = Knowledge(windows=known.windows, changes=known.changes)
+    opened = method.open(belief, window.samples[-1], window)
+    restarted = Verdict(Regime.COASTING, anew.aged(config, t_ns, belief), belief, opened)
+    return restarted, anew.after(t_ns, restarted)
 
 
 def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:

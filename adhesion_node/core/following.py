@@ -104,8 +104,7 @@ def _estimate(config: Config, state: State) -> tuple[State, Verdict, Estimate]:
     newest, belief, knowledge = state.newest, state.belief, state.knowledge
     assert newest is not None  # an estimate follows an accepted measurement
     assert belief is not None
-    verdict = judge(config, state.method, state.seed, newest, belief, state.window, knowledge)
-    knowledge = knowledge.after(newest.t_ns, verdict)
+    verdict, knowledge = judge(config, state.method, state.seed, newest, belief, state.window, knowledge)
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)
     state = state._replace(window=verdict.window, knowledge=knowledge, since_estimate=0, seen=estimate)
     return state, verdict, estimate

@@ -28,7 +28,6 @@ from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sa
 from adhesion_node.core.methods.particle_em import method as particle_em
 from adhesion_node.core.methods.particle_em.method import ParticleWindow, evaluate
 from adhesion_node.core.methods.protocol import Context, MethodWindow, Verdict
-from adhesion_node.core.methods.rail_condition.method import SHORT_S
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
@@ -130,7 +129,7 @@ class Watched:
         pipeline, config = self.pipeline, self.pipeline.config
         window = pipeline.state.window
         if window is not None and len(window.samples) >= config.window + config.step:
-            assert _lasted_s(window, config.step) < SHORT_S
+            assert _lasted_s(window, config.step) < config.shortest_window_s
 
     def refuse(self, topic: str, refusal: Rejected) -> None:
         assert Reason[refusal.reason].value in str(refusal)

@@ -51,6 +51,15 @@ def correct(predicted: Gaussian, measurement: Measurement, speed_variance: float
     return law
 
 
+def speed_apart(tracked: Gaussian, other: Gaussian) -> float:
+    """How far another belief's speed lies from the tracker's, in standard deviations of their difference.
+
+    The variances are added, as if nothing that both have seen were the same.
+    """
+    variance = tracked.covariance[1, 1] + other.covariance[1, 1]
+    return abs(float(other.mean[1] - tracked.mean[1])) / math.sqrt(variance)
+
+
 def is_settled(law: Gaussian, measured_rate: float) -> bool:
     """Whether the speed is known about as well as the tracker can know it under the brake.
 

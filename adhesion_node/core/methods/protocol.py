@@ -89,8 +89,11 @@ class Method(Protocol[Window]):
         """What it does, for the description of the setting `method`."""
         ...
 
-    def open(self, prior: Gaussian, sample: Sample) -> Window:
-        """Open a window at a braking's first sample; `prior` is the belief of (s, v) there, the sample included."""
+    def open(self, prior: Gaussian, sample: Sample, replaced: Window | None = None) -> Window:
+        """Open a window at a sample; `prior` is the belief of (s, v) there, the sample included.
+
+        `replaced` is the window that it takes the place of within a braking, as that had lost the train.
+        """
         ...
 
     def extend(self, window: Window, sample: Sample) -> Window:

@@ -47,8 +47,8 @@ class Prepared(NamedTuple):
     verdicts: Iterator[Verdict]
     summary: str = METHOD.summary
 
-    def open(self, prior: Gaussian, sample: Sample) -> ParticleWindow:
-        return METHOD.open(prior, sample)
+    def open(self, prior: Gaussian, sample: Sample, replaced: ParticleWindow | None = None) -> ParticleWindow:
+        return METHOD.open(prior, sample, replaced)
 
     def extend(self, window: ParticleWindow, sample: Sample) -> ParticleWindow:
         return METHOD.extend(window, sample)

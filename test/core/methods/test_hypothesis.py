@@ -14,10 +14,10 @@ from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.methods.rail_condition.hypotheses import (
     Hypothesis,
-    drifted,
     hypotheses,
     probabilities,
     scaled,
+    widened,
     with_rail,
 )
 from adhesion_node.core.methods.rail_condition.problem import Belief
@@ -76,8 +76,8 @@ def test_scaling_there_and_back() -> None:
     assert back.covariance == pytest.approx(BELIEF.covariance)
 
 
-def test_drift_is_relative_and_leaves_the_rest() -> None:
-    later = drifted(BELIEF, 0.01)
+def test_one_component_is_widened_and_the_rest_left() -> None:
+    later = widened(BELIEF, 2, 0.01 * 0.06**2)
     assert later.covariance[2, 2] == pytest.approx(1.6e-5 + 0.01 * 0.06**2)
     assert np.array_equal(later.mean, BELIEF.mean)
     later.covariance[2, 2] = BELIEF.covariance[2, 2]

@@ -43,8 +43,9 @@ class ParticleEm:
 
     summary: str = "constant mu, the paper's"
 
-    def open(self, prior: Gaussian, sample: Sample) -> ParticleWindow:
+    def open(self, prior: Gaussian, sample: Sample, replaced: ParticleWindow | None = None) -> ParticleWindow:
         """Open a window at the sample, of which `prior` holds the position already."""
+        del replaced  # it knows nothing that would outlive it
         return ParticleWindow(prior, (sample,))
 
     def extend(self, window: ParticleWindow, sample: Sample) -> ParticleWindow:

@@ -83,8 +83,8 @@ def probabilities(hypotheses: Sequence[Hypothesis]) -> Array:
     return result
 
 
-def drifted(belief: Belief, variance: float) -> Belief:
-    """Law after kappa has drifted, relative to itself, by that variance."""
+def widened(belief: Belief, component: int, variance: float) -> Belief:
+    """Add a variance to one component of a belief of (s, v, x)."""
     covariance = belief.covariance.copy()
-    covariance[2, 2] += variance * belief.mean[2] ** 2
+    covariance[component, component] += variance
     return belief._replace(covariance=covariance)

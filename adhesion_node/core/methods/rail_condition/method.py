@@ -22,34 +22,16 @@ from ...belief.regime import Regime
 from ...belief.window import Sample, window_of
 from ...physics.train import Array
 from ..protocol import Context, Fit, Verdict, spent
-from .changes import Change, change, position_step
-from .hypotheses import NEGLIGIBLE, Hypothesis, drifted, hypotheses, probabilities, scaled, with_rail
+from .branch import Branch, smoothed_branch
+from .detection import detect
+from .hypotheses import NEGLIGIBLE, Hypothesis, hypotheses, probabilities, widened, with_rail
 from .judgement import judge, most_used
 from .noise import Noise, learn_noise
-from .problem import Belief, Model, Problem
-from .smoother import Search, Smoothed, posterior, smooth
+from .problem import Belief
+from .smoother import posterior
 
 if TYPE_CHECKING:
     from ...config import Config
-
-EDGE = 5
-"""Steps at either end of a window in which a change of the rail is not looked for."""
-
-STEP_STD_M = 3.0
-"""By how much a balise may correct the positions."""
-
-RARER = 5.0
-"""Log odds that such a correction needs beyond those of a change of the rail; heavy tails look like one."""
-
-CLEARLY = 2.0
-"""By how much the log odds of one must exceed those of the other; else the next windows decide."""
-
-CLEAR = 2.0
-"""Standard deviations by which kappa must stay below the brake's limit for a step to tell of it."""
-
-
-SHORT_S = 4.5
-"""Time up to which a window grows beyond S measurements while it cannot yet tell kappa from the brake's limit."""
 
 
 class ConditionWindow(NamedTuple):
@@ -65,22 +47,8 @@ class ConditionWindow(NamedTuple):
     """Smoothed positions and speeds of its first samples, from the last evaluation; where the next one begins."""
     known: Rail | None = None
     """The rail as it was known when the braking began; None when it has changed since."""
-
-
-class Found(NamedTuple):
-    """What a window says under one hypothesis."""
-
-    before: Hypothesis
-    """As it stood at the window's first sample."""
-    problem: Problem
-    smoothed: Smoothed
-    now: Hypothesis
-    """As it stands at the newest one."""
-
-    @property
-    def margin(self) -> float:
-        """Headroom from which a step tells of kappa."""
-        return CLEAR * math.sqrt(self.now.belief.covariance[2, 2])
+    stepped_m: float = -math.inf
+    """Position of the last step of the measured positions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,9 +57,14 @@ class RailCondition:
 
     summary: str = "a factor on the speed law, by a Gaussian smoother"
 
-    def open(self, prior: Gaussian, sample: Sample) -> ConditionWindow:
-        """Open a window at the sample, of which `prior` holds the position already."""
-        return ConditionWindow(prior, (sample,))
+    def open(self, prior: Gaussian, sample: Sample, replaced: ConditionWindow | None = None) -> ConditionWindow:
+        """Open a window at the sample, of which `prior` holds the position already.
+
+        Of a window that it takes the place of, it keeps what is known of the position sensor.
+        """
+        if replaced is None:
+            return ConditionWindow(prior, (sample,))
+        return ConditionWindow(prior, (sample,), noise=replaced.noise, stepped_m=replaced.stepped_m)
 
     def extend(self, window: ConditionWindow, sample: Sample) -> ConditionWindow:
         """Return the window with one more sample."""
@@ -104,24 +77,19 @@ class RailCondition:
         """
         if not window.hypotheses:
             before = with_rail(window.prior, context.rail)
-            window = window._replace(hypotheses=_opened(config, before), known=context.rail)
-        arrays = window_of(window.samples, window.noise.factor)
-        start = config.start_mu if context.mu is None else None
-        found = list[Found]()
-        for hypothesis in window.hypotheses:
-            near = found[0].smoothed.trajectory if found else window.trajectory
-            model = Model(config.motion, hypothesis.law, config.tail_dof)
-            problem = Problem(model, arrays, hypothesis.belief)
-            found.append(_find(config, problem, hypothesis, (start, context.lowest_mu), near))
-        leading = max(found, key=lambda each: each.now.log_weight)
-        changed = _changed(config, found, leading)
-        now = tuple(each.now for each in found) if changed is None else changed.hypotheses
-        belief = _state(leading.now.belief if changed is None else now[0].belief)
-        if changed is not None and changed.certain:
-            known = None if changed.of_rail else window.known
-            following = ConditionWindow(belief, window.samples[-1:], now, window.noise, known=known)
+            opened = hypotheses(config.speed_law, config.low_law, config.law_probability, before)
+            window = window._replace(hypotheses=opened, known=context.rail)
+        branches = _branches(config, window, context)
+        leading = max(branches, key=lambda each: each.now.log_weight)
+        detected = detect(config, branches, leading, window.stepped_m)
+        now = tuple(each.now for each in branches) if detected is None else detected.hypotheses
+        belief = _state(leading.now.belief if detected is None else now[0].belief)
+        if detected is not None and detected.certain:
+            following = window._replace(prior=belief, samples=window.samples[-1:], hypotheses=now, trajectory=None)
+            newest_m = window.samples[-1].position_m
+            following = following._replace(**({"known": None} if detected.of_rail else {"stepped_m": newest_m}))
         else:
-            following = _following(config, window, found)
+            following = _following(config, window, branches)
         limit = most_used(config, window.samples, leading.smoothed.trajectory[:, 1], leading.now.mu)
         regime, rail = judge(config, now, context.rail, following.known, limit)
         if not context.pressure_measured and rail.mu <= 2.0 * rail.std:
@@ -133,103 +101,55 @@ class RailCondition:
             log_likelihood=leading.now.log_weight,
             shape=leading.now.law,
         )
-        rail_changed = changed is not None and changed.of_rail
+        rail_changed = detected is not None and detected.of_rail
         return Verdict(regime, rail, belief, following, mu=leading.now.mu, changed=rail_changed, fit=fit)
 
 
-def _opened(config: Config, belief: Belief) -> tuple[Hypothesis, ...]:
-    """All hypotheses, from the law of (s, v, mu)."""
-    return hypotheses(config.speed_law, config.low_law, config.law_probability, belief)
+def _branches(config: Config, window: ConditionWindow, context: Context) -> list[Branch]:
+    """The window under each hypothesis; the first one's trajectory is where the others begin."""
+    arrays = window_of(window.samples, window.noise.factor)
+    start = config.start_mu if context.mu is None else None
+    branches: list[Branch] = []
+    for before in window.hypotheses:
+        near = branches[0].smoothed.trajectory if branches else window.trajectory
+        branches.append(smoothed_branch(config, arrays, before, near, start, context.lowest_mu))
+    return branches
 
 
 def _state(belief: Belief) -> Gaussian:
     return Gaussian(belief.mean[:2], belief.covariance[:2, :2])
 
 
-def _find(
-    config: Config, problem: Problem, before: Hypothesis, search: tuple[float | None, float], near: Array | None
-) -> Found:
-    start, lowest = search
-    _, speed, kappa = before.belief.mean
-    scale = float(before.law(speed))
-    smoothed = smooth(
-        problem,
-        Search(
-            start=kappa if start is None else start / scale,
-            lowest=lowest / scale,
-            tolerance=config.tolerance / scale,
-            iterations=config.iterations,
-        ),
-        near,
-    )
-    # Where the brake limits, this is the law of the adhesion that it uses.
-    now = posterior(problem, smoothed, -math.inf)
-    return Found(before, problem, smoothed, Hypothesis(before.law, now.belief, before.log_weight + now.log_evidence))
-
-
-class Changed(NamedTuple):
-    """A change within the window."""
-
-    hypotheses: tuple[Hypothesis, ...]
-    """At the newest sample."""
-    of_rail: bool
-    """Of the rail, or only of the positions' origin."""
-    certain: bool
-    """Whether it has happened; else the rail is taken as it was, until the next windows tell."""
-
-
-def _changed(config: Config, found: Sequence[Found], leading: Found) -> Changed | None:
-    """The change that the window has seen, of the rail or of the positions, whichever explains it better."""
-    if leading.problem.window.steps < 2 * EDGE:
-        return None
-    rail, place = _rail_change(config, leading), _place_step(leading)
-    if max(rail.log_odds, place.log_odds) < config.change_threshold:
-        return None
-    if rail.log_odds > place.log_odds + CLEARLY:
-        belief = scaled(rail.belief, float(leading.before.law(rail.belief.mean[1])))
-        return Changed(_opened(config, belief), of_rail=True, certain=True)
-    # the laws as they weighed before: each explains a part of the step as best it can
-    stepped = tuple(each.before._replace(belief=_place_step(each).belief) for each in found)
-    needed = max(config.change_threshold + RARER, rail.log_odds + CLEARLY)
-    return Changed(stepped, of_rail=False, certain=place.log_odds > needed)
-
-
-def _rail_change(config: Config, found: Found) -> Change:
-    before, last = found.before, found.problem.window.steps - EDGE
-    jump_std = config.unknown_std / float(before.law(before.belief.mean[1]))
-    return change(found.problem, found.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), jump_std)
-
-
-def _place_step(found: Found) -> Change:
-    last = found.problem.window.steps - EDGE + 2
-    return position_step(found.problem, found.smoothed, np.arange(EDGE, last + 1, dtype=np.intp), STEP_STD_M)
-
-
-def _following(config: Config, window: ConditionWindow, found: Sequence[Found]) -> ConditionWindow:
-    """The window moved on, each hypothesis with the law that the samples left behind give."""
-    count, trajectory = spent(config, window.samples), found[0].smoothed.trajectory
-    if not count or _waits(window, found):
-        return window._replace(trajectory=trajectory)
-    gone = found[0].problem.window.beginning(count)
+def _following(config: Config, window: ConditionWindow, branches: Sequence[Branch]) -> ConditionWindow:
+    """The window moved on, each hypothesis with the belief that the samples left behind give."""
+    count, first = spent(config, window.samples), branches[0]
+    if not count or _waits(config, window, branches):
+        return window._replace(trajectory=first.smoothed.trajectory)
+    gone = first.problem.window.beginning(count)
     drift = config.rail_drift**2 * float(np.sum(gone.dt_s))
     passed = []
-    for each in found:
-        left = posterior(replace(each.problem, window=gone), each.smoothed, each.margin)
-        weight = each.before.log_weight + left.log_evidence
-        passed.append(Hypothesis(each.before.law, drifted(left.belief, drift), weight))
+    for each in branches:
+        left = posterior(replace(each.problem, window=gone), each.smoothed, each.margin(config))
+        belief = widened(left.belief, 2, drift * left.belief.mean[2] ** 2)
+        passed.append(Hypothesis(each.before.law, belief, each.before.log_weight + left.log_evidence))
     kept = tuple(
         hypothesis._replace(log_weight=math.log(probability))
         for hypothesis, probability in zip(passed, probabilities(passed), strict=True)
         if probability >= NEGLIGIBLE
     )
-    noise = (
-        learn_noise(window.noise, found[0].problem, found[0].smoothed, count) if config.identify_noise else window.noise
+    learnt = learn_noise(window.noise, first.problem, first.smoothed, count) if config.identify_noise else window.noise
+    return window._replace(
+        prior=_state(kept[0].belief),
+        samples=window.samples[count:],
+        hypotheses=kept,
+        noise=learnt,
+        trajectory=first.smoothed.trajectory[count:],
     )
-    prior = _state(kept[0].belief)
-    return ConditionWindow(prior, window.samples[count:], kept, noise, trajectory[count:], window.known)
 
 
-def _waits(window: ConditionWindow, found: Sequence[Found]) -> bool:
+def _waits(config: Config, window: ConditionWindow, branches: Sequence[Branch]) -> bool:
     """Whether to leave nothing behind yet, as no step would tell of kappa: S measurements at 50 Hz are but a second."""
     lasts_s = (window.samples[-1].t_ns - window.samples[0].t_ns) * 1e-9
-    return lasts_s < SHORT_S and all(np.max(each.smoothed.steps.headroom) < each.margin for each in found)
+    return lasts_s < config.shortest_window_s and all(
+        np.max(each.smoothed.steps.headroom) < each.margin(config) for each in branches
+    )
