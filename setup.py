@@ -59,7 +59,6 @@ setup(
         "matplotlib>=3.6,<4",
         "argcomplete>=3,<4",
         "mcap>=1.5,<2",
-        "lz4>=4.3,<5",
         "zstandard>=0.22,<1",
         "rosbags>=0.11.6,<0.12",
         "ruamel.yaml>=0.17.21,<0.20",

@@ -10,7 +10,6 @@ Messages are then read block by block, one block at a time in memory.
 
 from __future__ import annotations
 
-import zlib
 from collections import Counter
 from collections.abc import Iterator
 from io import BytesIO
@@ -18,32 +17,21 @@ from pathlib import Path
 from struct import Struct, error
 from typing import BinaryIO, NamedTuple
 
-from lz4.frame import decompress as lz4_decompress
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, Schema
+from mcap.records import Channel, Chunk, McapRecord, Message, Schema
+from mcap.stream_reader import breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 from zstandard import ZstdError
-from zstandard import decompress as zstd_decompress
 
 from .metadata import LATEST_NS
 from .types import Definition, is_latched
 
 _HEAD = Struct("<BQ")
-_MESSAGE = Struct("<HIQQ")
-_CHUNK_TIMES = Struct("<QQ")
 
 _UNREADABLE = (error, ValueError, OverflowError, MemoryError, McapError, ZstdError, RuntimeError)
 """What the decoders raise on bytes that are not what they seem."""
-
-
-class Message(NamedTuple):
-    """One message as it lies in the file."""
-
-    log_ns: int
-    channel: int
-    cdr: bytes
 
 
 class Block(NamedTuple):
@@ -87,9 +75,9 @@ class McapFile:
         with self.path.open("rb") as stream:
             stream.seek(block.offset)
             body = stream.read(block.length)
-        for opcode, inner in _unpack(block.opcode, body):
-            if opcode == Opcode.MESSAGE and (message := _message(inner)).channel in self.topics:
-                yield message
+        for record in _unpack(block.opcode, body):
+            if isinstance(record, Message) and record.channel_id in self.topics:
+                yield record
 
     def _scan(self, stream: BinaryIO) -> None:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -117,30 +105,30 @@ class McapFile:
         try:
             if opcode == Opcode.MESSAGE and self.blocks and self.blocks[-1].opcode == Opcode.CHUNK:
                 raise ValueError("behind a chunk comes its index, which one wrong bit makes a message")
-            messages = [_message(inner) for kind, inner in _unpack(opcode, body) if not self._declares(kind, inner)]
+            records = _unpack(opcode, body)
+            self._declare(records)
+            messages = [record for record in records if isinstance(record, Message)]
         except _UNREADABLE:
             self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
             return
         if messages:
-            self.blocks.append(Block(min(message.log_ns for message in messages), offset, opcode, len(body)))
-            self.counts.update(message.channel for message in messages)
+            self.blocks.append(Block(min(message.log_time for message in messages), offset, opcode, len(body)))
+            self.counts.update(message.channel_id for message in messages)
 
-    def _declares(self, opcode: int, body: bytes) -> bool:
-        """Take over a schema or channel record; False for a message.
+    def _declare(self, records: list[McapRecord]) -> None:
+        """Take over the schemas and channels.
 
         The end of a file repeats them without a checksum: what was said first, in a checked chunk, holds.
         """
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(ReadDataStream(BytesIO(body)))
-            self._schemas.setdefault(schema.id, schema)
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(body)))
-            schema = self._schemas.get(channel.schema_id) or Schema(id=0, data=b"", encoding="", name="")
-            known_as = Definition(schema.encoding, schema.data.decode())
-            latched = is_latched(channel.metadata.get("offered_qos_profiles", ""))
-            info = TopicInfo(channel.topic, schema.name, channel.message_encoding, known_as, latched)
-            self.topics.setdefault(channel.id, info)
-        return opcode != Opcode.MESSAGE
+        for record in records:
+            if isinstance(record, Schema):
+                self._schemas.setdefault(record.id, record)
+            elif isinstance(record, Channel):
+                schema = self._schemas.get(record.schema_id) or Schema(id=0, data=b"", encoding="", name="")
+                known_as = Definition(schema.encoding, schema.data.decode())
+                latched = is_latched(record.metadata.get("offered_qos_profiles", ""))
+                info = TopicInfo(record.topic, schema.name, record.message_encoding, known_as, latched)
+                self.topics.setdefault(record.id, info)
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, int, int]]:
@@ -169,32 +157,16 @@ def _extent(stream: BinaryIO) -> int:
     return extent
 
 
-def _unpack(opcode: int, body: bytes) -> Iterator[tuple[int, bytes]]:
-    """Yield opcode and body of the records in a chunk; another record stands for itself."""
-    if opcode != Opcode.CHUNK:
-        yield opcode, body
-        return
-    stream = BytesIO(_decompress(Chunk.read(ReadDataStream(BytesIO(body)))))
-    for inner, _, length in _records(stream):
-        yield inner, stream.read(length)
-
-
-def _decompress(chunk: Chunk) -> bytes:
-    if chunk.compression == "zstd":
-        data: bytes = zstd_decompress(chunk.data, chunk.uncompressed_size)
-    elif chunk.compression == "lz4":
-        data = lz4_decompress(chunk.data)
-    elif chunk.compression == "":
-        data = chunk.data
+def _unpack(opcode: int, body: bytes) -> list[McapRecord]:
+    """Return the messages, schemas and channels of a chunk; another record stands for itself."""
+    if opcode == Opcode.CHUNK:
+        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
     else:
+        chunk = Chunk("", _HEAD.pack(opcode, len(body)) + body, 0, 0, 0, 0)
+    if chunk.compression not in ("", "lz4", "zstd"):
         raise ValueError(f"chunk compression = {chunk.compression!r}: only zstd, lz4 and none are known")
-    if len(data) != chunk.uncompressed_size or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
-        raise ValueError("the checksum of the chunk does not fit")
-    return data
-
-
-def _message(body: bytes) -> Message:
-    channel, _, log_ns, _ = _MESSAGE.unpack_from(body)
-    if log_ns > LATEST_NS:
-        raise ValueError(f"log time = {log_ns} ns: beyond what a recording may hold")
-    return Message(log_ns, channel, body[_MESSAGE.size :])
+    records = breakup_chunk(chunk, validate_crc=True)
+    for record in records:
+        if isinstance(record, Message) and record.log_time > LATEST_NS:
+            raise ValueError(f"log time = {record.log_time} ns: beyond what a recording may hold")
+    return records

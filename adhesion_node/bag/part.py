@@ -63,12 +63,10 @@ class Part:
         self._writer.start(profile="ros2", library="adhesion_node")
         self._stream.flush()
 
-    def holds(self, topic: Topic) -> bool:
-        """Tell whether a topic has been declared."""
-        return topic.name in self._channels
-
     def declare(self, topic: Topic, definition: Definition) -> None:
-        """Declare a topic, once before its first message."""
+        """Declare a topic before its first message; declaring it again changes nothing."""
+        if topic.name in self._channels:
+            return
         # JSON is YAML as well, and rosbag2 wants YAML here.
         qos = {"offered_qos_profiles": json.dumps(qos_profiles(topic.latched)), "topic_type_hash": topic.type_hash}
         size = 256 + len(definition.text.encode()) + len(str(qos)) + 4 * len(topic.name + topic.type)
@@ -101,9 +99,7 @@ class Part:
     def advance(self, log_ns: int) -> None:
         """End the chunk where a message of this time would not belong into it any more."""
         start_ns = self._chunk_start_ns
-        if start_ns is None:
-            return
-        if self._chunk_bytes >= CHUNK_BYTES or abs(log_ns - start_ns) >= self._span_ns:
+        if start_ns is not None and (self._chunk_bytes >= CHUNK_BYTES or abs(log_ns - start_ns) >= self._span_ns):
             self.flush()
 
     def flush(self) -> None:

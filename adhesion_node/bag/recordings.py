@@ -10,7 +10,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from .mcap_file import McapFile, Message, TopicInfo
+from mcap.records import Message
+
+from .mcap_file import McapFile, TopicInfo
 from .types import deserialize
 
 
@@ -72,8 +74,8 @@ class McapRecording:
                 yield self._record(heapq.heappop(pending))
             file = self._files[number]
             for index, message in enumerate(file.messages(block)):
-                if wanted(file.topics[message.channel].name):
-                    heapq.heappush(pending, (message.log_ns, number, offset, index, message))
+                if wanted(file.topics[message.channel_id].name):
+                    heapq.heappush(pending, (message.log_time, number, offset, index, message))
         while pending:
             yield self._record(heapq.heappop(pending))
 
@@ -82,5 +84,5 @@ class McapRecording:
 
     def _record(self, entry: tuple[int, int, int, int, Message]) -> Record:
         message = entry[-1]
-        info = self._files[entry[1]].topics[message.channel]
-        return Record(info.name, info.type, message.cdr, message.log_ns)
+        info = self._files[entry[1]].topics[message.channel_id]
+        return Record(info.name, info.type, message.data, message.log_time)

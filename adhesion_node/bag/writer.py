@@ -82,8 +82,7 @@ class BagWriter:
             following = self._open(len(self._files) + 1)
             self._files.append(self._part.finish())
             self._part = following
-        if not self._part.holds(topic):
-            self._part.declare(topic, defined)
+        self._part.declare(topic, defined)
         self._part.write(topic_name, cdr, log_ns)
         self._counts[topic_name] += 1
 
