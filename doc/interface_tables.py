@@ -11,22 +11,13 @@ from pathlib import Path
 
 import adhesion_node
 from adhesion_node.core import Outcome
-from adhesion_node.nodes import atp_monitor, creep_estimator, estimator
-from adhesion_node.nodes.ros.params import Spec
+from adhesion_node.core.setting import Setting, by_group
+from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.codecs import Reason
 from adhesion_node.wire.topics import TOPICS, Quality, Topic
 from sim_node.faults.plan import FAULTS, NONE
-from sim_node.nodes import simulator, slip_simulator
 
 SOURCES = Path(adhesion_node.__file__).resolve().parent.parent
-
-NODES: dict[str, Sequence[Spec]] = {
-    "estimator": estimator.PARAMETERS,
-    "atp_monitor": atp_monitor.PARAMETERS,
-    "creep_estimator": creep_estimator.PARAMETERS,
-    "simulator": simulator.PARAMETERS,
-    "slip_simulator": slip_simulator.PARAMETERS,
-}
 
 QUALITIES = {Quality.SENSOR: "sensor", Quality.RESULT: "result", Quality.EXPIRING: "latched"}
 
@@ -34,7 +25,7 @@ QUALITIES = {Quality.SENSOR: "sensor", Quality.RESULT: "result", Quality.EXPIRIN
 def parts() -> dict[str, str]:
     """Return the tables by the name of their part."""
     return {
-        **{f"parameters of {node}": "\n\n".join(_groups(specs)) for node, specs in NODES.items()},
+        **{f"parameters of {node}": "\n\n".join(_groups(specs)) for node, specs in all_settings().items()},
         "topics": table(("topic", "type", "QoS", "meaning"), map(_topic, TOPICS)),
         "refusals": table(("refused message", "what helps"), ((f"`{r.name}`", _cell(r.value)) for r in Reason)),
         "outcomes": table(("sample", "what becomes of it"), ((f"`{o.name}`", _cell(o.value)) for o in Outcome)),
@@ -50,29 +41,26 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return "\n".join([shown[0], "|" + "---|" * len(head), *shown[1:]])
 
 
-def _groups(specs: Sequence[Spec]) -> Iterator[str]:
+def _groups(specs: Sequence[Setting]) -> Iterator[str]:
     """Yield a table for each group of settings, in the order of their declaration, under its name."""
     head = ("parameter", "default", "unit", "range", "meaning")
-    groups: dict[str, list[Spec]] = {}
-    for spec in specs:
-        groups.setdefault(getattr(spec, "group", ""), []).append(spec)
-    for group, members in groups.items():
+    for group, members in by_group(specs).items():
         if group:
             yield f"### {group[0].upper()}{group[1:]}"
         yield table(head, map(_parameter, members))
 
 
-def _parameter(spec: Spec) -> tuple[str, ...]:
+def _parameter(spec: Setting) -> tuple[str, ...]:
     default = f"{spec.default:.6g}" if isinstance(spec.default, float) else str(spec.default).lower()
     return f"`{spec.name}`", default, spec.unit, _range(spec), spec.description
 
 
-def _range(spec: Spec) -> str:
+def _range(spec: Setting) -> str:
     if spec.choices:
         return ", ".join(spec.choices)
     if isinstance(spec.default, bool):
         return "true, false"
-    return "text" if isinstance(spec.default, str) else f"{spec.minimum:g} to {spec.maximum:g}"
+    return "text" if isinstance(spec.default, str) else f"{spec.low:g} to {spec.high:g}"
 
 
 def _topic(topic: Topic) -> tuple[str, ...]:

@@ -1,28 +1,76 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Settings: dataclass fields that carry their description, unit and range, for checks, parameters and tables."""
+"""Settings: what is declared once feeds checks, ROS parameters, parameter files, command lines and documentation.
+
+A dataclass declares its settings as fields made by `setting`; `settings_of` lists them.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import field, fields
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Mapping
+from dataclasses import Field, field, fields
+from typing import Any, NamedTuple, TypeVar
+
+Value = bool | int | float | str
+
+Made = TypeVar("Made")
 
 
 class Setting(NamedTuple):
     """A setting: its default's type is its type; `low` and `high` bound a number, `choices` a text."""
 
     name: str
-    default: bool | int | float | str
+    default: Value
     description: str
-    unit: str
-    low: float
-    high: float
-    choices: tuple[str, ...]
+    unit: str = ""
+    low: float = -math.inf
+    high: float = math.inf
+    choices: tuple[str, ...] = ()
     group: str = ""
     """What the setting belongs to, for people who look for it."""
+
+    @property
+    def is_number(self) -> bool:
+        """Whether it has a range."""
+        return type(self.default) in (int, float)
+
+    def check(self, value: Any, owner: str = "") -> Value:
+        """Return `value` as the setting's type, an integer for a float included.
+
+        Raises ValueError with the owner, the name, the value and what is allowed.
+
+        >>> Setting("gain", 0.5, "a gain", high=1.0).check(1)
+        1.0
+        """
+        kind: Any = type(self.default)
+        what = f"{owner}{self.name} = {value!r}"
+        accepted = (int, float) if kind is float else kind
+        if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
+            raise ValueError(f"{what}: give a value of type {kind.__name__} ({self.allowed()})")
+        if self.choices and value not in self.choices:
+            raise ValueError(f"{what}: choose {self.allowed()}")
+        if self.is_number and not (self.low <= value <= self.high and math.isfinite(value)):
+            raise ValueError(f"{what}: give {self.allowed()}")
+        checked: Value = kind(value)
+        return checked
+
+    def allowed(self) -> str:
+        """Say in words what the setting takes.
+
+        >>> Setting("rate_hz", 10.0, "samples per second", "Hz", 0.1, 100.0).allowed()
+        'a value from 0.1 to 100 Hz'
+        """
+        if self.choices:
+            return f"one of {', '.join(self.choices)}"
+        if not self.is_number:
+            return "true or false" if isinstance(self.default, bool) else "a text"
+        if math.isfinite(self.low) and math.isfinite(self.high):
+            return f"a value from {self.low:g} to {self.high:g} {self.unit}".rstrip()
+        least = f" of at least {self.low:g}" if math.isfinite(self.low) else ""
+        most = f" of at most {self.high:g}" if math.isfinite(self.high) else ""
+        return f"a finite value{least}{most} {self.unit}".rstrip()
 
 
 def setting(
@@ -42,29 +90,33 @@ def setting(
     return field(default=default, metadata=rule)
 
 
-def check_settings(instance: Any, what: str) -> None:
-    """Check every setting of a dataclass instance; ValueError names `what`, the setting, its value and the remedy."""
+def check_settings(instance: Any, owner: str) -> None:
+    """Check every setting of a dataclass instance; ValueError names `owner`, the setting, its value and the remedy."""
     for item in fields(instance):
         if item.metadata:
-            check_value(f"{what}{item.name}", getattr(instance, item.name), type(item.default), item.metadata)
+            _declared(item).check(getattr(instance, item.name), owner)
 
 
-def check_value(name: str, value: Any, kind: type, rule: Mapping[str, Any]) -> None:
-    """Check one value against its type and its rule, the metadata of a setting; ValueError as above."""
-    accepted = (int, float) if kind is float else kind
-    if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
-        raise ValueError(f"{name} = {value!r}: give a value of type {kind.__name__}")
-    if kind in (int, float) and not rule["low"] <= value <= rule["high"]:
-        raise ValueError(f"{name} = {value!r}: give a value from {rule['low']:g} to {rule['high']:g} {rule['unit']}")
-    if rule["choices"] and value not in rule["choices"]:
-        raise ValueError(f"{name} = {value!r}: choose one of {', '.join(rule['choices'])}")
+def settings_of(kind: type[Any], prefix: str = "", group: str = "") -> list[Setting]:
+    """Return the settings among the fields of a dataclass; `group` is that of those that declare none."""
+    found = (_declared(item) for item in fields(kind) if item.metadata)
+    return [one._replace(name=prefix + one.name, group=one.group or group) for one in found]
 
 
-def settings_of(kind: type[Any], prefix: str = "") -> list[Setting]:
-    """Return the settings among the fields of a dataclass."""
-    defaults = kind()
-    return [
-        Setting(prefix + item.name, getattr(defaults, item.name), **item.metadata)
-        for item in fields(kind)
-        if item.metadata
-    ]
+def make(kind: type[Made], values: Mapping[str, Any], prefix: str = "", **others: Any) -> Made:
+    """Build a dataclass from those of `values` that are its settings, and `others`; raises ValueError as it does."""
+    own = {one.name.removeprefix(prefix): one.name for one in settings_of(kind, prefix)}
+    return kind(**{field: values[name] for field, name in own.items() if name in values}, **others)
+
+
+def _declared(item: Field[Any]) -> Setting:
+    default: Any = item.default
+    return Setting(item.name, default, **item.metadata)
+
+
+def by_group(settings: Iterable[Setting]) -> dict[str, list[Setting]]:
+    """Return the settings under their groups, both in the order of declaration."""
+    groups: dict[str, list[Setting]] = {}
+    for one in settings:
+        groups.setdefault(one.group, []).append(one)
+    return groups

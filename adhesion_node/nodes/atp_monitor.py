@@ -15,7 +15,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -33,29 +32,18 @@ from adhesion_node.core.atp.supervision import (
     decide,
     unsafe,
 )
-from adhesion_node.core.setting import setting, settings_of
+from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Rejected
 from adhesion_node.wire.results import Status
+from adhesion_node.wire.settings import ATP_SETTINGS, Watchdogs
 from adhesion_node.wire.topics import Topic
 
 from .ros import qos, runtime
-from .ros.params import declare, spec_of
+from .ros.params import declare
 from .ros.types import new
 
-
-@dataclass(frozen=True, slots=True)
-class Watchdogs:
-    """How soon silence is noticed."""
-
-    check_rate_hz: float = setting(5.0, "Rate of the watchdogs", "Hz", 0.1, 100.0)
-    clock_timeout_s: float = setting(
-        2.0, "Time by the machine's clock for which the ROS clock may stand still", "s", 0.1, 3600.0
-    )
-
-
-SETTINGS = (*settings_of(SupervisionConfig), *settings_of(Watchdogs))
-PARAMETERS = tuple(map(spec_of, SETTINGS))
+PARAMETERS = ATP_SETTINGS
 
 EXAMPLES = (
     "atp_monitor --ros-args -p target_position_m:=6000.0 -p target_speed_kmh:=100.0",
@@ -75,9 +63,9 @@ class AtpMonitor(Node):
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("atp_monitor", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, PARAMETERS)
-        watchdogs = Watchdogs(**{item.name: values.pop(item.name) for item in fields(Watchdogs)})
+        watchdogs = make(Watchdogs, values)
         self._clock_timeout_s = watchdogs.clock_timeout_s
-        self._config = SupervisionConfig(**values)
+        self._config = make(SupervisionConfig, values)
         self._state: TrainState | Unavailable = Unavailable(_SILENCE)
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
         self._judged = False

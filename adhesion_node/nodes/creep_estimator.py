@@ -17,15 +17,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adhesion_node.core.atp.supervision import Severity
-from adhesion_node.run.creep_pipeline import SETTINGS, CreepPipeline, setup_of
+from adhesion_node.run.creep_pipeline import CreepPipeline
 from adhesion_node.wire import topics
+from adhesion_node.wire.settings import CREEP_SETTINGS, creep_setup_of
 
 from .ros import runtime
 from .ros.diagnostics import Finding
 from .ros.estimating import EstimatingNode, Kind, SetUp
-from .ros.params import spec_of
 
-PARAMETERS = tuple(map(spec_of, SETTINGS))
+PARAMETERS = CREEP_SETTINGS
 
 EXAMPLES = ("creep_estimator", "creep_estimator --ros-args -p axles:=4 -p wheel_radius_m:=0.46")
 
@@ -38,7 +38,7 @@ class CreepEstimator(EstimatingNode[CreepPipeline]):
 
 
 def _set_up(values: Mapping[str, Any]) -> SetUp[CreepPipeline]:
-    setup = setup_of(values)
+    setup = creep_setup_of(values)
     return SetUp(CreepPipeline(setup.config), setup.line, setup.sensor_timeout_s)
 
 

@@ -23,9 +23,8 @@ from adhesion_node.wire.settings import SETTINGS, setup_of
 from .ros import runtime
 from .ros.diagnostics import Finding
 from .ros.estimating import EstimatingNode, Kind, SetUp
-from .ros.params import spec_of
 
-PARAMETERS = tuple(map(spec_of, SETTINGS))
+PARAMETERS = SETTINGS
 
 EXAMPLES = (
     "estimator",

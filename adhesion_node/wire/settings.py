@@ -1,18 +1,22 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""The estimator's settings by name: what its ROS parameters, parameter files and command lines have in common."""
+"""The nodes' settings by name: what ROS parameters, parameter files, command lines and pages have in common."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..core import Config
+from ..core.atp.config import SupervisionConfig
+from ..core.creep.config import CreepConfig
+from ..core.creep.vehicle import Vehicle
 from ..core.physics.track import parse_track
 from ..core.physics.train import Train
-from ..core.setting import Setting, check_value, settings_of
+from ..core.setting import Setting, check_settings, make, setting, settings_of
 from .codecs import Line
 
 TRACK = Setting(
@@ -20,21 +24,64 @@ TRACK = Setting(
     "",
     "Track profile: 'grade START END RISE', 'curve START END RADIUS ANGLE', 'tunnel START END', separated by ';'",
     "m, degrees",
-    0.0,
-    0.0,
-    (),
+    group="track",
 )
 
-SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, ())
+SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
 
 FRAME_ID, AMBIENT = settings_of(Line)
 
 SENSOR_TIMEOUT = Setting(
-    "sensor_timeout_s", 0.5, "Silence of the sensor after which /diagnostics says STALE", "s", 0.05, 3600.0, ()
+    "sensor_timeout_s",
+    0.5,
+    "Silence of the sensor after which /diagnostics says STALE",
+    "s",
+    0.05,
+    3600.0,
+    (),
+    "intake",
 )
 
-SETTINGS = (SEED, FRAME_ID, AMBIENT, SENSOR_TIMEOUT, *settings_of(Config), *settings_of(Train, "train."), TRACK)
+
+@dataclass(frozen=True, slots=True)
+class Watchdogs:
+    """How soon the ATP monitor notices silence. Raises ValueError naming what is out of range."""
+
+    check_rate_hz: float = setting(5.0, "Rate of the watchdogs", "Hz", 0.1, 100.0, group="watchdogs")
+    clock_timeout_s: float = setting(
+        *(2.0, "Time by the machine's clock for which the ROS clock may stand still", "s", 0.1, 3600.0),
+        group="watchdogs",
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self, "")
+
+
+SETTINGS = (
+    SEED,
+    FRAME_ID,
+    AMBIENT,
+    SENSOR_TIMEOUT,
+    *settings_of(Config),
+    *settings_of(Train, "train.", "train"),
+    TRACK,
+)
 """All settings of the estimator."""
+
+CREEP_SETTINGS = (
+    *(FRAME_ID, SENSOR_TIMEOUT),
+    *settings_of(Vehicle, group="vehicle"),
+    *settings_of(CreepConfig, group="identification"),
+)
+"""All settings of the creep estimator."""
+
+ATP_SETTINGS = (*settings_of(SupervisionConfig, group="supervision"), *settings_of(Watchdogs))
+"""All settings of the ATP monitor."""
+
+OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
+    {"estimator": SETTINGS, "creep_estimator": CREEP_SETTINGS, "atp_monitor": ATP_SETTINGS}
+)
+"""The settings of every node by its name; those of the simulators are in sim_node/settings.py."""
 
 
 class Setup(NamedTuple):
@@ -47,6 +94,15 @@ class Setup(NamedTuple):
     """Silence of the position after which /diagnostics says STALE; no result depends on it."""
 
 
+class CreepSetup(NamedTuple):
+    """What a creep estimator is set up with."""
+
+    config: CreepConfig
+    line: Line
+    sensor_timeout_s: float
+    """Silence of the wheel speeds after which /diagnostics says STALE; no result depends on it."""
+
+
 def check_names(values: Mapping[str, Any], settings: Sequence[Setting]) -> None:
     """Raise ValueError naming the first value that is of no setting."""
     names = {setting.name for setting in settings}
@@ -56,23 +112,23 @@ def check_names(values: Mapping[str, Any], settings: Sequence[Setting]) -> None:
 
 
 def setup_of(values: Mapping[str, Any]) -> Setup:
-    """Build the set-up from values by setting name; what is not named keeps its default.
+    """Build the estimator's set-up from values by setting name; what is not named keeps its default.
 
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
     check_names(values, SETTINGS)
-    for setting in (SEED, SENSOR_TIMEOUT, TRACK):
-        check_value(setting.name, values.get(setting.name, setting.default), type(setting.default), setting._asdict())
-    train = Train(**{name.removeprefix("train."): value for name, value in values.items() if name.startswith("train.")})
-    own = {item.name for item in fields(Config) if item.metadata}
-    config = Config(
-        train=train,
-        track=parse_track(values.get(TRACK.name, ""), train.length_m),
-        **{name: value for name, value in values.items() if name in own},
-    )
-    line = Line(**{setting.name: values[setting.name] for setting in (FRAME_ID, AMBIENT) if setting.name in values})
-    seed, timeout_s = (values.get(setting.name, setting.default) for setting in (SEED, SENSOR_TIMEOUT))
-    return Setup(config, seed, line, timeout_s)
+    seed, timeout_s, track = (one.check(values.get(one.name, one.default)) for one in (SEED, SENSOR_TIMEOUT, TRACK))
+    train = make(Train, values, "train.")
+    config = make(Config, values, train=train, track=parse_track(str(track), train.length_m))
+    return Setup(config, int(seed), make(Line, values), float(timeout_s))
+
+
+def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:
+    """Build the creep estimator's set-up, as `setup_of` does."""
+    check_names(values, CREEP_SETTINGS)
+    timeout_s = SENSOR_TIMEOUT.check(values.get(SENSOR_TIMEOUT.name, SENSOR_TIMEOUT.default))
+    config = make(CreepConfig, values, vehicle=make(Vehicle, values))
+    return CreepSetup(config, make(Line, values), float(timeout_s))
 
 
 def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:

@@ -17,6 +17,7 @@ from types import MappingProxyType
 import numpy as np
 
 from adhesion_node.core.physics.track import Grade, Track
+from adhesion_node.core.setting import check_settings, setting
 
 from ..train.messages import Tick, ticks
 from ..train.run import run
@@ -122,15 +123,14 @@ class Plan:
     Raises ValueError naming the value that does not fit.
     """
 
-    fault: str = NONE
-    fault_start_s: float = 30.0
-    fault_duration_s: float = 0.0
-    fault_share: float = 0.0
-    fault_size: float = 0.0
+    fault: str = setting(NONE, "What goes wrong", choices=tuple(FAULTS))
+    fault_start_s: float = setting(30.0, "Time of the run at which the fault begins", "s", 0.0, 1e6)
+    fault_duration_s: float = setting(0.0, "How long the fault lasts; 0 = as it is usual", "s", 0.0, 1e6)
+    fault_share: float = setting(0.0, "Share of the samples that it meets; 0 = as it is usual", "", 0.0, 1.0)
+    fault_size: float = setting(0.0, "Its size in the unit of the fault; 0 = as it is usual", "", -1e6, 1e6)
 
     def __post_init__(self) -> None:
-        if self.fault not in FAULTS:
-            raise ValueError(f"fault = {self.fault!r}: give one of {', '.join(FAULTS)}")
+        check_settings(self, "")
 
     @property
     def dose(self) -> Dose:

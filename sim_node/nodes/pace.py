@@ -10,32 +10,16 @@ moves it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
-from adhesion_node.nodes.ros.params import Spec
-from adhesion_node.wire.topics import Topic
-
 MAX_BURST = 10
 """Samples that one timer callback publishes at most, so that the node stays responsive while it catches up."""
 
 SHORTEST_TIMER_S = 1e-3
-
-
-def run_parameters(scenarios: Iterable[str], scenario: str, rate_hz: float, awaited: Topic) -> tuple[Spec, ...]:
-    """Return the parameters of every simulated run: name, default, meaning, unit, least and most."""
-    return (
-        Spec("scenario", scenario, "what happens", choices=tuple(scenarios)),
-        Spec("seed", 1, "seed of all noise", "", 0, 2**31 - 1),
-        Spec("rate_hz", rate_hz, "samples per simulated second", "Hz", 0.1, 1000.0),
-        Spec("real_time_factor", 1.0, "simulated seconds per second; 0 = as fast as possible", "", 0.0, 1000.0),
-        Spec("start_time_s", 1000.0, "stamp of the first sample", "s", 0.0, 2e9),
-        Spec("wait_for", 0, f"start when so many subscribers to {awaited.name} are there", "", 0, 100),
-        Spec("exit_at_end", True, "end the program with the scenario"),
-    )
 
 
 class Pace:

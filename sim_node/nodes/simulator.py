@@ -14,48 +14,27 @@ The parameter `fault` lets something go wrong; `faults` lists what.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 from rclpy.node import Node
 
 from adhesion_node.core.physics.train import KMH
+from adhesion_node.core.setting import make
 from adhesion_node.nodes.ros import runtime
-from adhesion_node.nodes.ros.params import Spec, declare
+from adhesion_node.nodes.ros.params import declare
 from adhesion_node.nodes.ros.qos import advertise
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
-from ..faults.plan import FAULTS, Plan, faulty_run, period_of
+from ..faults.plan import Plan, faulty_run, period_of
+from ..settings import SIMULATOR
 from ..train import scenario
 from ..train.messages import SensorMessage
 from ..train.plant import Truth
 from ..train.sensors import SensorSettings
-from .pace import Pace, run_parameters
+from .pace import Pace
 
-_NOISE = SensorSettings()
-_PLAN = Plan()
-
-# name, default, meaning, unit, least and most
-PARAMETERS = (
-    *run_parameters(scenario.SCENARIOS, "tunnel_entry", 10.0, topics.POSITION),
-    Spec("position_std_m", _NOISE.position_std_m, "noise of the position", "m", 1e-3, 100.0),
-    Spec("student_dof", _NOISE.student_dof, "0, or degrees of freedom of Student-t position noise", "", 0.0, 100.0),
-    Spec("outlier_fraction", _NOISE.outlier_fraction, "fraction of positions that are outliers", "", 0.0, 1.0),
-    Spec("outlier_size_m", _NOISE.outlier_size_m, "size of an outlier", "m", 0.0, 1e4),
-    Spec("dropout_fraction", _NOISE.dropout_fraction, "fraction of positions that are missing", "", 0.0, 1.0),
-    Spec("pressure_std_pa", _NOISE.pressure_std_pa, "noise of the brake pressure", "Pa", 0.0, 1e5),
-    Spec("speed_std_mps", _NOISE.speed_std_mps, "noise of the speed; 0 = no odometer", "m/s", 0.0, 10.0),
-    Spec(
-        *("wheel_speed_std_radps", _NOISE.wheel_speed_std_radps, "noise of the wheel speeds; 0 = no such sensors"),
-        *("rad/s", 0.0, 10.0),
-    ),
-    Spec("fault", _PLAN.fault, "what goes wrong", choices=tuple(FAULTS)),
-    Spec("fault_start_s", _PLAN.fault_start_s, "time of the run at which the fault begins", "s", 0.0, 1e6),
-    Spec("fault_duration_s", _PLAN.fault_duration_s, "how long the fault lasts; 0 = as it is usual", "s", 0.0, 1e6),
-    Spec("fault_share", _PLAN.fault_share, "share of the samples that it meets; 0 = as it is usual", "", 0.0, 1.0),
-    Spec("fault_size", _PLAN.fault_size, "its size in the unit of the fault; 0 = as it is usual", "", -1e6, 1e6),
-)
+PARAMETERS = SIMULATOR
 
 EXAMPLES = (
     "simulator --ros-args -p scenario:=tunnel_exit -p seed:=2",
@@ -78,8 +57,7 @@ class Simulator(Node):
         super().__init__("simulator", automatically_declare_parameters_from_overrides=True, **kwargs)
         self.finished = False
         values = declare(self, PARAMETERS)
-        settings = SensorSettings(**{field.name: values[field.name] for field in fields(SensorSettings)})
-        plan = Plan(**{field.name: values[field.name] for field in fields(Plan)})
+        settings, plan = make(SensorSettings, values), make(Plan, values)
         self._scenario = scenario.find(values["scenario"])
         self._exit_at_end = values["exit_at_end"]
         self._start_ns = round(values["start_time_s"] * 1e9)

@@ -13,29 +13,23 @@ It paces itself as the simulator does.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import fields
 from typing import Any
 
 from rclpy.node import Node
 
+from adhesion_node.core.setting import make
 from adhesion_node.nodes.ros import runtime
-from adhesion_node.nodes.ros.params import Spec, declare
+from adhesion_node.nodes.ros.params import declare
 from adhesion_node.nodes.ros.qos import advertise
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
+from ..settings import SLIP_SIMULATOR
 from ..slip import plant as slip
 from ..slip import scenario as slip_scenario
-from .pace import Pace, run_parameters
+from .pace import Pace
 
-_NOISE = slip.SlipNoise()
-
-PARAMETERS = (
-    *run_parameters(slip_scenario.SCENARIOS, "creep_switch", 100.0, topics.WHEEL_SPEED),
-    Spec("wheel_std_radps", _NOISE.wheel_std_radps, "noise of a wheel speed", "rad/s", 0.0, 10.0),
-    Spec("speed_std_mps", _NOISE.speed_std_mps, "noise of the train's speed", "m/s", 0.0, 10.0),
-    Spec("force_std_n", _NOISE.force_std_n, "noise of the traction force", "N", 0.0, 1e6),
-)
+PARAMETERS = SLIP_SIMULATOR
 
 EXAMPLES = ("slip_simulator --ros-args -p scenario:=creep_dry -p wait_for:=1",)
 
@@ -55,7 +49,7 @@ class SlipSimulator(Node):
         self.finished = False
         values = declare(self, PARAMETERS)
         self._scenario = slip_scenario.find(values["scenario"])
-        self._noise = slip.SlipNoise(**{field.name: values[field.name] for field in fields(slip.SlipNoise)})
+        self._noise = make(slip.SlipNoise, values)
         self._exit_at_end = values["exit_at_end"]
         self._start_ns = round(values["start_time_s"] * 1e9)
         period_s, subscribers = 1.0 / values["rate_hz"], values["wait_for"]

@@ -17,12 +17,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from adhesion_node.core.physics.train import GRAVITY, Array
+from adhesion_node.core.setting import check_settings, setting
 
 from .scenario import Locomotive, SlipScenario, Surface
 
@@ -40,15 +41,12 @@ RISE_S, FALL_S = 20.0, 0.5
 class SlipNoise:
     """Noise of the sensors, standard deviations. Raises ValueError naming the one that is out of range."""
 
-    wheel_std_radps: float = 0.003
-    speed_std_mps: float = 0.003
-    force_std_n: float = 2000.0
+    wheel_std_radps: float = setting(0.003, "Noise of a wheel speed", "rad/s", 0.0, 10.0)
+    speed_std_mps: float = setting(0.003, "Noise of the train's speed", "m/s", 0.0, 10.0)
+    force_std_n: float = setting(2000.0, "Noise of the traction force", "N", 0.0, 1e6)
 
     def __post_init__(self) -> None:
-        for name in (field.name for field in fields(self)):
-            value = getattr(self, name)
-            if not math.isfinite(value) or value < 0:
-                raise ValueError(f"sensor {name} = {value!r}: give a finite number of at least 0")
+        check_settings(self, "sensor ")
 
 
 class SlipTruth(NamedTuple):

@@ -9,10 +9,12 @@ The wheel-speed sensors have a file of their own, `wheels`.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+
+from adhesion_node.core.setting import check_settings, setting
 
 from .plant import Truth
 
@@ -24,33 +26,19 @@ ATMOSPHERE_PA = 101325.0
 class SensorSettings:
     """Noise of the sensors. Raises ValueError naming the setting that is out of range."""
 
-    position_std_m: float = 0.5
-    """Gaussian standard deviation; with `student_dof` the scale of Student's t, which it is the limit of."""
-    student_dof: float = 0.0
-    """Degrees of freedom of Student's t, at least 1; 0 = Gaussian."""
-    outlier_fraction: float = 0.0
-    """Probability that a position is off by `outlier_size_m`, to either side."""
-    outlier_size_m: float = 20.0
-    dropout_fraction: float = 0.0
-    """Probability that a position is missing."""
-    pressure_std_pa: float = 0.0
-    speed_std_mps: float = 0.0
-    """0 = the train has no odometer."""
-    wheel_speed_std_radps: float = 0.0
-    """0 = the train has no wheel-speed sensors."""
+    position_std_m: float = setting(0.5, "Noise of the position, or with student_dof the scale of t", "m", 1e-3, 100.0)
+    student_dof: float = setting(0.0, "0, or degrees of freedom of Student-t position noise, from 1", "", 0.0, 100.0)
+    outlier_fraction: float = setting(0.0, "Fraction of positions that are outliers, to either side", "", 0.0, 1.0)
+    outlier_size_m: float = setting(20.0, "Size of an outlier", "m", 0.0, 1e4)
+    dropout_fraction: float = setting(0.0, "Fraction of positions that are missing", "", 0.0, 1.0)
+    pressure_std_pa: float = setting(0.0, "Noise of the brake pressure", "Pa", 0.0, 1e5)
+    speed_std_mps: float = setting(0.0, "Noise of the speed; 0 = no odometer", "m/s", 0.0, 10.0)
+    wheel_speed_std_radps: float = setting(0.0, "Noise of the wheel speeds; 0 = no such sensors", "rad/s", 0.0, 10.0)
 
     def __post_init__(self) -> None:
-        for name in (field.name for field in fields(self)):
-            value = getattr(self, name)
-            if not math.isfinite(value) or value < 0:
-                raise ValueError(f"sensor {name} = {value!r}: give a finite number of at least 0")
-        if self.position_std_m == 0:
-            raise ValueError("sensor position_std_m = 0: give a number above 0, the receivers need a variance")
+        check_settings(self, "sensor ")
         if 0 < self.student_dof < 1:
             raise ValueError(f"sensor student_dof = {self.student_dof!r}: give 0 (Gaussian) or at least 1")
-        for name in ("outlier_fraction", "dropout_fraction"):
-            if getattr(self, name) > 1:
-                raise ValueError(f"sensor {name} = {getattr(self, name)!r}: give a fraction from 0 to 1")
 
 
 class Reading(NamedTuple):

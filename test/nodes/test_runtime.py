@@ -30,9 +30,10 @@ import os, sys
 from rclpy.node import Node
 from std_msgs.msg import Float64
 from adhesion_node.nodes.ros import runtime
-from adhesion_node.nodes.ros.params import Spec, declare
+from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.ros.params import declare
 
-SPECS = (Spec("gain", 0.5, "a gain", "dB", minimum=0.0, maximum=1.0),)
+SPECS = (Setting("gain", 0.5, "a gain", "dB", 0.0, 1.0),)
 
 def say(word):
     print(word, flush=True)
@@ -197,9 +198,9 @@ def test_an_integer_for_a_float_is_accepted(start: Start) -> None:
 @pytest.mark.parametrize(
     ("args", "message"),
     [
-        (("-p", "gain:=7"), "gain = 7.0: give a finite number between 0 and 1 dB"),
-        (("-p", "gain:=loud"), "gain = 'loud': give a finite number between 0 and 1 dB"),
-        (("-p", "use_sim_time:=1"), "use_sim_time = 1: give true or false"),
+        (("-p", "gain:=7"), "gain = 7: give a value from 0 to 1 dB"),
+        (("-p", "gain:=loud"), "gain = 'loud': give a value of type float (a value from 0 to 1 dB)"),
+        (("-p", "use_sim_time:=1"), "use_sim_time = 1: give a value of type bool (true or false)"),
         (("--params-file", "/nowhere.yaml"), "/nowhere.yaml"),
         (("-p", "gain"), "gain"),
         (("-r", "__node:=a b"), "a b"),
@@ -246,7 +247,7 @@ def test_help_shows_the_parameters(start: Start) -> None:
     shown, errors = program.communicate(timeout=30.0)
     assert (program.returncode, errors) == (0, "")
     assert "A node that says what it does." in shown
-    assert "gain (default 0.5): a gain; a finite number between 0 and 1 dB" in shown
+    assert "gain (default 0.5): a gain; a value from 0 to 1 dB" in shown
 
 
 def test_a_full_disk_is_one_line_and_code_1(start: Start) -> None:

@@ -131,14 +131,14 @@ def test_the_same_seed_gives_the_same_run_and_another_seed_another() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"position_std_m": 0.0}, r"sensor position_std_m = 0: give a number above 0"),
+        ({"position_std_m": 0.0}, r"sensor position_std_m = 0\.0: give a value from 0\.001"),
         ({"position_std_m": -1.0}, r"sensor position_std_m = -1\.0"),
         ({"speed_std_mps": math.nan}, "sensor speed_std_mps = nan"),
         ({"wheel_speed_std_radps": -0.1}, r"sensor wheel_speed_std_radps = -0\.1"),
         ({"pressure_std_pa": math.inf}, "sensor pressure_std_pa = inf"),
         ({"student_dof": 0.5}, r"sensor student_dof = 0\.5: give 0 \(Gaussian\) or at least 1"),
-        ({"outlier_fraction": 1.1}, r"sensor outlier_fraction = 1\.1: give a fraction"),
-        ({"dropout_fraction": 2.0}, r"sensor dropout_fraction = 2\.0: give a fraction"),
+        ({"outlier_fraction": 1.1}, r"sensor outlier_fraction = 1\.1: give a value from 0 to 1"),
+        ({"dropout_fraction": 2.0}, r"sensor dropout_fraction = 2\.0: give a value from 0 to 1"),
     ],
 )
 def test_settings_out_of_range_are_refused_by_name(change: dict[str, float], message: str) -> None:

@@ -287,9 +287,9 @@ def test_a_jittering_timer_still_publishes_one_sample_per_call(jitter_s: float) 
     [
         (
             {"scenario": "tunel"},
-            "scenario = 'tunel': give one of tunnel_entry, tunnel_exit, cruise, dry_braking, low_ad",
+            "scenario = 'tunel': choose one of tunnel_entry, tunnel_exit, cruise, dry_braking, low_ad",
         ),
-        ({"rate_hz": 0.0}, r"rate_hz = 0\.0: give a finite number between 0\.1 and 1000 Hz"),
+        ({"rate_hz": 0.0}, r"rate_hz = 0\.0: give a value from 0\.1 to 1000 Hz"),
         ({"real_time_factor": -1.0}, r"real_time_factor = -1\.0: give"),
         ({"position_std_m": 0.0}, r"position_std_m = 0\.0: give"),
         ({"outlier_fraction": 1.5}, r"outlier_fraction = 1\.5: give"),
@@ -320,7 +320,7 @@ def test_the_program_tells_an_unknown_scenario_in_one_line() -> None:
     assert ended.returncode == 2
     assert ended.stdout == ""
     assert ended.stderr.count("\n") == 1
-    assert "scenario = 'tunel': give one of tunnel_entry" in ended.stderr
+    assert "scenario = 'tunel': choose one of tunnel_entry" in ended.stderr
 
 
 def test_the_program_reports_start_regimes_and_end_and_exits() -> None:

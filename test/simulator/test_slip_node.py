@@ -75,7 +75,7 @@ def test_a_run_ends_and_finishes(context: Context, sent: Sent) -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"scenario": "mud"}, r"scenario = 'mud': give one of creep_dry, creep_switch"),
+        ({"scenario": "mud"}, r"scenario = 'mud': choose one of creep_dry, creep_switch"),
         ({"speed_std_mps": -0.1}, r"speed_std_mps = -0\.1: give"),
         ({"rate_hz": 0.0}, r"rate_hz = 0\.0: give"),
     ],

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import subprocess
 import sys
@@ -21,14 +22,15 @@ from ruamel.yaml import YAML
 from test_offline import samples, write_run
 
 from adhesion_node.core import Config
+from adhesion_node.core.setting import Setting, Value
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator, replay
-from adhesion_node.nodes.ros.params import Spec, Value
+from adhesion_node.tools import defaults
 from sim_node.nodes import simulator
 from sim_node.nodes import slip_simulator as slip_node
 
 DEFAULTS = ROOT / "adhesion_node" / "nodes" / "defaults.yaml"
 
-NODES: dict[str, tuple[Callable[..., Node], tuple[Spec, ...]]] = {
+NODES: dict[str, tuple[Callable[..., Node], tuple[Setting, ...]]] = {
     "simulator": (simulator.Simulator, simulator.PARAMETERS),
     "estimator": (estimator.Estimator, estimator.PARAMETERS),
     "atp_monitor": (atp_monitor.AtpMonitor, atp_monitor.PARAMETERS),
@@ -66,6 +68,10 @@ def other(value: Value) -> Value:
         return value * 0.999 if value else 1e-3
     others = {"snow": "wet", "wet": "snow", "rail_condition": "particle_em", "track": "map", "": "tunnel 0 1000"}
     return others[value]
+
+
+def test_the_file_is_what_the_declarations_say() -> None:
+    assert DEFAULTS.read_text(encoding="utf-8") == defaults.text(), "run python -m adhesion_node.tools.defaults"
 
 
 def test_there_is_a_section_for_each_node_with_parameters() -> None:
@@ -167,5 +173,5 @@ def test_every_parameter_has_a_description_and_every_number_a_range(name: str) -
     for spec in NODES[name][1]:
         assert spec.description, spec.name
         if isinstance(spec.default, (int, float)) and not isinstance(spec.default, bool):
-            assert spec.minimum is not None, spec.name
-            assert spec.maximum is not None, spec.name
+            assert math.isfinite(spec.low), spec.name
+            assert math.isfinite(spec.high), spec.name

@@ -14,15 +14,16 @@ from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from adhesion_node.nodes.ros.params import Spec, declare, unknown
+from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.ros.params import declare, unknown
 
 SPECS = (
-    Spec("start_mu", 0.09, "first guess of the adhesion coefficient", minimum=0.0, maximum=0.5),
-    Spec("particles", 20, "number of particles", minimum=2),
-    Spec("law", "wet", "speed law", choices=("dry", "wet")),
-    Spec("verbose", False, "say more"),
-    Spec("output", "bag", "where to"),
-    Spec("length_m", 200.0, "length of the train", "m"),
+    Setting("start_mu", 0.09, "first guess of the adhesion coefficient", low=0.0, high=0.5),
+    Setting("particles", 20, "number of particles", low=2),
+    Setting("law", "wet", "speed law", choices=("dry", "wet")),
+    Setting("verbose", False, "say more"),
+    Setting("output", "bag", "where to"),
+    Setting("length_m", 200.0, "length of the train", "m"),
 )
 DEFAULTS = {"start_mu": 0.09, "particles": 20, "law": "wet", "verbose": False, "output": "bag", "length_m": 200.0}
 
@@ -85,20 +86,20 @@ def test_given_values_win_and_an_integer_serves_for_a_float(make: Make, automati
 @pytest.mark.parametrize(
     ("name", "value", "message"),
     [
-        ("start_mu", 0.6, r"start_mu = 0\.6: give a finite number between 0 and 0\.5"),
-        ("start_mu", -1, r"start_mu = -1\.0: give a finite number between 0 and 0\.5"),
-        ("start_mu", float("nan"), r"start_mu = nan: give a finite number"),
-        ("start_mu", "wet", r"start_mu = 'wet': give a finite number"),
-        ("start_mu", True, r"start_mu = True: give a finite number"),
-        ("start_mu", [0.1], r"start_mu = .*0\.1.*: give a finite number"),
-        ("length_m", float("inf"), r"length_m = inf: give a finite number m"),
-        ("particles", 1, r"particles = 1: give an integer of at least 2"),
-        ("particles", 20.0, r"particles = 20\.0: give an integer"),
-        ("particles", False, r"particles = False: give an integer"),
-        ("law", "muddy", r"law = 'muddy': give one of dry, wet"),
-        ("law", 1, r"law = 1: give one of dry, wet"),
-        ("verbose", 1, r"verbose = 1: give true or false"),
-        ("output", 5, r"output = 5: give a text"),
+        ("start_mu", 0.6, r"start_mu = 0\.6: give a value from 0 to 0\.5"),
+        ("start_mu", -1, r"start_mu = -1: give a value from 0 to 0\.5"),
+        ("start_mu", float("nan"), r"start_mu = nan: give a value from 0 to 0\.5"),
+        ("start_mu", "wet", r"start_mu = 'wet': give a value of type float \(a value from 0 to 0\.5\)"),
+        ("start_mu", True, r"start_mu = True: give a value of type float"),
+        ("start_mu", [0.1], r"start_mu = .*0\.1.*: give a value of type float"),
+        ("length_m", float("inf"), r"length_m = inf: give a finite value m"),
+        ("particles", 1, r"particles = 1: give a finite value of at least 2"),
+        ("particles", 20.0, r"particles = 20\.0: give a value of type int"),
+        ("particles", False, r"particles = False: give a value of type int"),
+        ("law", "muddy", r"law = 'muddy': choose one of dry, wet"),
+        ("law", 1, r"law = 1: give a value of type str \(one of dry, wet\)"),
+        ("verbose", 1, r"verbose = 1: give a value of type bool \(true or false\)"),
+        ("output", 5, r"output = 5: give a value of type str \(a text\)"),
     ],
 )
 def test_a_bad_value_is_refused_with_name_value_and_what_is_allowed(
@@ -108,11 +109,6 @@ def test_a_bad_value_is_refused_with_name_value_and_what_is_allowed(
     with pytest.raises(ValueError, match=message) as refusal:
         declare(node, SPECS)
     assert "\n" not in str(refusal.value)
-
-
-def test_a_default_that_breaks_its_own_range_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"rate = 0\.0: give a finite number of at least 1 Hz"):
-        Spec("rate", 0.0, "a rate", "Hz", minimum=1.0)
 
 
 @pytest.mark.parametrize(
@@ -168,7 +164,7 @@ def test_sim_time_still_works(make: Make) -> None:
 
 
 def test_sim_time_of_a_wrong_type_is_refused(make: Make) -> None:
-    with pytest.raises(ValueError, match=r"use_sim_time = 1: give true or false"):
+    with pytest.raises(ValueError, match=r"use_sim_time = 1: give .*true or false"):
         declare(make({"use_sim_time": 1}), SPECS)
 
 

@@ -15,7 +15,6 @@ from adhesion_node.core import Config
 from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.setting import Setting
-from adhesion_node.nodes.estimator import PARAMETERS
 from adhesion_node.wire.codecs import Line
 from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
 
@@ -65,19 +64,6 @@ def test_every_setting_says_what_it_is_and_what_it_may_be(setting: Setting) -> N
     elif not isinstance(setting.default, bool):
         assert -math.inf < setting.low <= setting.default <= setting.high < math.inf
         assert setting.low < setting.high
-
-
-@pytest.mark.parametrize("setting", SETTINGS, ids=named)
-def test_the_ros_parameter_is_the_same_setting(setting: Setting) -> None:
-    (spec,) = [spec for spec in PARAMETERS if spec.name == setting.name]
-    assert (type(spec.default), spec.default) == (type(setting.default), setting.default)
-    assert (spec.description, spec.unit, spec.choices) == (setting.description, setting.unit, setting.choices)
-    number = setting in NUMBERS
-    assert (spec.minimum, spec.maximum) == ((setting.low, setting.high) if number else (None, None))
-
-
-def test_there_is_no_ros_parameter_besides() -> None:
-    assert [spec.name for spec in PARAMETERS] == [setting.name for setting in SETTINGS]
 
 
 def test_nothing_named_is_the_nominal_set_up() -> None:

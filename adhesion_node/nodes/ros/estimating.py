@@ -17,6 +17,7 @@ from std_srvs.srv import SetBool, Trigger
 
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.core.setting import Setting
 from adhesion_node.run.engine import EstimatorPipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Line, Rejected
@@ -25,7 +26,7 @@ from adhesion_node.wire.topics import Topic
 from . import qos
 from .diagnostics import Finding, next_stamp, status_message
 from .intake import Intake
-from .params import Spec, declare
+from .params import declare
 from .types import new
 
 P = TypeVar("P", bound=EstimatorPipeline[Any, Any, Any])
@@ -45,7 +46,7 @@ class Kind(NamedTuple, Generic[P]):
     name: str
     entry: str
     """Of /diagnostics, behind the node's name."""
-    parameters: Sequence[Spec]
+    parameters: Sequence[Setting]
     set_up: Callable[[Mapping[str, Any]], SetUp[P]]
     inputs: Sequence[Topic]
     """The last one must not fall silent."""

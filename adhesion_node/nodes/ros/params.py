@@ -1,13 +1,12 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""ROS parameters from one table per node: typed, with ranges, checked as a whole before the node does anything."""
+"""Settings as ROS parameters: typed, with ranges, checked as a whole before the node does anything."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
 
@@ -17,133 +16,60 @@ from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
 
-Value = bool | int | float | str
-
 _INT64_MAX = 2**63 - 1
-_NUMBER = {float: "a finite number", int: "an integer"}
 
+_USE_SIM_TIME = Setting("use_sim_time", False, "Follow /clock")
 _OF_RCLPY = ("use_sim_time", "start_type_description_service")
 _OF_RCLPY_QOS = "qos_overrides."
 
 
-@dataclass(frozen=True, slots=True)
-class Spec:
-    """A parameter: the type of `default` is its type; `minimum` and `maximum` are allowed values themselves.
-
-    `unit` is for people (empty for a plain number); `choices` restricts a string. Raises ValueError when the
-    default breaks its own rule.
-    """
-
-    name: str
-    default: Value
-    description: str
-    unit: str = ""
-    minimum: float | None = None
-    maximum: float | None = None
-    choices: tuple[str, ...] = ()
-
-    def __post_init__(self) -> None:
-        self.check(self.default)
-
-    def check(self, value: object) -> Value:
-        """Return `value` as this parameter's type, an integer for a float included; ValueError says what is allowed.
-
-        >>> Spec("gain", 0.5, "a gain", maximum=1.0).check(1)
-        1.0
-        """
-        kind = type(self.default)
-        if kind is float and type(value) is int:
-            value = float(value)
-        if type(value) is not kind or not self._within(value):
-            raise ValueError(f"{self.name} = {value!r}: give {self.allowed()}")
-        return value
-
-    def allowed(self) -> str:
-        """Say in words what the parameter takes.
-
-        >>> Spec("rate_hz", 10.0, "samples per second", "Hz", minimum=0.1, maximum=100.0).allowed()
-        'a finite number between 0.1 and 100 Hz'
-        """
-        if self.choices:
-            return f"one of {', '.join(self.choices)}"
-        kind = type(self.default)
-        if kind not in _NUMBER:
-            return "true or false" if kind is bool else "a text"
-        low, high = self.minimum, self.maximum
-        if low is None and high is None:
-            limits = ""
-        elif high is None:
-            limits = f" of at least {low:.12g}"
-        elif low is None:
-            limits = f" of at most {high:.12g}"
-        else:
-            limits = f" between {low:.12g} and {high:.12g}"
-        return f"{_NUMBER[kind]}{limits} {self.unit}".rstrip()
-
-    def descriptor(self) -> ParameterDescriptor:
-        """Describe the parameter to `ros2 param describe` and to graphical tools."""
-        described = ParameterDescriptor(
-            description=f"{self.description} [{self.unit}]" if self.unit else self.description,
-            additional_constraints=f"{self.allowed()}; fixed at start",
-            # A static type would refuse an integer for a float before `check` can accept it.
-            dynamic_typing=True,
-        )
-        if self.minimum is None and self.maximum is None:
-            return described
-        if isinstance(self.default, float):
-            low = -math.inf if self.minimum is None else float(self.minimum)
-            high = math.inf if self.maximum is None else float(self.maximum)
-            described.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
-        else:
-            least = -_INT64_MAX if self.minimum is None else int(self.minimum)
-            most = _INT64_MAX if self.maximum is None else int(self.maximum)
-            described.integer_range = [IntegerRange(from_value=least, to_value=most)]
+def descriptor(setting: Setting) -> ParameterDescriptor:
+    """Describe a setting to `ros2 param describe` and to graphical tools."""
+    described = ParameterDescriptor(
+        description=f"{setting.description} [{setting.unit}]" if setting.unit else setting.description,
+        additional_constraints=f"{setting.allowed()}; fixed at start",
+        # A static type would refuse an integer for a float before `check` can accept it.
+        dynamic_typing=True,
+    )
+    if not setting.is_number or (math.isinf(setting.low) and math.isinf(setting.high)):
         return described
-
-    def _within(self, value: Any) -> bool:
-        if self.choices:
-            return value in self.choices
-        if type(value) not in _NUMBER:
-            return True
-        low, high = self.minimum, self.maximum
-        return math.isfinite(value) and (low is None or value >= low) and (high is None or value <= high)
-
-
-def spec_of(setting: Setting) -> Spec:
-    """Return the ROS parameter of a setting."""
-    number = not isinstance(setting.default, (str, bool))
-    low, high = (limit if number and math.isfinite(limit) else None for limit in (setting.low, setting.high))
-    return Spec(setting.name, setting.default, setting.description, setting.unit, low, high, setting.choices)
+    if isinstance(setting.default, float):
+        floats = FloatingPointRange(from_value=float(setting.low), to_value=float(setting.high))
+        described.floating_point_range = [floats]
+    else:
+        low, high = max(setting.low, -_INT64_MAX), min(setting.high, _INT64_MAX)
+        described.integer_range = [IntegerRange(from_value=int(low), to_value=int(high))]
+    return described
 
 
-def declare(node: Node, specs: Sequence[Spec]) -> dict[str, Any]:
-    """Declare every parameter of `specs` on `node` and return the effective values as plain Python ones.
+def declare(node: Node, settings: Sequence[Setting]) -> dict[str, Any]:
+    """Declare every setting as a parameter of `node` and return the effective values as plain Python ones.
 
     All values are checked before the first is accepted; a bad one raises ValueError with name, value and what is
     allowed. Afterwards a change is refused: a configuration holds for a whole run. The effective configuration is
     logged once. Construct the node with `automatically_declare_parameters_from_overrides=True`: then the
     parameters it was given but does not have are logged as well.
     """
-    if node.has_parameter("use_sim_time"):
-        Spec("use_sim_time", False, "follow /clock").check(node.get_parameter("use_sim_time").value)
-    values = {spec.name: spec.check(_given(node, spec)) for spec in specs}
-    for spec in specs:
-        node.set_descriptor(spec.name, spec.descriptor())
+    if node.has_parameter(_USE_SIM_TIME.name):
+        _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
+    values = {setting.name: setting.check(_given(node, setting)) for setting in settings}
+    for setting in settings:
+        node.set_descriptor(setting.name, descriptor(setting))
     node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
-    allowed = {spec.name: spec.allowed() for spec in specs}
+    allowed = {setting.name: setting.allowed() for setting in settings}
     node.add_on_set_parameters_callback(lambda changes: _refuse(changes, allowed))
-    for message in unknown(node, specs):
+    for message in unknown(node, settings):
         node.get_logger().warning(message)
     node.get_logger().info("parameters: " + ", ".join(f"{name} = {value}" for name, value in values.items()))
     return values
 
 
-def unknown(node: Node, specs: Sequence[Spec]) -> list[str]:
+def unknown(node: Node, settings: Sequence[Setting]) -> list[str]:
     """Return one message for each parameter that was given to `node` but that it does not have: a typo, as a rule.
 
     Only a warning: `-p` and the wildcard `/**` of a YAML file reach every node of a process.
     """
-    names = [spec.name for spec in specs]
+    names = [setting.name for setting in settings]
     return [
         f"{name} = {node.get_parameter(name).value!r}: {node.get_name()} has no such parameter{_hint(name, names)}"
         for name in node.list_parameters([], 0).names
@@ -151,10 +77,10 @@ def unknown(node: Node, specs: Sequence[Spec]) -> list[str]:
     ]
 
 
-def _given(node: Node, spec: Spec) -> object:
-    if node.has_parameter(spec.name):  # declared from what the node was given
-        return node.get_parameter(spec.name).value
-    return node.declare_parameter(spec.name, spec.default, ParameterDescriptor(dynamic_typing=True)).value
+def _given(node: Node, setting: Setting) -> object:
+    if node.has_parameter(setting.name):  # declared from what the node was given
+        return node.get_parameter(setting.name).value
+    return node.declare_parameter(setting.name, setting.default, ParameterDescriptor(dynamic_typing=True)).value
 
 
 def _refuse(changes: Sequence[Parameter], allowed: Mapping[str, str]) -> SetParametersResult:

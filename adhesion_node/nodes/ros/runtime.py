@@ -28,8 +28,8 @@ from rclpy.utilities import ok, try_shutdown
 from adhesion_node.command.signals import StopRequest, stop_on_signals
 
 from ...command.options import help_texts
+from ...core.setting import Setting, by_group
 from ...wire.parameter_sections import unheeded
-from .params import Spec
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 """Exit codes of every program."""
@@ -50,7 +50,7 @@ _BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidat
 def run(
     make_node: Callable[[], Node],
     args: Sequence[str] | None = None,
-    parameters: Sequence[Spec] = (),
+    parameters: Sequence[Setting] = (),
     examples: Sequence[str] = (),
 ) -> int:
     """Run one node as a program and return its exit code: 0 after a clean stop, 1 failed, 2 bad input.
@@ -88,19 +88,25 @@ def split_ros_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
 
 
 def _parser(
-    make_node: Callable[[], Node], parameters: Sequence[Spec], examples: Sequence[str]
+    make_node: Callable[[], Node], parameters: Sequence[Setting], examples: Sequence[str]
 ) -> argparse.ArgumentParser:
     """Return the parser of a node's own arguments; asked by a shell, it answers for those of ROS too and ends."""
     purpose, _, _ = (inspect.getdoc(make_node) or "").partition("\n\n")
-    described = [f"  {spec.name} (default {spec.default}): {spec.description}; {spec.allowed()}" for spec in parameters]
-    listed = "\n".join(["parameters:", *described]) if described else ""
+    listed = "\n".join(
+        line
+        for group, members in by_group(parameters).items()
+        for line in (
+            f"{group} parameters:".lstrip(),
+            *(f"  {one.name} (default {one.default}): {one.description}; {one.allowed()}" for one in members),
+        )
+    )
     parser = argparse.ArgumentParser(
         usage="%(prog)s [--help] [--ros-args -p NAME:=VALUE ... --params-file FILE -r FROM:=TO ...]",
         **help_texts(purpose, *examples, more=listed),
     )
     if "_ARGCOMPLETE" in os.environ:
         parser.add_argument("--ros-args", action="store_true")
-        parser.add_argument("-p", "--param", action="append", choices=[f"{spec.name}:=" for spec in parameters])
+        parser.add_argument("-p", "--param", action="append", choices=[f"{one.name}:=" for one in parameters])
         parser.add_argument("--params-file", action="append")
         argcomplete.autocomplete(parser)
     return parser

@@ -1,0 +1,68 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""Writes nodes/defaults.yaml, the parameters of all nodes with their defaults, out of their declarations.
+
+python -m adhesion_node.tools.defaults
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+
+from sim_node import settings as simulated
+
+from ..core.setting import Setting, Value, by_group
+from ..wire import settings
+
+FILE = Path(__file__).resolve().parent.parent / "nodes" / "defaults.yaml"
+
+HEAD = """\
+# The parameters of all nodes with their defaults, for `--ros-args --params-file`. What each one means, its unit and
+# its range: `ros2 param describe`, `--help` of the node, or doc/parameters.md. Change a copy.
+# Written by `python -m adhesion_node.tools.defaults` out of the declarations.
+"""
+
+
+def all_settings() -> Mapping[str, Sequence[Setting]]:
+    """Return the settings of every node and simulator by the node's name."""
+    return {**settings.OF_NODES, **simulated.OF_NODES}
+
+
+def text() -> str:
+    """Return what the file should hold."""
+    sections = (
+        "\n".join((f"\n{node}:", "  ros__parameters:", *_lines(of_node))) for node, of_node in all_settings().items()
+    )
+    return HEAD + "\n".join(sections) + "\n"
+
+
+def _lines(of_node: Sequence[Setting]) -> Iterator[str]:
+    for group, members in by_group(of_node).items():
+        parent = members[0].name.rpartition(".")[0]
+        if parent:
+            yield f"    {parent}:"
+        elif group:
+            yield f"    # {group}"
+        for one in members:
+            unit = f"  # {one.unit}" if one.unit else ""
+            yield f"    {'  ' if parent else ''}{one.name.rpartition('.')[2]}: {_spelled(one.default)}{unit}"
+
+
+def _spelled(value: Value) -> str:
+    """Spell a value so that YAML 1.1 reads its type.
+
+    >>> [_spelled(value) for value in (True, 1, 1e-6, 0.5, "snow")]
+    ['true', '1', '1.0e-06', '0.5', '"snow"']
+    """
+    if isinstance(value, str):
+        return f'"{value}"'
+    if isinstance(value, bool):
+        return str(value).lower()
+    mantissa, e, exponent = repr(value).partition("e")
+    return f"{mantissa}{'.0' if e and '.' not in mantissa else ''}{e}{exponent}"
+
+
+if __name__ == "__main__":
+    FILE.write_text(text(), encoding="utf-8")

@@ -1,0 +1,49 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The settings of the simulators by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+
+from adhesion_node.core.setting import Setting, settings_of
+from adhesion_node.wire.topics import POSITION, WHEEL_SPEED, Topic
+
+from .faults.plan import Plan
+from .slip import scenario as slip_scenario
+from .slip.plant import SlipNoise
+from .train import scenario
+from .train.sensors import SensorSettings
+
+
+def _run(scenarios: Iterable[str], usual: str, rate_hz: float, awaited: Topic) -> tuple[Setting, ...]:
+    """The settings of every simulated run."""
+    waiting = f"Start when so many subscribers to {awaited.name} are there"
+    return (
+        Setting("scenario", usual, "What happens", choices=tuple(scenarios), group="run"),
+        Setting("seed", 1, "Seed of all noise", "", 0, 2**31 - 1, group="run"),
+        Setting("rate_hz", rate_hz, "Samples per simulated second", "Hz", 0.1, 1000.0, group="run"),
+        Setting("real_time_factor", 1.0, "Simulated seconds per second; 0 = any speed", "", 0.0, 1000.0, group="run"),
+        Setting("start_time_s", 1000.0, "Stamp of the first sample", "s", 0.0, 2e9, group="run"),
+        Setting("wait_for", 0, waiting, "", 0, 100, group="run"),
+        Setting("exit_at_end", True, "End the program with the scenario", group="run"),
+    )
+
+
+SIMULATOR = (
+    *_run(scenario.SCENARIOS, "tunnel_entry", 10.0, POSITION),
+    *settings_of(SensorSettings, group="sensors"),
+    *settings_of(Plan, group="fault"),
+)
+
+SLIP_SIMULATOR = (
+    *_run(slip_scenario.SCENARIOS, "creep_switch", 100.0, WHEEL_SPEED),
+    *settings_of(SlipNoise, group="sensors"),
+)
+
+OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
+    {"simulator": SIMULATOR, "slip_simulator": SLIP_SIMULATOR}
+)
+"""By the name of the node."""
