@@ -19,7 +19,7 @@ from ..core.methods.rail_condition.problem import Belief, Model, Problem
 from ..core.methods.rail_condition.smoother import Search, posterior, smooth
 from ..core.physics.adhesion import SpeedLaw
 from .scene import Scene, Update, braking_window
-from .timing import Contender, Timed, figures, interleave
+from .timing import SLOW, Contender, Timed, beside, interleave
 
 OURS, PASS, FIFTY, CONVERGED = (
     "ours, converged",
@@ -31,9 +31,6 @@ OURS, PASS, FIFTY, CONVERGED = (
 START_MU = 0.05
 TOLERANCE = 1e-7
 MOST_ITERATIONS = 2000
-
-SLOW = 10
-"""The slowest takes part in every so many rounds."""
 
 NOTHING_KNOWN = 1e3
 """Standard deviation of mu before the window."""
@@ -71,8 +68,7 @@ def _row(timed: Timed[Update], ours: Timed[Update]) -> dict[str, Any]:
     """Times, their ratio to ours, and how far the result is from ours: all calls of a method give the same."""
     found, our = timed.results[0], ours.results[0]
     return {
-        **figures(timed.seconds),
-        "ratio": float(np.median(timed.seconds) / np.median(ours.seconds)),
+        **beside(timed, ours),
         "iterations": found.iterations,
         "mu": found.mu,
         "mu_differs": abs(found.mu - our.mu),

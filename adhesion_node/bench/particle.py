@@ -13,27 +13,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..core.methods.particle_em.em import ParticleEStep, maximise
 from ..core.physics.train import Array
-from .scene import MU, Scene, braking_window, maximised
-from .timing import Contender, Timed, figures, interleave
+from .scene import MU, Scene, Update, braking_window, maximised
+from .timing import SLOW, Contender, Timed, beside, interleave
 
 OURS, MCMC, EXACT = "ours, exact", "particles, MCMC O(N)", "particles, exact O(N^2)"
-
-SLOW = 10
-"""The slowest takes part in every so many rounds."""
-
-
-class Result(NamedTuple):
-    """What an E and M step gives."""
-
-    mu: float
-    speed_mps: Array
-    """Smoothed means, shape (K + 1,)."""
 
 
 def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, Any]]:
@@ -51,26 +40,25 @@ def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, An
     return [{"method": name, **_row(timed[name], timed[OURS])} for name in timed]
 
 
-def _ours(e_step: ParticleEStep) -> Result:
+def _ours(e_step: ParticleEStep) -> Update:
     expected = e_step(np.array([MU]))
     speed = np.einsum("krn,krn->k", e_step.smoother.marginal, e_step.filter.states[1])
-    return Result(float(maximise(expected, np.zeros(1))[0]), speed)
+    return Update(float(maximise(expected, np.zeros(1))[0]), speed)
 
 
-def _sampled(scene: Scene, count: int, smoother: Callable[[Scene, float, int], Array]) -> Result:
+def _sampled(scene: Scene, count: int, smoother: Callable[[Scene, float, int], Array]) -> Update:
     states = np.moveaxis(smoother(scene, MU, count), 2, 0)
-    return Result(
+    return Update(
         maximised(scene.motion, scene.windows, states, np.full(states.shape[1:], 1.0 / count), MU),
         states[1].mean(axis=1),
     )
 
 
-def _row(timed: Timed[Result], ours: Timed[Result]) -> dict[str, Any]:
+def _row(timed: Timed[Update], ours: Timed[Update]) -> dict[str, Any]:
     """Times, their ratio to ours, and how far the smoothed speeds are from ours, averaged over the calls."""
     (mean, error), (our_mean, our_error) = _mean_speed(timed.results), _mean_speed(ours.results)
     return {
-        **figures(timed.seconds),
-        "ratio": float(np.median(timed.seconds) / np.median(ours.seconds)),
+        **beside(timed, ours),
         "mu": float(np.mean([result.mu for result in timed.results])),
         "mu_std": float(np.std([result.mu for result in timed.results])),
         "differs_mps": float(np.sqrt(np.mean((mean - our_mean) ** 2))),
@@ -78,7 +66,7 @@ def _row(timed: Timed[Result], ours: Timed[Result]) -> dict[str, Any]:
     }
 
 
-def _mean_speed(results: Sequence[Result]) -> tuple[Array, Array]:
+def _mean_speed(results: Sequence[Update]) -> tuple[Array, Array]:
     """Mean over the calls and its standard error, each (K + 1,)."""
     speeds = np.array([result.speed_mps for result in results])
     return speeds.mean(axis=0), speeds.std(axis=0) / math.sqrt(len(speeds))

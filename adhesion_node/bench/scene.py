@@ -50,12 +50,12 @@ class Scene(NamedTuple):
 
 
 class Update(NamedTuple):
-    """What the Gaussian update of a window finds."""
+    """What a contender finds in a window."""
 
     mu: float
     speed_mps: Array
     """Smoothed means, shape (K + 1,)."""
-    iterations: int
+    iterations: int = 1
 
 
 def maximised(motion: Motion, windows: Windows, states: Array, marginal: Array, mu: float) -> float:

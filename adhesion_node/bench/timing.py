@@ -15,6 +15,9 @@ from ..command.options import progress
 
 Result = TypeVar("Result")
 
+SLOW = 10
+"""A slow contender takes part in every so many rounds."""
+
 
 class Contender(NamedTuple, Generic[Result]):
     """Something to time: `run` is called in so many rounds, spread over all of them."""
@@ -45,6 +48,11 @@ def interleave(contenders: Sequence[Contender[Result]]) -> dict[str, Timed[Resul
                 timed[name].seconds.append(time.perf_counter() - started)
                 timed[name].results.append(result)
     return timed
+
+
+def beside(timed: Timed[Result], ours: Timed[Result]) -> dict[str, Any]:
+    """`figures` of a contender, and the ratio of its median to ours."""
+    return {**figures(timed.seconds), "ratio": float(np.median(timed.seconds) / np.median(ours.seconds))}
 
 
 def figures(seconds: Iterable[float]) -> dict[str, Any]:

@@ -44,17 +44,17 @@ class Step(NamedTuple):
     precision: Any
     """-1/(2 r) of the measured position."""
     with_speed: bool
-    states: tuple[Array, Array]
+    before: tuple[Array, Array]
     """Positions and speeds before it, (R, N) each."""
-    stepped: Array
-    """(2, R, N)."""
+    moved: Array
+    """Where it leads them without noise, (2, R, N)."""
     after: Array
-    """States after it, (2, R, N), which a pass begins with the noise alone in them."""
-    log_weights: Array
-    """Before it, (R, N)."""
+    """States after it, (2, R, N); a pass begins with the noise alone in them."""
+    log_before: Array
+    """Log weights before it, (R, N), and after it."""
     log_after: Array
     highest: Array
-    """Largest of these, (R, 1)."""
+    """Largest of those after it, (R, 1)."""
     sums: Array
     """Of the weights relative to it, and of their squares, (2, R)."""
 
@@ -145,6 +145,7 @@ def systematic(relative: Array, offsets: Array) -> NDArray[np.intp]:
     upto = np.cumsum(relative, axis=1)
     reached = upto * (count / upto[:, -1:]) + (1.0 - offsets[:, None])  # so many of the N numbers, rounded down
     children = np.minimum(reached, count).astype(np.intp)
+    children[:, -1] = count  # also where a sum was rounded
     children[:, 1:] -= children[:, :-1]
     return np.repeat(np.arange(relative.size) % count, children.ravel()).reshape(relative.shape)
 
