@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from .outcome import Event, Outcome
-from .pairing import Gate, Inbox, Matched, S, due, release
+from .pairing import Gate, Inbox, Matched, S, release
 from .samples import Measurement, Sample
 
 
@@ -77,7 +77,7 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
         first_ns = inbox.released_ns - gate.kept_ns
     stream = stream.since(first_ns)
     inbox = inbox._replace(now_ns=_newest(inbox.now_ns, sample)).with_stream(type(sample), stream)
-    return Pushed(*release(gate, inbox, due(gate, inbox)))
+    return Pushed(*release(gate, inbox, inbox.anchors.excess))
 
 
 def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
@@ -89,14 +89,12 @@ def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     refused = inbox.anchors.refusal(t_ns)
     if refused is not None:
         return Pushed(inbox, events=(Event(refused, _named(anchor)),))
-    begins = newest_ns is None or t_ns > newest_ns + gate.far_ns or 0 < inbox.begun_ns - t_ns <= gate.far_ns
     inbox = inbox._replace(
         now_ns=_newest(inbox.now_ns, anchor),
         anchors=inbox.anchors.added(anchor),
-        begun_ns=t_ns if begins else inbox.begun_ns,
         late=(0, 0),
     )
-    return Pushed(*release(gate, inbox, due(gate, inbox)))
+    return Pushed(*release(gate, inbox, inbox.anchors.excess))
 
 
 def _late(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> Pushed:

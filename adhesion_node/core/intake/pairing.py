@@ -10,7 +10,6 @@ happens to have arrived; so what an anchor is paired with does not depend on the
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -90,22 +89,15 @@ class Inbox(NamedTuple):
         return self._replace(others=MappingProxyType({**self.others, kind: stream}))
 
 
-def due(gate: Gate, inbox: Inbox) -> int:
-    """Number of anchors that need not wait any longer."""
-    waiting, newest_ns = inbox.anchors.samples, inbox.anchors.newest_ns
-    if not waiting or newest_ns is None:
-        return 0
-    in_order = bisect_right(waiting, newest_ns - gate.max_lag_ns, key=lambda anchor: anchor.t_ns)
-    count = inbox.anchors.excess
-    while count < in_order and not _waits(gate, inbox, waiting[count], newest_ns):
-        count += 1
-    return count
-
-
 def release(gate: Gate, inbox: Inbox, count: int) -> tuple[Inbox, tuple[Matched, ...]]:
-    """Release the first `count` anchors, each with the samples of its time."""
-    matched = []
-    for anchor in inbox.anchors.samples[:count]:
+    """Release the first `count` anchors and all that need not wait any longer, each with the samples of its time."""
+    matched: list[Matched] = []
+    for anchor in inbox.anchors.samples:
+        begins = inbox.released_ns is None or anchor.t_ns > inbox.released_ns + gate.far_ns
+        at_turn = inbox._replace(begun_ns=anchor.t_ns) if begins else inbox
+        if len(matched) >= count and _waits(gate, at_turn, anchor):
+            break
+        inbox = at_turn._replace(released_ns=anchor.t_ns)
         sources = () if isinstance(anchor, Measurement) else gate.sources
         values = tuple(_value(inbox, source, anchor.t_ns) for source in sources)
         for source, value in zip(sources, values, strict=True):
@@ -113,13 +105,14 @@ def release(gate: Gate, inbox: Inbox, count: int) -> tuple[Inbox, tuple[Matched,
                 spent = inbox.others[source.kind]._replace(spent_ns=value.t_ns)
                 inbox = inbox.with_stream(source.kind, spent)
         matched.append(Matched(anchor, values))
-    if matched:
-        left = inbox.anchors._replace(samples=inbox.anchors.samples[count:])
-        inbox = inbox._replace(anchors=left, released_ns=matched[-1].anchor.t_ns)
-    return inbox, tuple(matched)
+    left = inbox.anchors._replace(samples=inbox.anchors.samples[len(matched) :])
+    return inbox._replace(anchors=left) if matched else inbox, tuple(matched)
 
 
-def _waits(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> bool:
+def _waits(gate: Gate, inbox: Inbox, anchor: Any) -> bool:
+    newest_ns = inbox.anchors.newest_ns
+    if newest_ns is None or anchor.t_ns > newest_ns - gate.max_lag_ns:  # an earlier one may still come
+        return True
     if isinstance(anchor, Measurement):  # complete as it is
         return False
     return any(

@@ -239,6 +239,17 @@ def test_the_first_anchor_that_is_sorted_in_has_its_pressure() -> None:
     assert pressures(feeder.drain()) == [1.0, 2.0]
 
 
+def test_an_anchor_sorted_in_before_a_gap_shortens_it_in_every_order() -> None:
+    """Nothing begins at 1.1 s or 3.05 s, where a speed would be waited for: whichever position comes first."""
+    samples: tuple[Sample, ...] = (position(1.1), speed(1.1, 9.0), position(3.05))
+    released = set()
+    for order in itertools.permutations(samples):
+        feeder = Feeder(gate_of(Config(max_lag_s=3.0)))
+        feeder.push(position(0.9), pressure(1.3, 0.0), *order)
+        released.add(tuple(feeder.drain()))
+    assert len(released) == 1
+
+
 def test_late_anchors_in_a_row_are_a_step_back_in_time() -> None:
     feeder = running(20.0)
     feeder.push(*(position(k / 10) for k in range(5)))
