@@ -41,8 +41,8 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
     from .player import Replay
     from .ros import runtime
 
-    if options.set or options.params or options.seed is not None or options.estimator is not None:
-        own = "--set, --params, --seed and --estimator are for --offline"
+    if options.set or options.params or options.node or options.seed is not None or options.estimator is not None:
+        own = "--set, --params, --node, --seed and --estimator are for --offline"
         raise ValueError(f"{own}: start the live estimator of your choice with its own parameters")
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
@@ -124,4 +124,5 @@ def _parser() -> argparse.ArgumentParser:
     straight("--seed", type=int, help="seed of the estimator")
     straight("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
     straight("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
+    straight("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
     return parser

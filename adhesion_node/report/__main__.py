@@ -114,6 +114,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--seed", type=int, help="seed of the estimator")
     add("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
     add("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
+    add("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
     return parser
 
 

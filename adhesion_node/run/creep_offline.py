@@ -12,8 +12,7 @@ from typing import Any
 
 from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
-from ..wire import parameter_file
-from ..wire.settings import CREEP_SETTINGS, creep_setup_of
+from ..wire.settings import CREEP_SETTINGS, creep_setup_of, given
 from ..wire.topics import CREEP_INPUTS, WHEEL_SPEED
 from .creep_pipeline import CreepPipeline
 from .offline import feed, messages
@@ -31,7 +30,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         raise ValueError(f"seed = {options.seed}: the creep identification draws nothing, leave it out")
     if WHEEL_SPEED.name not in selection.values():
         raise ValueError(f"bag = {reader.path}: holds no {WHEEL_SPEED.name}, without which there is no creep")
-    setup = creep_setup_of(parameter_file.given(options, NODE, CREEP_SETTINGS))
+    setup = creep_setup_of(given(options, NODE, CREEP_SETTINGS))
     pipeline = CreepPipeline(setup.config)
     for _ in feed(pipeline, progress(messages(reader, selection), "messages"), CREEP_INPUTS, setup.line):
         pass

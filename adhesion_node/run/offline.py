@@ -16,9 +16,8 @@ from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
 from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
-from ..wire import parameter_file
 from ..wire.codecs import NOMINAL, Line, Rejected
-from ..wire.settings import SEED, SETTINGS, setup_of
+from ..wire.settings import SEED, SETTINGS, given, setup_of
 from ..wire.topics import ADHESION_INPUTS, POSITION, TRUTH_MU, TRUTH_STATE, Topic
 from .engine import EstimatorPipeline
 from .pipeline import Pipeline
@@ -44,7 +43,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
     """Settings by name from the options --params, --set and --seed, the later ones over the earlier."""
-    values = parameter_file.given(options, "estimator", SETTINGS)
+    values = given(options, "estimator", SETTINGS)
     return values if options.seed is None else {**values, SEED.name: options.seed}
 
 

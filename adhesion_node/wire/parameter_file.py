@@ -1,42 +1,115 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Settings of an offline estimator from a ROS parameter file and the command line."""
+"""ROS parameter files: whom their sections are for, and what they give an offline estimator.
+
+A section is for the nodes that its name matches: `*` stands for one part of a fully qualified name, `**` for any
+number of them, and a name without namespace for the node in the root. Of several sections for a node the later one
+wins, parameter by parameter, as in ROS.
+"""
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from ..core.setting import Setting
-from .settings import parse_setting
-
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 """Parameters that ROS itself gives to every node: they may stand in a parameter file and mean nothing here."""
 
+_WILDCARDS = {"*": r"/\w+", "**": r"(/\w+)*"}
 
-def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:
-    """Values of `--params` and, before them, of `--set`, by name; ValueError when one cannot be read."""
-    values = read(options.params, node) if options.params else {}
-    return values | dict(parse_setting(text, settings) for text in options.set)
+
+class Section(NamedTuple):
+    """Parameters by name, and the name of the nodes that they are for; nested namespaces are joined."""
+
+    name: str
+    values: dict[str, Any]
 
 
 def read(path: str, node: str) -> dict[str, Any]:
-    """Settings of a node in a ROS parameter file; ValueError when it is unreadable or not for that node."""
+    """Parameters of a node in a file; ValueError when it is unreadable or not for that node.
+
+    `node` is a fully qualified name such as /train1/estimator, or a bare name. A bare one is any node of that name,
+    as long as the file gives all that it names the same values.
+    """
+    found = sections(path)
+    nodes = _meant(found, node)
+    if not nodes:
+        listed, bare = ", ".join(one.name for one in found), node.rpartition("/")[2]
+        raise ValueError(f"params = {path}: has {listed or 'nobody'}: name the node '{bare}' or '/**'")
+    results = [_values(found, one) for one in nodes]
+    if any(result != results[0] for result in results):
+        listed = " and ".join(nodes)
+        raise ValueError(f"params = {path}: gives {listed} other values: say whose you want, --node {nodes[0]}")
+    return {name: value for name, value in results[0].items() if not name.startswith(OF_EVERY_NODE)}
+
+
+def unheeded(ros_arguments: Sequence[str], node: str) -> list[str]:
+    """Return one message for every --params-file that has no section for `node`, a fully qualified name.
+
+    The files are those that ROS has read already, so they are there and in order.
+    """
+    files = [file for option, file in pairwise(ros_arguments) if option == "--params-file"]
+    return [
+        f"--params-file {file}: has sections for {', '.join(one.name for one in found) or 'nobody'}, none for {node}: "
+        f"name one '{node.rpartition('/')[2]}' or '/**'"
+        for file, found in ((file, sections(file)) for file in files)
+        if not any(is_for(one.name, node) for one in found)
+    ]
+
+
+def sections(path: str) -> list[Section]:
+    """Return the sections of a file in their order; ValueError when it is no readable parameter file."""
     try:
-        document = YAML(typ="safe").load(Path(path).read_text(encoding="utf-8"))
-        nodes = {name.strip("/"): _flat(content["ros__parameters"]) for name, content in document.items()}
+        return list(_named(YAML(typ="safe").load(Path(path).read_text(encoding="utf-8")), ""))
     except (OSError, UnicodeDecodeError, YAMLError, AttributeError, LookupError, TypeError) as error:
         raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
-    if node not in nodes and "**" not in nodes:
-        raise ValueError(f"params = {path}: has {', '.join(nodes)}: name the node '{node}' or '/**'")
-    values = {**nodes.get("**", {}), **nodes.get(node, {})}
-    return {name: value for name, value in values.items() if not name.startswith(OF_EVERY_NODE)}
+
+
+def is_for(section: str, node: str) -> bool:
+    """Whether a section is for the node, a fully qualified name.
+
+    >>> [is_for(section, "/train1/estimator") for section in ("/**", "estimator", "/*/estimator", "train1/estimator")]
+    [True, False, True, True]
+    """
+    parts = section.strip("/").split("/")
+    return re.fullmatch("".join(_WILDCARDS.get(part, f"/{re.escape(part)}") for part in parts), node) is not None
+
+
+def _values(found: Sequence[Section], node: str) -> dict[str, Any]:
+    values: dict[str, Any] = {}
+    for section in found:
+        if is_for(section.name, node):
+            values |= section.values
+    return values
+
+
+def _meant(found: Sequence[Section], node: str) -> list[str]:
+    """Return the nodes for which the file has something: those it spells out, or else one for each of its patterns."""
+    if node.startswith("/"):
+        return [node] if any(is_for(section.name, node) for section in found) else []
+    ranked: dict[int, list[str]] = {}
+    for section in found:
+        parts = section.name.strip("/").split("/")
+        *namespace, last = parts
+        if last in (node, "*", "**"):
+            spelled = ["any" if part == "*" else part for part in (*namespace, node) if part != "**"]
+            ranked.setdefault(2 if "**" in parts else int("*" in parts), []).append("/" + "/".join(spelled))
+    return list(dict.fromkeys(ranked[min(ranked)])) if ranked else []
+
+
+def _named(content: Mapping[str, Any], name: str) -> Iterator[Section]:
+    for key, value in content.items():
+        if key == "ros__parameters":
+            yield Section(name, _flat(value))
+        else:
+            yield from _named(value, f"{name}/{str(key).strip('/')}".lstrip("/"))
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
@@ -17,6 +18,7 @@ from ..core.creep.vehicle import Vehicle
 from ..core.physics.track import parse_track
 from ..core.physics.train import Train
 from ..core.setting import Setting, check_settings, make, setting, settings_of
+from . import parameter_file
 from .codecs import Line
 
 TRACK = Setting(
@@ -129,6 +131,15 @@ def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:
     timeout_s = SENSOR_TIMEOUT.check(values.get(SENSOR_TIMEOUT.name, SENSOR_TIMEOUT.default))
     config = make(CreepConfig, values, vehicle=make(Vehicle, values))
     return CreepSetup(config, make(Line, values), float(timeout_s))
+
+
+def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:
+    """Values of `--params` and, before them, of `--set`, by name; ValueError when one cannot be read.
+
+    `--node` names the node whose parameters are meant where a file has them for several.
+    """
+    values = parameter_file.read(options.params, getattr(options, "node", None) or node) if options.params else {}
+    return values | dict(parse_setting(text, settings) for text in options.set)
 
 
 def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:

@@ -23,7 +23,7 @@ from std_msgs.msg import Float64
 
 from adhesion_node.command.signals import stop_on_signals
 from adhesion_node.nodes.ros import runtime
-from adhesion_node.wire.parameter_sections import sections_of, unheeded
+from adhesion_node.wire.parameter_file import sections, unheeded
 
 PROGRAM = """
 import os, sys
@@ -229,7 +229,7 @@ def test_a_parameter_file_for_another_node_is_told(start: Start, tmp_path: Path,
 def test_nested_namespaces_are_sections_too(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text("train1:\n  probe: {ros__parameters: {gain: 1.0}}\n  other: {ros__parameters: {}}\n")
-    assert sections_of(str(file)) == ["train1/probe", "train1/other"]
+    assert [one.name for one in sections(str(file))] == ["train1/probe", "train1/other"]
     assert unheeded(["--params-file", str(file)], "/train1/probe") == []
     (warning,) = unheeded(["-p", "a:=1", "--params-file", str(file)], "/train2/probe")
     assert "has sections for train1/probe, train1/other, none for /train2/probe" in warning

@@ -29,7 +29,7 @@ from adhesion_node.command.signals import StopRequest, stop_on_signals
 
 from ...command.options import help_texts
 from ...core.setting import Setting, by_group
-from ...wire.parameter_sections import unheeded
+from ...wire.parameter_file import unheeded
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 """Exit codes of every program."""
