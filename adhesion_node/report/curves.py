@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 
 from ..core import Config, Regime
 from ..core.physics import braking
-from ..core.physics.train import KMH, Array
-from ..wire.codecs import ATMOSPHERE_PA
-from .findings import distances, first_identified
+from ..core.physics.train import KMH
+from .charts import Chart, charts
+from .findings import Distances, distances, first_identified
 from .run import FIXED_MU, Curve, Run, bands
-from .series import Series, Times
+from .series import Times
 
 MOST_POINTS = 1500
 """Points of a series at most: more than a screen is wide."""
@@ -43,39 +43,29 @@ def chart_data(subject: Subject, target_kmh: float) -> dict[str, Any]:
     """Return what the script of the report draws; lengths in m, speeds in km/h, forces in kN, times in s."""
     run, config = subject.run, subject.config
     planned = distances(run, target_kmh * KMH, config.train)
-    brake = config.train.brake_force(run.pressure.values - ATMOSPHERE_PA) / 1e3
-    moments = _moments(run, config, planned.identified, planned.saved, planned.saved_at_least)
-    first, seen = first_identified(run), run.learnt
+    moments = _moments(run, config, planned)
+    first = first_identified(run)
+    place, speed = run.way
+    kept = _thinned(place.t_ns.size, MOST_POINTS)
     return {
         "name": subject.name,
         "source": subject.source,
-        "confidence": "" if run.confidence is None else f", {run.confidence:.0%} confidence",
         "bands": [
             {"from": _round(band.start_s, 2), "to": _round(band.end_s, 2), "kind": band.regime.lower(), "label": label}
             for band in bands(run)
             if (label := IN_WORDS.get(band.regime))
         ],
-        "true_mu": _over_time(run, run.true_mu.t_ns, run.true_mu.values, 5),
-        "mu": _over_time(run, run.mu.t_ns, run.mu.values, 5),
-        "mu_lower": _over_time(run, run.mu_lower.t_ns, run.mu_lower.values, 5),
-        "true_speed": _over_time(run, run.true_speed.t_ns, run.true_speed.values / KMH, 2),
-        "speed": _over_time(run, run.speed.t_ns, run.speed.values / KMH, 2),
-        "brake": _over_time(run, run.pressure.t_ns, brake, 1),
-        "true_force": _over_time(run, run.true_mu.t_ns, config.train.adhesion_force(run.true_mu.values) / 1e3, 1),
-        "identified_force": _over_time(run, run.mu.t_ns, config.train.adhesion_force(run.mu.values) / 1e3, 1),
-        "saved": _over_time(run, run.speed.t_ns[seen], planned.saved[seen], 1),
-        "saved_at_least": _over_time(run, run.speed.t_ns[seen], planned.saved_at_least[seen], 1),
-        "path": _path(run),
+        "charts": [_chart(run, chart) for chart in charts(run, target_kmh, config.train)],
+        "path": _way(run, Curve(0, place.values[kept], speed.values[kept])),
         "moments": moments,
         "opens_at": moments[-1]["t"] if first is None else _round(run.seconds(run.speed.t_ns)[first], 2),
     }
 
 
-def _moments(run: Run, config: Config, distance: Array, saved: Array, least: Array) -> list[dict[str, Any]]:
+def _moments(run: Run, config: Config, planned: Distances) -> list[dict[str, Any]]:
     """What is known at every estimate that has a place on the slider, with the braking curves from there."""
-    start_m = _start_m(run)
     safe, nominal = ({curve.t_ns: curve for curve in curves} for curves in (run.safe, run.nominal))
-    regimes = dict(zip(run.regime.t_ns.tolist(), run.regime.values.tolist(), strict=True))
+    regimes = run.regime.by_time()
     kept = _thinned(run.speed.t_ns.size, MOST_POINTS // 5)
     times = run.speed.t_ns[kept]
     columns = (run.speed.values[kept], run.position.values[kept], run.mu.at(times), run.mu_lower.at(times))
@@ -90,37 +80,29 @@ def _moments(run: Run, config: Config, distance: Array, saved: Array, least: Arr
                 "mu": _round(mu, 5),
                 "mu_lower": _round(lower, 5),
                 "regime": IN_WORDS.get(regimes.get(t_ns, ""), "regime not recorded"),
-                "distance": _round(distance[i], 1),
-                "saved": _round(saved[i], 1),
-                "saved_at_least": _round(least[i], 1),
-                "fixed": _way(Curve(t_ns, place + fixed.distance_m, fixed.speed_mps), start_m),
-                "safe": _way(safe[t_ns], start_m) if t_ns in safe else None,
-                "nominal": _way(nominal[t_ns], start_m) if t_ns in nominal else None,
+                "distance": _round(planned.identified[i], 1),
+                "saved": _round(planned.saved[i], 1),
+                "saved_at_least": _round(planned.saved_at_least[i], 1),
+                "fixed": _way(run, Curve(t_ns, place + fixed.distance_m, fixed.speed_mps)),
+                "safe": _way(run, safe[t_ns]) if t_ns in safe else None,
+                "nominal": _way(run, nominal[t_ns]) if t_ns in nominal else None,
             }
         )
     return moments
 
 
-def _start_m(run: Run) -> float:
-    place = run.true_position if run.true_position.t_ns.size else run.position
-    return float(place.values[0])
-
-
-def _path(run: Run) -> dict[str, list[float | None]]:
-    """The way of the train: the true one where it is known."""
-    known = run.true_position.t_ns.size > 0
-    place, speed = (run.true_position, run.true_speed) if known else (run.position, run.speed)
-    kept = _thinned(place.t_ns.size, MOST_POINTS)
-    return _way(Curve(0, place.values[kept], speed.values[kept]), _start_m(run))
-
-
-def _way(curve: Curve, start_m: float) -> dict[str, list[float | None]]:
+def _way(run: Run, curve: Curve) -> dict[str, list[float | None]]:
+    start_m = float(run.way[0].values[0])
     return {"x": _rounded(curve.position_m - start_m, 1), "y": _rounded(curve.speed_mps / KMH, 2)}
 
 
-def _over_time(run: Run, t_ns: Times, values: Array, digits: int) -> dict[str, list[float | None]]:
-    kept = _thinned(t_ns.size, MOST_POINTS)
-    return {"t": _rounded(run.seconds(t_ns[kept]), 3), "v": _rounded(values[kept], digits)}
+def _chart(run: Run, chart: Chart) -> dict[str, Any]:
+    lines = []
+    for label, kind, series in chart.lines:
+        kept = _thinned(series.t_ns.size, MOST_POINTS)
+        x, y = _rounded(run.seconds(series.t_ns[kept]), 3), _rounded(series.values[kept], chart.digits)
+        lines.append({"label": label, "kind": kind, "dots": kind == "identified", "x": x, "y": y})
+    return {"title": chart.title, "range": chart.range, "lines": lines}
 
 
 def _thinned(size: int, most: int) -> Times:
@@ -136,10 +118,3 @@ def _rounded(values: ArrayLike, digits: int) -> list[float | None]:
 
 def _round(value: float, digits: int) -> float:
     return round(float(value), digits)
-
-
-def changes(series: Series) -> list[tuple[int, str]]:
-    """Times and texts at which a series of texts changes, the first included; "" is left out."""
-    texts = [str(text) for text in series.values]
-    rows = zip(series.t_ns.tolist(), texts, ["", *texts[:-1]], strict=True)
-    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]

@@ -5,22 +5,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
 from ..bag import BagReader
 from ..command.options import progress
+from ..core import Estimate
 from ..core.physics.braking import BrakingCurve
-from ..core.prediction import Prediction
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.score import Truth
 from ..wire.settings import Setup
-from ..wire.topics import BRAKE_PRESSURE, TRUTH_MU, TRUTH_STATE, Topic
-from .run import Curve, Run, position_of, speed_of
-from .series import Series, read_series
+from .findings import listed
+from .run import Curve, Run, read_inputs
+from .series import Series
 
 
 def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) -> Run:
@@ -32,45 +32,27 @@ def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) 
     recorded = progress(offline.messages(reader, selection), "messages")
     predictions = offline.replay(pipeline, Truth(), recorded, setup.line).predictions
     if not predictions:
-        dropped = ", ".join(f"{count} {reason}" for reason, count in pipeline.dropped.items()) or "nothing"
+        dropped = listed(pipeline.dropped) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")
-    sources = {ours: recorded for recorded, ours in selection.items()}
+    t_ns = np.array([prediction.estimate.t_ns for prediction in predictions], dtype=np.int64)
 
-    def series(topic: Topic, value: Any) -> Series:
-        return read_series(reader, topic._replace(name=sources.get(topic.name, topic.name)), value)
+    def column(value: Callable[[Estimate], Any]) -> Series:
+        return Series(t_ns, np.array([value(prediction.estimate) for prediction in predictions]))
 
-    return Run(
-        true_mu=series(TRUTH_MU, lambda message: message.data),
-        true_position=series(TRUTH_STATE, position_of),
-        true_speed=series(TRUTH_STATE, speed_of),
-        pressure=series(BRAKE_PRESSURE, lambda message: message.fluid_pressure),
-        mu=_column(predictions, "mu"),
-        mu_lower=_column(predictions, "mu_lower"),
-        position=_column(predictions, "position_m"),
-        speed=_column(predictions, "speed_mps"),
-        regime=_series(predictions, [prediction.estimate.regime.name for prediction in predictions]),
-        safe=_curves(predictions, [prediction.safe for prediction in predictions]),
-        nominal=_curves(predictions, [prediction.nominal for prediction in predictions]),
-        remarks=_series(predictions[:0], []),
-        levels=_series(predictions[:0], []),
+    return read_inputs(reader, {ours: recorded for recorded, ours in selection.items()})._replace(
+        mu=column(lambda estimate: estimate.mu),
+        mu_lower=column(lambda estimate: estimate.mu_lower),
+        position=column(lambda estimate: estimate.position_m),
+        speed=column(lambda estimate: estimate.speed_mps),
+        regime=column(lambda estimate: estimate.regime.name),
+        safe=tuple(_curve(made.estimate, made.safe) for made in predictions if made.safe is not None),
+        nominal=tuple(_curve(made.estimate, made.nominal) for made in predictions if made.nominal is not None),
         counts=_counts(pipeline),
     )
 
 
-def _column(predictions: list[Prediction], name: str) -> Series:
-    return _series(predictions, [getattr(prediction.estimate, name) for prediction in predictions])
-
-
-def _series(predictions: list[Prediction], values: list[Any]) -> Series:
-    return Series(np.array([prediction.estimate.t_ns for prediction in predictions], dtype=np.int64), np.array(values))
-
-
-def _curves(predictions: list[Prediction], curves: list[BrakingCurve | None]) -> tuple[Curve, ...]:
-    return tuple(
-        Curve(prediction.estimate.t_ns, prediction.estimate.position_m + curve.distance_m, curve.speed_mps)
-        for prediction, curve in zip(predictions, curves, strict=True)
-        if curve is not None
-    )
+def _curve(estimate: Estimate, curve: BrakingCurve) -> Curve:
+    return Curve(estimate.t_ns, estimate.position_m + curve.distance_m, curve.speed_mps)
 
 
 def _counts(pipeline: Pipeline) -> dict[str, str]:

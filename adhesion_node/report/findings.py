@@ -15,7 +15,6 @@ from ..core.physics.train import KMH, Array, Train
 from ..run.score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
 from ..wire.codecs import ATMOSPHERE_PA
 from .run import FIXED_MU, Run, distance_to_target
-from .series import Series
 
 AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
 """Findings at the first estimate that counts as identified: speed, adhesion, braking distances."""
@@ -59,9 +58,9 @@ def distances(run: Run, target_mps: float, train: Train) -> Distances:
 
 def first_identified(run: Run) -> int | None:
     """Index of the first estimate of an adhesion that limits, after 30 km/h of braking; None where there is none."""
-    limits = dict(zip(run.regime.t_ns.tolist(), run.regime.values.tolist(), strict=True))
+    regimes = run.regime.by_time()
     slow = run.speed.values < np.maximum.accumulate(run.speed.values) - CONVERGED_AFTER_MPS
-    shown = (i for i in np.flatnonzero(slow) if limits.get(int(run.speed.t_ns[i])) == Regime.ADHESION_LIMITED.name)
+    shown = (i for i in np.flatnonzero(slow) if regimes.get(int(run.speed.t_ns[i])) == Regime.ADHESION_LIMITED.name)
     return next((int(i) for i in shown), None)
 
 
@@ -96,14 +95,17 @@ def dropped(counts: Mapping[str, str]) -> dict[str, int]:
     return {key.removeprefix("dropped."): int(value) for key, value in counts.items() if key.startswith("dropped.")}
 
 
+def listed(counts: Mapping[str, int]) -> str:
+    """Counts by reason in words.
+
+    >>> listed({"LATE": 2, "OLD": 1})
+    '2 LATE, 1 OLD'
+    """
+    return ", ".join(f"{count} {reason}" for reason, count in counts.items())
+
+
 def _error(run: Run, config: Config) -> float | None:
     """The score of an offline replay; None where the recording holds no truth of the estimates' stamps."""
-    truth = Truth()
-    truth.mu = _by_time(run.true_mu)
-    truth.speed_mps = _by_time(run.true_speed)
-    truth.pressure_pa = {t_ns: max(absolute - ATMOSPHERE_PA, 0.0) for t_ns, absolute in _by_time(run.pressure).items()}
-    return mean_relative_error_percent(config, truth, [_Point(*row) for row in _by_time(run.mu).items()])
-
-
-def _by_time(series: Series) -> dict[int, float]:
-    return dict(zip(series.t_ns.tolist(), series.values.tolist(), strict=True))
+    pressure_pa = run.pressure.map(lambda absolute: np.maximum(absolute - ATMOSPHERE_PA, 0.0)).by_time()
+    truth = Truth(mu=run.true_mu.by_time(), speed_mps=run.true_speed.by_time(), pressure_pa=pressure_pa)
+    return mean_relative_error_percent(config, truth, [_Point(*row) for row in run.mu.by_time().items()])

@@ -13,10 +13,11 @@ from typing import Any
 
 from ..web import as_json, page
 from ..wire.settings import SETTINGS
-from .curves import Subject, changes, chart_data
-from .findings import findings
-from .run import FIXED_MU
-from .table import Row, rows
+from .curves import Subject, chart_data
+from .findings import findings, listed
+from .run import FIXED_MU, Run
+from .series import Series
+from .table import cells, rows
 
 MOST_CHANGES = 40
 """Lines of a list of changes; the rest is counted."""
@@ -33,11 +34,8 @@ FINDINGS: tuple[tuple[str, _Write], ...] = (
     ("Braking distance by the fixed worst case", lambda f, s: _value(f["fixed_m"], "{:.0f} m")),
     ("saved by the identified μ̂", lambda f, s: _saved(f, "saved_m")),
     ("saved at least", lambda f, s: _saved(f, "saved_at_least_m") + _confidence(s)),
-    (
-        "Mean relative error while the adhesion limits",
-        lambda f, s: _value(f["mean_relative_error_percent"], "{:.2f} %"),
-    ),
-    ("Messages not used", lambda f, s: escape(_listed(f["dropped"]) or "none")),
+    ("Mean relative error while adhesion limits", lambda f, s: _value(f["mean_relative_error_percent"], "{:.2f} %")),
+    ("Messages not used", lambda f, s: escape(listed(f["dropped"]) or "none")),
 )
 """Lines of the table of findings: their names and how they are written."""
 
@@ -47,23 +45,22 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
 
     Raises ValueError when a recorded number is not finite.
     """
-    data = {
-        "runs": [chart_data(subject, target_kmh) for subject in subjects],
-        "target_kmh": target_kmh,
-        "fixed_mu": FIXED_MU,
-    }
+    runs = [chart_data(subject, target_kmh) for subject in subjects]
     subtitle = (
         f"Wheel–rail adhesion and emergency braking to {target_kmh:g} km/h, beside the fixed worst case "
         f"μ\u00a0=\u00a0{FIXED_MU}. Distances are those of the braking curves; without a curve μ keeps its value. "
         "Bands: nothing to learn (grey), the brake limits (blue), the adhesion limits (orange)."
     )
-    details = [_section("Distances", subjects, lambda subject: _distances(subject, target_kmh))]
-    details += [_section("Drops and diagnostics", subjects, _diagnostics)]
-    details += [_parameters(parameters), _versions()]
+    details = (
+        _section("Distances", subjects, lambda subject: _distances(subject, target_kmh)),
+        _section("Drops and diagnostics", subjects, _diagnostics),
+        _parameters(parameters),
+        _versions(),
+    )
     return page(
         "report",
         title=escape(title),
-        data=as_json(data),
+        data=as_json({"runs": runs, "target_kmh": target_kmh, "fixed_mu": FIXED_MU}),
         subtitle=escape(subtitle),
         findings=_findings(subjects, target_kmh),
         details="\n".join(details),
@@ -72,10 +69,7 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
 
 def _findings(subjects: Sequence[Subject], target_kmh: float) -> str:
     found = [findings(subject.run, subject.config, target_kmh) for subject in subjects]
-    body = (
-        [escape(name), *(write(one, subject) for one, subject in zip(found, subjects, strict=True))]
-        for name, write in FINDINGS
-    )
+    body = ([escape(name), *map(write, found, subjects)] for name, write in FINDINGS)
     return _table(["", *(escape(subject.name) for subject in subjects)], body)
 
 
@@ -94,10 +88,6 @@ def _confidence(subject: Subject) -> str:
     return " (confidence not recorded)" if confidence is None else f" ({confidence:.0%} confidence)"
 
 
-def _listed(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{count} {reason}" for reason, count in counts.items())
-
-
 def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject], str]) -> str:
     columns = "".join(f"<section><h3>{escape(subject.name)}</h3>{write(subject)}</section>" for subject in subjects)
     return f'<h2>{escape(title)}</h2><div class="columns">{columns}</div>'
@@ -105,26 +95,25 @@ def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject],
 
 def _distances(subject: Subject, target_kmh: float) -> str:
     header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "by bound m", f"fixed {FIXED_MU} m"]
-    body = [_distance_cells(row) for row in rows(subject.run, target_kmh, subject.config.train)]
+    body = [cells(row, "–") for row in rows(subject.run, target_kmh, subject.config.train)]
     return _table(header, body, "number") if body else "<p>The train did not slow down.</p>"
-
-
-def _distance_cells(row: Row) -> list[str]:
-    adhesions = (_value(mu, "{:.4f}") for mu in (row.true_mu, row.mu, row.mu_lower))
-    lengths = (_value(m, "{:.0f}") for m in (row.true_m, row.identified_m, row.at_least_m, row.fixed_m))
-    return [f"{row.speed_kmh:.0f}", *adhesions, *lengths]
 
 
 def _diagnostics(subject: Subject) -> str:
     run = subject.run
     counts = _table(["", ""], ([escape(key), f"<code>{escape(value)}</code>"] for key, value in run.counts.items()))
-    lists = (("The estimator said", run.remarks), ("The ATP monitor said", run.levels))
-    return counts + "".join(_changes(subject, title, changes(series)) for title, series in lists if series.t_ns.size)
+    return counts + _changes(run, "The estimator said", run.remarks) + _changes(run, "The ATP monitor said", run.levels)
 
 
-def _changes(subject: Subject, title: str, found: list[tuple[int, str]]) -> str:
-    origin_ns = subject.run.origin_ns
-    body = [[f"{(t_ns - origin_ns) * 1e-9:.1f} s", escape(text)] for t_ns, text in found[:MOST_CHANGES]]
+def changes(series: Series) -> list[tuple[int, str]]:
+    """Times and texts at which a series of texts changes, the first included; "" is left out."""
+    rows = zip(series.t_ns.tolist(), map(str, series.values), ["", *map(str, series.values)], strict=False)
+    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]
+
+
+def _changes(run: Run, title: str, series: Series) -> str:
+    found = changes(series)
+    body = [[f"{(t_ns - run.origin_ns) * 1e-9:.1f} s", escape(text)] for t_ns, text in found[:MOST_CHANGES]]
     more = f"<p>and {len(found) - MOST_CHANGES} more changes</p>" if len(found) > MOST_CHANGES else ""
     return (_table([title, ""], body) + more) if body else ""
 

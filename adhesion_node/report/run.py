@@ -5,8 +5,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from itertools import groupby
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,27 +17,15 @@ from ..bag import BagReader
 from ..core import Regime
 from ..core.physics import braking
 from ..core.physics.train import GRAVITY, Array, Train
-from ..wire import codecs as reading
-from ..wire.topics import (
-    ATP_STATUS,
-    BRAKE_PRESSURE,
-    BRAKING_CURVE,
-    BRAKING_CURVE_NOMINAL,
-    DECELERATION,
-    DIAGNOSTICS,
-    MU,
-    MU_LOWER,
-    STATE,
-    TRUTH_MU,
-    TRUTH_STATE,
-    Topic,
-)
-from .series import Series, Times, read_last_status, read_remarks, read_series, read_status, read_unstamped
+from ..wire import topics
+from ..wire.codecs import stamp_ns
+from ..wire.topics import Topic
+from .series import NONE, Series, Times, read_last_status, read_remarks, read_series, read_status, read_unstamped
 
 FIXED_MU = 0.0726
 """The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""
 
-RESULTS = (MU, MU_LOWER, STATE)
+RESULTS = (topics.MU, topics.MU_LOWER, topics.STATE)
 """Without these a recording holds no results."""
 
 
@@ -61,27 +50,27 @@ class Band(NamedTuple):
 
 
 class Run(NamedTuple):
-    """The series of a recording; those of the truth are empty where it holds none."""
+    """The series of a recording; empty where it holds none."""
 
-    true_mu: Series
-    true_position: Series
-    true_speed: Series
-    pressure: Series
+    true_mu: Series = NONE
+    true_position: Series = NONE
+    true_speed: Series = NONE
+    pressure: Series = NONE
     """Absolute, Pa."""
-    mu: Series
-    mu_lower: Series
-    position: Series
-    speed: Series
-    regime: Series
-    safe: tuple[Curve, ...]
+    mu: Series = NONE
+    mu_lower: Series = NONE
+    position: Series = NONE
+    speed: Series = NONE
+    regime: Series = NONE
+    safe: tuple[Curve, ...] = ()
     """On mu_lower, a weaker brake and the least resistance of the track; at most one for each estimate."""
-    nominal: tuple[Curve, ...]
+    nominal: tuple[Curve, ...] = ()
     """On mu and the identified law over speed."""
-    remarks: Series
+    remarks: Series = NONE
     """What the estimator said while all was not well."""
-    levels: Series
+    levels: Series = NONE
     """Of the ATP monitor."""
-    counts: Mapping[str, str]
+    counts: Mapping[str, str] = MappingProxyType({})
     """Last diagnostics by key."""
 
     @property
@@ -100,6 +89,12 @@ class Run(NamedTuple):
         """When the run starts."""
         return int(min(series.t_ns[0] for series in (self.speed, self.true_speed) if series.t_ns.size))
 
+    @property
+    def way(self) -> tuple[Series, Series]:
+        """Place and speed of the train: the true ones where they are known."""
+        known = self.true_position.t_ns.size > 0
+        return (self.true_position, self.true_speed) if known else (self.position, self.speed)
+
     def seconds(self, t_ns: Times) -> Array:
         """Times as seconds from the start of the run."""
         return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
@@ -107,26 +102,36 @@ class Run(NamedTuple):
 
 def read_run(reader: BagReader) -> Run:
     """Read the series. Raises ValueError when the recording holds no estimates."""
-    run = Run(
-        true_mu=read_series(reader, TRUTH_MU, lambda message: message.data),
-        true_position=read_series(reader, TRUTH_STATE, position_of),
-        true_speed=read_series(reader, TRUTH_STATE, speed_of),
-        pressure=read_series(reader, BRAKE_PRESSURE, lambda message: message.fluid_pressure),
+    run = read_inputs(reader, {})._replace(
         mu=_read_mu(reader),
-        mu_lower=read_unstamped(reader, MU_LOWER, (STATE, DECELERATION)),
-        position=read_series(reader, STATE, position_of),
-        speed=read_series(reader, STATE, speed_of),
-        regime=read_status(reader, DIAGNOSTICS, "regime"),
-        safe=_read_curves(reader, BRAKING_CURVE),
-        nominal=_read_curves(reader, BRAKING_CURVE_NOMINAL),
-        remarks=read_remarks(reader, DIAGNOSTICS, "regime"),
-        levels=read_status(reader, ATP_STATUS, "level"),
-        counts=read_last_status(reader, DIAGNOSTICS, "regime"),
+        mu_lower=read_unstamped(reader, topics.MU_LOWER, (topics.STATE, topics.DECELERATION)),
+        position=read_series(reader, topics.STATE, _position),
+        speed=read_series(reader, topics.STATE, _speed),
+        regime=read_status(reader, topics.DIAGNOSTICS, "regime"),
+        safe=_read_curves(reader, topics.BRAKING_CURVE),
+        nominal=_read_curves(reader, topics.BRAKING_CURVE_NOMINAL),
+        remarks=read_remarks(reader, topics.DIAGNOSTICS, "regime"),
+        levels=read_status(reader, topics.ATP_STATUS, "level"),
+        counts=read_last_status(reader, topics.DIAGNOSTICS, "regime"),
     )
     for topic, series in zip(RESULTS, (run.mu, run.mu_lower, run.speed), strict=True):
         if not series.t_ns.size:
             raise ValueError(f"bag = {reader.path}: holds no {topic.name}: record while the estimator runs")
     return run
+
+
+def read_inputs(reader: BagReader, recorded: Mapping[str, str]) -> Run:
+    """Read the truth and the brake pressure; `recorded` has their names in the recording where these differ."""
+
+    def series(topic: Topic, value: Callable[[Any], Any]) -> Series:
+        return read_series(reader, topic._replace(name=recorded.get(topic.name, topic.name)), value)
+
+    return Run(
+        true_mu=series(topics.TRUTH_MU, lambda message: message.data),
+        true_position=series(topics.TRUTH_STATE, _position),
+        true_speed=series(topics.TRUTH_STATE, _speed),
+        pressure=series(topics.BRAKE_PRESSURE, lambda message: message.fluid_pressure),
+    )
 
 
 def bands(run: Run) -> list[Band]:
@@ -156,24 +161,22 @@ def distance_to_target(
     )
 
 
-def position_of(message: Any) -> float:
-    """Place along the track, m, of an Odometry."""
-    return float(message.pose.pose.position.x)
-
-
-def speed_of(message: Any) -> float:
-    """Speed along the track, m/s, of an Odometry."""
-    return float(message.twist.twist.linear.x)
-
-
 def _held(train: Train, speed_mps: float, mu: float, target_mps: float) -> float:
     return float(braking.curve(train, speed_mps, mu, target_mps).distance_m[-1])
 
 
+def _position(odometry: Any) -> float:
+    return float(odometry.pose.pose.position.x)
+
+
+def _speed(odometry: Any) -> float:
+    return float(odometry.twist.twist.linear.x)
+
+
 def _read_mu(reader: BagReader) -> Series:
     """Read mu from its stamped form, the deceleration -mu g, where it was recorded, else from the number alone."""
-    stamped = read_series(reader, DECELERATION, lambda message: -message.accel.accel.linear.x / GRAVITY)
-    return stamped if stamped.t_ns.size else read_unstamped(reader, MU, (STATE,))
+    stamped = read_series(reader, topics.DECELERATION, lambda message: -message.accel.accel.linear.x / GRAVITY)
+    return stamped if stamped.t_ns.size else read_unstamped(reader, topics.MU, (topics.STATE,))
 
 
 def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
@@ -183,4 +186,4 @@ def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
 def _curve(message: Any) -> Curve:
     rows = [(point.positions[0], point.velocities[0]) for point in message.points]
     place, speed = np.array(rows).T
-    return Curve(reading.stamp_ns(message.header), place, speed)
+    return Curve(stamp_ns(message.header), place, speed)

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from ..bag import BagReader
 from ..core.physics.train import Array
-from ..wire import codecs as reading
-from ..wire.topics import Topic
+from ..wire.codecs import stamp_ns
+from ..wire.results import Status
+from ..wire.topics import DIAGNOSTICS, Topic
 
 Times = NDArray[np.int64]
 
@@ -29,6 +30,18 @@ class Series(NamedTuple):
     def at(self, t_ns: Times) -> Array:
         """Values interpolated at other times; held constant before the first and after the last."""
         return np.asarray(np.interp(t_ns, self.t_ns, self.values), dtype=np.float64)
+
+    def map(self, change: Callable[[Array], Any]) -> Series:
+        """What `change` makes of the values, at the same times."""
+        return self._replace(values=np.asarray(change(self.values)))
+
+    def by_time(self) -> dict[int, Any]:
+        """Values by time."""
+        return dict(zip(self.t_ns.tolist(), self.values.tolist(), strict=True))
+
+
+NONE = Series(np.array([], dtype=np.int64), np.array([]))
+"""Of what was not recorded."""
 
 
 def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any]) -> Series:
@@ -62,7 +75,9 @@ def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read the value of `key` in a topic of diagnostics, as texts."""
-    return read_series(reader, topic, lambda message: _status_value(message, key))
+    return read_series(
+        reader, topic, lambda message: next((status.values[key] for status in _with_key(message, key)), "")
+    )
 
 
 def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
@@ -79,19 +94,14 @@ def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str
     last: dict[str, str] = {}
     for record in reader.messages([topic.name]):
         for status in _with_key(record.message, key):
-            last = {pair.key: pair.value for pair in status.values}
+            last = dict(status.values)
     return last
 
 
-def _with_key(message: Any, key: str) -> list[Any]:
-    return [status for status in message.status if any(pair.key == key for pair in status.values)]
+def _with_key(message: Any, key: str) -> list[Status]:
+    return [status for status in DIAGNOSTICS.read(message).entries if key in status.values]
 
 
 def _time(message: Any, log_ns: int) -> int:
     header = getattr(message, "header", None)
-    return log_ns if header is None else reading.stamp_ns(header)
-
-
-def _status_value(message: Any, key: str) -> str:
-    pairs = ((pair.key, pair.value) for status in message.status for pair in status.values)
-    return next((value for name, value in pairs if name == key), "")
+    return log_ns if header is None else stamp_ns(header)

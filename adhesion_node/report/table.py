@@ -22,6 +22,10 @@ HEADER = (
     "     km/h   true identified  at least    true identified  at least  fixed {fixed}"
 )
 
+FORMS = ("{:.0f}", "{:.4f}", "{:.4f}", "{:.4f}", "{:.0f}", "{:.0f}", "{:.0f}", "{:.0f}")
+WIDTHS = (9, 7, 11, 10, 8, 11, 10, 10)
+"""How the columns are written."""
+
 
 class Row(NamedTuple):
     """An estimate, and the braking distances, m, from its speed; the truth is None where the recording lacks it."""
@@ -51,18 +55,15 @@ def rows(run: Run, target_kmh: float, train: Train = CRH3) -> Iterator[Row]:
         yield Row(float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *lengths)
 
 
+def cells(row: Row, absent: str = "") -> list[str]:
+    """Return a row as texts."""
+    return [absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True)]
+
+
 def table(run: Run, target_kmh: float, train: Train = CRH3) -> str:
     """The table as text; columns of the truth stay empty where the recording holds none."""
-    return "\n".join([HEADER.format(target=target_kmh, fixed=FIXED_MU), *map(_line, rows(run, target_kmh, train))])
-
-
-def _line(row: Row) -> str:
-    true_mu = "" if row.true_mu is None else f"{row.true_mu:.4f}"
-    true_m = "" if row.true_m is None else f"{row.true_m:.0f}"
-    return (
-        f"{row.speed_kmh:9.0f} {true_mu:>6} {row.mu:10.4f} {row.mu_lower:9.4f} {true_m:>7} "
-        f"{row.identified_m:10.0f}{row.at_least_m:10.0f}{row.fixed_m:10.0f}"
-    )
+    lines = (map(str.rjust, cells(row), WIDTHS) for row in rows(run, target_kmh, train))
+    return "\n".join([HEADER.format(target=target_kmh, fixed=FIXED_MU), *map("".join, lines)])
 
 
 def _truth(run: Run, t_ns: int, target_mps: float) -> tuple[float | None, float | None]:

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
@@ -27,14 +28,14 @@ class Identified(Protocol):
     def mu(self) -> float: ...
 
 
+@dataclass
 class Truth:
     """True adhesion and speed, and the measured brake pressure, by stamp."""
 
-    def __init__(self) -> None:
-        self.mu: dict[int, float] = {}
-        self.speed_mps: dict[int, float] = {}
-        self.pressure_pa: dict[int, float] = {}
-        """Gauge."""
+    mu: dict[int, float] = field(default_factory=dict)
+    speed_mps: dict[int, float] = field(default_factory=dict)
+    pressure_pa: dict[int, float] = field(default_factory=dict)
+    """Gauge."""
 
     def limits(self, config: Config, t_ns: int) -> bool:
         """Whether the true adhesion, not the brake, limited the train at a time."""

@@ -27,17 +27,9 @@ function ticks(low, high, wanted) {
   return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(10)));
 }
 
-// Smallest and largest of all values, null left out; at least `margin` apart.
-function rangeOf(values, margin = 1e-6) {
-  const numbers = values.filter((value) => value !== null);
-  if (!numbers.length) return [0, 1];
-  const low = numbers.reduce((a, b) => Math.min(a, b)), high = numbers.reduce((a, b) => Math.max(a, b));
-  return high - low < margin ? [low, low + margin] : [low, high];
-}
-
 // A chart below `host`. spec: {title, x: {label, range}, y: {range}, lines: [{label, kind, x, y, dots}],
-// bands: [{from, to, kind, label}], areas: [{label, kind, points: [[x, y]...]}], marks: [{x, y, kind, label}]};
-// lines may have null for gaps. Returns draw(spec) and cursor(x); `onPick` hears of a place chosen with the pointer.
+// bands: [{from, to, kind, label}], marks: [{x, y, kind, label}]}; lines may have null for gaps. Returns draw(spec) and
+// cursor(x); `onPick` hears of a place chosen with the pointer.
 function chart(host, onPick = null) {
   const figure = host.appendChild(element("figure", { class: "chart" }));
   const caption = figure.appendChild(element("figcaption"));
@@ -87,9 +79,6 @@ function chart(host, onPick = null) {
 
   function curves() {
     const drawn = shape("g", { "clip-path": `url(#${clip})` });
-    for (const area of spec.areas ?? []) {
-      drawn.append(shape("polygon", { points: area.points.map((p) => point(...p)).join(" "), class: `area ${area.kind}` }));
-    }
     for (const line of spec.lines) {
       drawn.append(shape("path", { d: path(line), class: `line ${line.kind}` }));
       if (!line.dots) continue;
@@ -105,11 +94,11 @@ function chart(host, onPick = null) {
 
   // The legend is only made anew when its entries change: it would flicker on the live page.
   function describe() {
-    const entries = [...(spec.areas ?? []).map((area) => [area.label, `area ${area.kind}`]), ...spec.lines.map((line) => [line.label, `line ${line.kind}`])];
+    const entries = spec.lines.map((line) => [line.label, `line ${line.kind}`]);
     if (legendKey === (legendKey = JSON.stringify(entries))) return;
     legend.replaceChildren(...entries.map(([label, kind]) => {
       const entry = element("span"), sample = shape("svg", { width: 30, height: 10 });
-      sample.append(kind.startsWith("area") ? shape("rect", { width: 30, height: 10, class: kind }) : shape("path", { d: "M0,5H30", class: kind }));
+      sample.append(shape("path", { d: "M0,5H30", class: kind }));
       entry.append(sample, label);
       return entry;
     }));

@@ -7,40 +7,19 @@
 const { runs, target_kmh: target, fixed_mu: fixedMu } = JSON.parse(document.getElementById("data").textContent);
 const slider = document.getElementById("slider"), shownTime = document.getElementById("time");
 const all = (pick) => runs.flatMap(pick);
-const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => run.true_mu.t.at(-1) ?? 0));
+const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => run.charts.flatMap((spec) => spec.lines.map((line) => line.x.at(-1)))));
 
 // Equal axes in all columns: runs side by side are to be compared by eye.
-const rangeIn = (names) => rangeOf([0, ...all((run) => names.flatMap((name) => run[name].v))]);
-const upTo = (...names) => [0, 1.08 * rangeIn(names)[1]];
-const around = (...names) => {
-  const [lowest, high] = rangeIn(names), low = high > 0 ? Math.max(lowest, -2 * high) : lowest, air = 0.06 * (high - low);
-  return [low - air, high + air];
-};
+const shared = (i) => ({ range: [Math.min(...all((run) => run.charts[i].range[0])), Math.max(...all((run) => run.charts[i].range[1]))] });
 const time = { label: "time, s", range: [0, longest] };
 // A bound near 0 needs any distance: as far as the fixed worst case tells all there is to compare.
 const way = { label: "position from the start, m", range: [0, 1.08 * Math.max(1, ...all((run) => run.path.x), ...all((run) => run.moments.map((m) => m.fixed.x.at(-1))))] };
-
-const line = (label, kind, series, dots = false) => ({ label, kind, x: series.t, y: series.v, dots });
-const known = (lines) => lines.filter((candidate) => candidate.x.length);
-
-function timeCharts(run) {
-  return [
-    { title: "Adhesion coefficient", y: { range: upTo("mu", "true_mu") }, lines: known([
-      { label: `fixed worst case ${fixedMu}`, kind: "fixed", x: time.range, y: [fixedMu, fixedMu] }, line("true", "truth", run.true_mu),
-      line(`lower bound${run.confidence}`, "bound", run.mu_lower), line("identified μ̂", "identified", run.mu, true)]) },
-    { title: "Speed, km/h", y: { range: upTo("speed", "true_speed") }, lines: known([line("true", "truth", run.true_speed), line("estimated", "identified", run.speed, true)]) },
-    { title: "Forces, kN", y: { range: upTo("brake", "identified_force", "true_force") }, lines: known([
-      line("brake B", "fixed", run.brake), line("adhesion F, true", "truth", run.true_force), line("adhesion F, identified", "identified", run.identified_force, true)]) },
-    { title: `Braking distance to ${target} km/h saved against μ = ${fixedMu}, m`, y: { range: around("saved", "saved_at_least") }, lines: known([
-      line(`at least${run.confidence}`, "bound", run.saved_at_least), line("by the identified μ̂", "identified", run.saved, true)]) },
-  ];
-}
 
 function curveChart(run, moment) {
   const lines = [{ label: `by the fixed ${fixedMu}`, kind: "fixed", ...moment.fixed }, { label: "what the train did", kind: "truth", ...run.path }];
   if (moment.safe) lines.push({ label: "safe: by the lower bound", kind: "bound", ...moment.safe });
   if (moment.nominal) lines.push({ label: "by the identified μ̂", kind: "identified", ...moment.nominal });
-  return { title: "Braking curve at this time, km/h", x: way, y: { range: upTo("speed", "true_speed") }, lines,
+  return { title: "Braking curve at this time, km/h", x: way, y: shared(1), lines,
            marks: [{ x: moment.fixed.x[0], y: moment.fixed.y[0], kind: "now", label: "" }] };
 }
 
@@ -58,9 +37,9 @@ const columns = runs.map((run) => {
   const host = document.getElementById("runs").appendChild(element("section", { class: "run" }));
   host.append(element("h2", {}, run.name), element("p", { class: "soft" }, run.source));
   const text = host.appendChild(element("p", { class: "readout" })), grid = host.appendChild(element("div", { class: "columns" }));
-  const curve = chart(grid), charts = timeCharts(run).map((spec) => {
+  const curve = chart(grid), charts = run.charts.map((spec, i) => {
     const made = chart(grid, (t) => show(t));
-    made.draw({ ...spec, x: time, bands: run.bands });
+    made.draw({ ...spec, x: time, y: shared(i), bands: run.bands });
     return made;
   });
   return (t) => {

@@ -32,12 +32,12 @@ def report(tmp_path: Path) -> str:
 def test_the_report_draws_every_chart_of_every_run(report: str) -> None:
     with browser.open_page() as (page, troubles):
         page.goto(report)
-        assert page.locator("figure.chart").count() == 10
+        assert page.locator("figure.chart").count() == 12
         assert page.locator("section.run h2").all_inner_texts() == ["with", "without"]
         assert page.locator("section.run").nth(0).locator("path.line.truth").count() > 2
         for line in page.locator("section.run:first-child path.line.identified").all():
             assert "NaN" not in (line.get_attribute("d") or "NaN")
-        assert page.locator(".bands .adhesion_limited").count() == 8
+        assert page.locator(".bands .adhesion_limited").count() == 10
         assert troubles == []
 
 

@@ -22,8 +22,8 @@ from adhesion_node.bag import BagWriter
 from adhesion_node.core import Config
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
-from adhesion_node.report.curves import changes
 from adhesion_node.report.findings import distances, findings, first_identified
+from adhesion_node.report.page import changes
 from adhesion_node.report.run import Band, bands
 from adhesion_node.report.series import Series
 from adhesion_node.wire.topics import DIAGNOSTICS, TRUTH_MU
@@ -66,15 +66,22 @@ def make(tmp_path: Path, *arguments: str) -> tuple[dict[str, Any], Parser]:
     return json.loads(result.read_text()), Parser((tmp_path / "report" / "report.html").read_text(encoding="utf-8"))
 
 
+def lines(run: dict[str, Any], title: str) -> dict[str, dict[str, Any]]:
+    """Return the lines of the chart whose title begins so, by their labels."""
+    (chart,) = (chart for chart in run["charts"] if chart["title"].startswith(title))
+    return {line["label"]: line for line in chart["lines"]}
+
+
 def test_a_recording_with_results_is_shown_as_recorded(tmp_path: Path) -> None:
     result, page = make(tmp_path, str(record(tmp_path / "mine")))
     (run,) = page.data["runs"]
     assert (run["name"], run["source"], result["runs"][0]["source"]) == ("mine", "as recorded", "as recorded")
-    assert run["mu"]["t"] == list(range(20))
-    assert (set(run["mu"]["v"]), set(run["mu_lower"]["v"]), set(run["true_mu"]["v"])) == ({0.09}, {0.08}, {0.1})
-    assert run["speed"]["v"] == pytest.approx([3.6 * (80.0 - 2.0 * second) for second in range(20)], abs=0.006)
-    assert run["brake"]["v"] == pytest.approx([500.2] * 20, abs=0.05)  # 0.9332 m/s^2 x 536 t
-    assert run["identified_force"]["v"] == pytest.approx([0.09 * 536 * 9.8] * 20, abs=0.05)
+    adhesion, speed, forces = (lines(run, title) for title in ("Adhesion", "Speed", "Forces"))
+    assert adhesion["identified"]["x"] == list(range(20))
+    assert [set(adhesion[name]["y"]) for name in ("identified", "lower bound", "true")] == [{0.09}, {0.08}, {0.1}]
+    assert speed["estimated"]["y"] == pytest.approx([3.6 * (80.0 - 2.0 * second) for second in range(20)], abs=0.006)
+    assert forces["brake B"]["y"] == pytest.approx([500.2] * 20, abs=0.05)  # 0.9332 m/s^2 x 536 t
+    assert forces["adhesion F, identified"]["y"] == pytest.approx([0.09 * 536 * 9.8] * 20, abs=0.05)
     assert len(run["moments"]) == 20
     for name in ("mine.png", "mine.pdf"):
         assert (tmp_path / "report" / name).stat().st_size > 10_000
@@ -89,8 +96,10 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     (run,) = page.data["runs"]
     assert run["source"] == "estimated from the recorded sensors"
     assert replayed["digest"] in page.texts
-    assert run["mu"]["v"][-1] == pytest.approx(replayed["mu_final"], abs=1e-5)
-    assert run["mu_lower"]["v"][-1] == pytest.approx(replayed["mu_lower_final"], abs=1e-5)
+    adhesion = lines(run, "Adhesion")
+    assert adhesion["identified"]["y"][-1] == pytest.approx(replayed["mu_final"], abs=1e-5)
+    (bound,) = (line["y"][-1] for label, line in adhesion.items() if label.startswith("lower bound, "))
+    assert bound == pytest.approx(replayed["mu_lower_final"], abs=1e-5)
     assert run["bands"][-1]["kind"] == replayed["regime_final"].lower()
     assert "iterations = 3" in page.texts
     last = run["moments"][-1]
@@ -117,7 +126,7 @@ def test_recordings_stand_side_by_side_under_their_own_names(tmp_path: Path) -> 
     first, second = record(tmp_path / "one" / "bag"), record(tmp_path / "two" / "bag", *TRUTH)
     result, page = make(tmp_path, str(first), str(second), "--target", "180")
     assert [run["name"] for run in page.data["runs"]] == [run["name"] for run in result["runs"]] == ["bag", "bag (2)"]
-    assert [len(run["true_mu"]["t"]) for run in page.data["runs"]] == [20, 0]
+    assert ["true" in lines(run, "Adhesion") for run in page.data["runs"]] == [True, False]
     assert page.data["target_kmh"] == 180.0
     assert all(Path(path).is_file() for run in result["runs"] for path in run["pictures"])
 
@@ -130,7 +139,7 @@ def test_a_recorded_number_that_is_none_leaves_a_gap(tmp_path: Path) -> None:
                 cdr_ = serialize_message(Float64(data=float("nan"))) if broken else cdr
                 writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr_, START_NS + second * S)
     _, page = make(tmp_path, str(tmp_path / "bag"))
-    values = page.data["runs"][0]["true_mu"]["v"]
+    values = lines(page.data["runs"][0], "Adhesion")["true"]["y"]
     assert [second for second, value in enumerate(values) if value is None] == [7]
 
 

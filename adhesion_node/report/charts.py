@@ -1,0 +1,81 @@
+# Copyright 2026 the adhesion_node authors
+# SPDX-License-Identifier: Apache-2.0
+
+"""The charts of a run over time, the same in its picture and on its page: lines and ranges."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core.physics.train import KMH, Train
+from ..wire.codecs import ATMOSPHERE_PA
+from .findings import distances
+from .run import FIXED_MU, Run
+from .series import Series
+
+
+class Line(NamedTuple):
+    """A line of a chart; its kind says how it is drawn: "truth", "identified", "bound" or "fixed"."""
+
+    label: str
+    kind: str
+    series: Series
+
+
+class Chart(NamedTuple):
+    """Lines over time, without those that were not recorded; `digits` are the decimals that matter."""
+
+    title: str
+    digits: int
+    lines: list[Line]
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """From the lowest value, or 0, to the highest; a bound near 0 is far from all that it may be compared with."""
+        others = [line.series.values for line in self.lines if line.kind != "bound"]
+        far = 2.0 * np.nanmax(np.abs(np.concatenate([[0.0], *others])))
+        values = np.concatenate([[0.0, 1e-6], *(np.clip(line.series.values, -far, far) for line in self.lines)])
+        return 1.08 * float(np.nanmin(values)), 1.08 * float(np.nanmax(values))
+
+
+def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
+    """Return the charts: adhesion, speed, forces, braking distance, and what is saved of it while the train brakes."""
+    planned = distances(run, target_kmh * KMH, train)
+    at, seen = run.speed.t_ns, run.learnt
+    worst, to_target = f"fixed worst case {FIXED_MU}", f"Braking distance to {target_kmh:.0f} km/h"
+    bound = "lower bound" if run.confidence is None else f"lower bound, {run.confidence:.0%} confidence"
+    adhesion = (
+        Line(worst, "fixed", Series(at, np.full(at.size, FIXED_MU))),
+        Line("true", "truth", run.true_mu),
+        Line(bound, "bound", run.mu_lower),
+        Line("identified", "identified", run.mu),
+    )
+    speed = (
+        Line("true", "truth", run.true_speed.map(lambda mps: mps / KMH)),
+        Line("estimated", "identified", run.speed.map(lambda mps: mps / KMH)),
+    )
+    forces = (
+        Line("brake B", "fixed", run.pressure.map(lambda pa: train.brake_force(pa - ATMOSPHERE_PA) / 1e3)),
+        Line("adhesion F, true", "truth", run.true_mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
+        Line("adhesion F, identified", "identified", run.mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
+    )
+    distance = (
+        Line(worst, "fixed", Series(at, planned.fixed)),
+        Line("safe curve, by the lower bound", "bound", Series(at, planned.longest)),
+        Line("nominal curve, by the identified μ", "identified", Series(at, planned.identified)),
+    )
+    saved = (
+        Line(worst, "fixed", Series(at, np.zeros(at.size))),
+        Line("at least, by the lower bound", "bound", Series(at[seen], planned.saved_at_least[seen])),
+        Line("by the identified μ", "identified", Series(at[seen], planned.saved[seen])),
+    )
+    table = (
+        ("Adhesion coefficient", 5, adhesion),
+        ("Speed, km/h", 2, speed),
+        ("Forces, kN", 1, forces),
+        (f"{to_target}, m", 1, distance),
+        (f"{to_target} saved, m", 1, saved),
+    )
+    return [Chart(title, digits, [line for line in lines if line.series.t_ns.size]) for title, digits, lines in table]
