@@ -45,10 +45,13 @@ def push(gate: Gate, inbox: Inbox, sample: Sample) -> Pushed:
     agreeing = [each for each in suspects if abs(each.t_ns - t_ns) < near_ns]
     together = sorted((*agreeing, sample), key=lambda each: each.t_ns)
     is_gap = now_ns <= together[0].t_ns and together[-1].t_ns <= now_ns + gate.reset_ns
-    if agreeing and (is_gap or any(isinstance(each, gate.anchor | Measurement) for each in together)):
+    anchors = [each for each in together if isinstance(each, gate.anchor | Measurement)]
+    if agreeing and (is_gap or (anchors and not _returns(gate, inbox, t_ns))):
         left = tuple(each for each in suspects if each not in agreeing)
         return _jump(gate, inbox._replace(suspects=left), is_gap, together)
-    return Pushed(inbox._replace(suspects=(*of_others, sample)), events=_strays(now_ns, of_kind))
+    count, before_ns = inbox.late
+    late = (count + isinstance(sample, gate.anchor | Measurement), before_ns)
+    return Pushed(inbox._replace(suspects=(*of_others, sample), late=late), events=_strays(now_ns, of_kind))
 
 
 def drain(gate: Gate, inbox: Inbox) -> Pushed:
@@ -107,6 +110,13 @@ def _late(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> Pushed:
     return Pushed(inbox._replace(late=(count, anchor.t_ns)), events=(event,))
 
 
+def _returns(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
+    """Whether a stamp goes on with the time that was left: two clocks, unless no anchor has the new time any more."""
+    if inbox.now_ns is None or inbox.left_ns is None or inbox.late[0] + 1 >= gate.late_run:
+        return False
+    return abs(t_ns - (inbox.now_ns + inbox.left_ns)) <= gate.reset_ns
+
+
 def _jump(gate: Gate, inbox: Inbox, is_gap: bool, samples: Sequence[Any]) -> Pushed:
     """Stamps agree that time has jumped: a gap, or where it is long or back, another time."""
     first, *others = samples
@@ -122,7 +132,8 @@ def _anew(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     low, high = sample.t_ns - gate.reset_ns, sample.t_ns + gate.far_ns
     others = {kind: stream.between(low, high) for kind, stream in inbox.others.items()}
     newest = [stream.newest_ns for stream in others.values() if stream.newest_ns is not None]
-    fresh = Inbox(max(newest, default=None), others=MappingProxyType(others), suspects=inbox.suspects)
+    left_ns = None if inbox.now_ns is None else inbox.now_ns - sample.t_ns
+    fresh = Inbox(max(newest, default=None), others=MappingProxyType(others), suspects=inbox.suspects, left_ns=left_ns)
     event = Event(Outcome.RESET, f"stamps went from {(inbox.now_ns or 0) / S:.12g} to {sample.t_ns / S:.12g} s")
     return _with((event,), _take(gate, fresh, sample))._replace(ended=settle(gate, inbox).matched)
 

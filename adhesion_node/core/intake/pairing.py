@@ -78,7 +78,9 @@ class Inbox(NamedTuple):
     suspects: tuple[Any, ...] = ()
     """Samples stamped far from all others, set aside: at most one of each sensor."""
     late: tuple[int, int] = (0, 0)
-    """Late anchors in a row, and the stamp of the last one."""
+    """Late anchors in a row, those set aside among them, and the stamp of the last late one."""
+    left_ns: int | None = None
+    """By how much the time that was left, when all began anew, is ahead of the present one."""
 
     def stream(self, kind: type[Any]) -> Stream:
         """What another sensor has measured."""

@@ -211,6 +211,28 @@ def test_the_wrong_clock_of_a_pressure_keeps_no_position_back(first: int, off_s:
     assert feeder.outcomes.count(Outcome.RESET) <= 1
 
 
+@pytest.mark.parametrize("per_first", [1, 2, 3])
+@pytest.mark.parametrize("jitter_s", [0.0, 0.05])
+def test_two_clocks_of_the_anchor_are_one_reset_at_most(per_first: int, jitter_s: float) -> None:
+    """4000 s apart, for 200 s, the second one as fast or faster: one of them is followed, the other one stray."""
+    rng = np.random.default_rng(1)
+    stamps = [k / 10 * per_first for k in range(2000 // per_first)]
+    first = [(t, sample) for t in stamps for sample in (pressure(t, 1.0), position(t))]
+    second = [(k / 10 + 0.01, position(4000 + k / 10)) for k in range(2000)]
+    feeder = Feeder(gate_of(Config()))
+    arriving = sorted((t + jitter_s * rng.uniform(), number, s) for number, (t, s) in enumerate((*first, *second)))
+    feeder.push(*(s for *_, s in arriving))
+    assert feeder.outcomes.count(Outcome.RESET) <= 1
+    assert len(feeder.ended + feeder.matched) > 0.9 * len(stamps)
+
+
+def test_two_stray_stamps_that_agree_are_left_again() -> None:
+    feeder = running()
+    feeder.push(position(100.0), position(100.1), *(position(1 + k / 10) for k in range(1, 20)))
+    assert feeder.outcomes.count(Outcome.RESET) == 2
+    assert len(feeder.matched) > 20
+
+
 def test_wild_stamps_do_not_agree_with_each_other() -> None:
     feeder = running()
     feeder.push(position(6.0), position(4000.0), pressure(9000.0, 1.0), position(1.1))
