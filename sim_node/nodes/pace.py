@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What both simulators share: the parameters of a run, and a timer that calls for samples as simulated time asks for.
+"""What both simulators share: a node that publishes the samples of a run as simulated time asks for.
 
 It paces itself by the monotonic clock: with use_sim_time the node's own clock would stand still until this node
 moves it.
@@ -10,11 +10,18 @@ moves it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
+
+from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.ros.params import declare
+from adhesion_node.nodes.ros.qos import advertise
+from adhesion_node.nodes.ros.types import new
+from adhesion_node.wire.topics import CLOCK, Topic
 
 MAX_BURST = 10
 """Samples that one timer callback publishes at most, so that the node stays responsive while it catches up."""
@@ -22,32 +29,86 @@ MAX_BURST = 10
 SHORTEST_TIMER_S = 1e-3
 
 
-class Pace:
-    """Calls `tick`, which publishes a sample and returns False at the end of the run, in time; begins once `ready`."""
+class RunNode(Node):
+    """Publishes the samples of a simulated run in time until it ends; logs its beginning, what changes, and its end."""
 
-    def __init__(
-        self, node: Node, period_s: float, factor: float, ready: Callable[[], bool], tick: Callable[[], bool]
-    ) -> None:
-        """Begin with the node's spinning; `factor` 0 is as fast as possible."""
-        self._period_s, self._factor = period_s, factor
-        self._ready, self._tick = ready, tick
+    def __init__(self, name: str, specs: Sequence[Setting], **kwargs: Any) -> None:
+        """Read the parameters; ValueError when one is out of range."""
+        super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        self.values = declare(self, specs)
+        self.finished = False
+        self.samples = 0
+        """Number of samples published."""
+        self.now_ns = 0
+        """Time of the newest one, as on /clock."""
+        self._start_ns = round(self.values["start_time_s"] * 1e9)
+        self._ended = False
+        self._state: Any = None
         self._monotonic = Clock(clock_type=ClockType.STEADY_TIME)
         self._begun_ns: int | None = None
-        self._ticked = 0
-        fitting_s = period_s / factor if factor else 0.0
-        self._timer = node.create_timer(max(fitting_s, SHORTEST_TIMER_S), self._on_timer, clock=self._monotonic)
+
+    def begin(self, run: Iterator[tuple[Any, Any]], topics: Sequence[Topic], period_s: float, *, paced: bool) -> None:
+        """Take up a run of truths, with their `t_ns`, and what was measured; begin when the last topic is subscribed.
+
+        Unless `paced` there is no timer: the node's owner asks for every sample by `tick`.
+        """
+        self._run, self._period_s, self._awaited = run, period_s, topics[-1]
+        self._outputs = {topic: advertise(self, topic) for topic in (CLOCK, *topics)}
+        if paced:
+            if self.values["wait_for"]:
+                self.log(f"waiting for {self.values['wait_for']} subscriber(s) to {self._awaited.name}")
+            factor = self.values["real_time_factor"]
+            fitting_s = period_s / factor if factor else 0.0
+            self._timer = self.create_timer(max(fitting_s, SHORTEST_TIMER_S), self._on_timer, clock=self._monotonic)
+
+    def tick(self) -> bool:
+        """Publish the next sample; False when the scenario has ended and nothing was published."""
+        scenario, sample = f"scenario {self.values['scenario']}", next(self._run, None)
+        if sample is None:
+            if not self._ended:
+                self._ended, self.finished = True, self.values["exit_at_end"]
+                self.log(f"{scenario}: ended after {self.samples} samples")
+            return False
+        if not self.samples:
+            self.log(f"{scenario}: started at {self._start_ns / 1e9:.1f} s")
+        truth, measured = sample
+        state, news = self.news(truth)
+        if state != self._state:
+            self._state = state
+            self.log(f"{truth.t_ns / 1e9:.1f} s: {news}")
+        self.now_ns = self._start_ns + truth.t_ns
+        self.send(CLOCK, self.now_ns)
+        self.publish(truth, measured)
+        self.samples += 1
+        return True
+
+    def news(self, truth: Any) -> tuple[Any, str]:
+        """Return what is logged when it changes, and the words for it."""
+        raise NotImplementedError
+
+    def publish(self, truth: Any, measured: Any) -> None:
+        """Publish a sample at `now_ns`."""
+        raise NotImplementedError
+
+    def send(self, topic: Topic, *values: Any) -> None:
+        """Publish what the topic's codec takes."""
+        self._outputs[topic].publish(topic.build(new, *values))
+
+    def log(self, text: str) -> None:
+        """Tell people."""
+        self.get_logger().info(text)
 
     def _on_timer(self) -> None:
         now_ns = self._monotonic.now().nanoseconds
         if self._begun_ns is None:
-            if not self._ready():
+            if self._outputs[self._awaited].get_subscription_count() < self.values["wait_for"]:
                 return
             self._begun_ns = now_ns
-        for _ in range(due(now_ns - self._begun_ns, self._factor, self._period_s, self._ticked)):
-            if not self._tick():
+        elapsed_ns = now_ns - self._begun_ns
+        for _ in range(due(elapsed_ns, self.values["real_time_factor"], self._period_s, self.samples)):
+            if not self.tick():
                 self._timer.cancel()
                 return
-            self._ticked += 1
 
 
 def due(elapsed_ns: int, factor: float, period_s: float, published: int) -> int:

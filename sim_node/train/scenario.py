@@ -123,99 +123,49 @@ def braking_place(speed_mps: float) -> float:
     return speed_mps * (CRUISE_S - _BEFORE_BRAKING_S)
 
 
-def _tunnel_entry() -> Scenario:
-    speed = 300 * KMH
-    portal = braking_place(speed)
-    return Scenario(
-        name="tunnel_entry",
-        speed_mps=speed,
-        rail=Rail(((0.0, DRY), (portal, WET))),
-        track=Track((Tunnel(portal, portal + _TUNNEL_M),)),
-        brake=Brake(CRUISE_S),
-        end_speed_mps=100 * KMH,
-        end_s=200.0,
-    )
-
-
-def _tunnel_exit() -> Scenario:
-    speed = 250 * KMH
-    portal = braking_place(speed)
-    return Scenario(
-        name="tunnel_exit",
-        speed_mps=speed,
-        rail=Rail(((0.0, DRY), (portal, WET))),
-        # Left before the braking, so that the tunnel costs traction only: 2 km, 0.00026 N/N.
-        track=Track((Tunnel(portal - 2000.0, portal),)),
-        brake=Brake(CRUISE_S),
-        end_speed_mps=50 * KMH,
-        end_s=200.0,
-    )
-
-
-def _cruise() -> Scenario:
-    return Scenario(name="cruise", speed_mps=300 * KMH, rail=Rail(((0.0, DRY),)), end_s=60.0)
-
-
-def _dry_braking() -> Scenario:
-    # A stop on dry rail: the brake is weaker than the adhesion all the way.
-    return Scenario(
-        name="dry_braking",
-        speed_mps=300 * KMH,
-        rail=Rail(((0.0, DRY),)),
-        brake=Brake(CRUISE_S),
-        end_speed_mps=0.0,
-        end_s=200.0,
-    )
-
-
-def _low_adhesion_patch() -> Scenario:
-    # Braking on wet rail; 500 m on, 1 km of it (leaves, oil) gives 0.45 of the wet adhesion.
-    speed = 250 * KMH
-    patch = braking_place(speed) + 500.0
-    return Scenario(
-        name="low_adhesion_patch",
-        speed_mps=speed,
-        rail=Rail(((0.0, WET), (patch, replace(WET, scale=0.45)), (patch + 1000.0, WET))),
-        brake=Brake(CRUISE_S),
-        end_speed_mps=50 * KMH,
-        end_s=200.0,
-    )
-
-
-def _open_line(
-    name: str, law: SpeedLaw, *, track: Track = LEVEL, train: Train = CRH3, end_s: float = 200.0
+def _braking(
+    name: str,
+    from_kmh: float,
+    to_kmh: float,
+    *laws: tuple[float, SpeedLaw],
+    track: Track = LEVEL,
+    train: Train = CRH3,
+    end_s: float = 200.0,
 ) -> Scenario:
-    """From 300 to 100 km/h on one rail; what differs from `LEVEL` and `CRH3` is unknown to an estimator."""
-    return Scenario(
-        name=name,
-        speed_mps=300 * KMH,
-        rail=Rail(((0.0, law),)),
-        track=track,
-        train=train,
-        brake=Brake(CRUISE_S),
-        end_speed_mps=100 * KMH,
-        end_s=end_s,
-    )
+    """Full braking after `CRUISE_S`; what differs from `LEVEL` and `CRH3` is unknown to an estimator."""
+    brake = Brake(CRUISE_S)
+    return Scenario(name, from_kmh * KMH, Rail(laws), end_s, brake, to_kmh * KMH, track, train)
 
 
-_OPEN_LINE = (
-    _open_line("constant_adhesion", SpeedLaw(0.07)),
-    _open_line("snow", SNOW),
-    _open_line("scaled_wet", replace(WET, scale=0.8)),
+_FROM_300, _FROM_250 = braking_place(300 * KMH), braking_place(250 * KMH)
+
+_ENTERED = Track((Tunnel(_FROM_300, _FROM_300 + _TUNNEL_M),))
+
+_LEFT = Track((Tunnel(_FROM_250 - 2000.0, _FROM_250),))
+"""Left before the braking, so that the tunnel costs traction only: 2 km, 0.00026 N/N."""
+
+_PATCH = ((_FROM_250 + 500.0, replace(WET, scale=0.45)), (_FROM_250 + 1500.0, WET))
+"""500 m on, 1 km of the wet rail (leaves, oil) gives 0.45 of the wet adhesion."""
+
+_ALL = (
+    _braking("tunnel_entry", 300, 100, (0.0, DRY), (_FROM_300, WET), track=_ENTERED),
+    _braking("tunnel_exit", 250, 50, (0.0, DRY), (_FROM_250, WET), track=_LEFT),
+    Scenario("cruise", 300 * KMH, Rail(((0.0, DRY),)), 60.0),
+    # A stop: the brake is weaker than the adhesion all the way.
+    _braking("dry_braking", 300, 0, (0.0, DRY)),
+    _braking("low_adhesion_patch", 250, 50, (0.0, WET), *_PATCH),
+    _braking("constant_adhesion", 300, 100, (0.0, SpeedLaw(0.07))),
+    _braking("snow", 300, 100, (0.0, SNOW)),
+    _braking("scaled_wet", 300, 100, (0.0, replace(WET, scale=0.8))),
     # Worn or glazed pads: 60 % of the force that the pressure promises, less than the wet rail takes at any speed.
-    _open_line("weak_brake", WET, train=replace(CRH3, pad_friction=0.6 * CRH3.pad_friction)),
-    _open_line("grade_unknown", WET, track=Track((Grade(0.0, 20e3, -100.0),))),
-    _open_line("overweight", WET, train=replace(CRH3, mass_kg=1.1 * CRH3.mass_kg)),
+    _braking("weak_brake", 300, 100, (0.0, WET), train=replace(CRH3, pad_friction=0.6 * CRH3.pad_friction)),
+    _braking("grade_unknown", 300, 100, (0.0, WET), track=Track((Grade(0.0, 20e3, -100.0),))),
+    _braking("overweight", 300, 100, (0.0, WET), train=replace(CRH3, mass_kg=1.1 * CRH3.mass_kg)),
     # A quarter of the wet adhesion: for more than three minutes nothing changes, and no change may be reported.
-    _open_line("long_braking", replace(WET, scale=0.25), end_s=400.0),
+    _braking("long_braking", 300, 100, (0.0, replace(WET, scale=0.25)), end_s=400.0),
 )
 
-SCENARIOS: Mapping[str, Scenario] = MappingProxyType(
-    {
-        s.name: s
-        for s in (_tunnel_entry(), _tunnel_exit(), _cruise(), _dry_braking(), _low_adhesion_patch(), *_OPEN_LINE)
-    }
-)
+SCENARIOS: Mapping[str, Scenario] = MappingProxyType({scenario.name: scenario for scenario in _ALL})
 """The scenarios by name."""
 
 
