@@ -20,26 +20,7 @@ from ...core.creep.recursion import Recursion, full_covariance
 from ...core.physics.train import Array
 from ..trial.running import Arrays
 from . import errors_in_variables as creep_eiv
-from .runs import (
-    DRY,
-    DRY_PEAK,
-    ENOUGH,
-    LAMBDA_M,
-    NOISE_STD,
-    ONE,
-    RAMP,
-    RISE,
-    SLOPE,
-    START_SHARE,
-    WET,
-    WET_PEAK,
-    Data,
-    identify,
-    measure,
-    on_one,
-    peaks,
-    rise,
-)
+from . import runs as he
 
 CREEP_STDS = (0.0005, 0.001, 0.002)
 """Noise of the creep: speeds of 10 m/s measured to 0.005, 0.01 and 0.02 m/s."""
@@ -55,52 +36,42 @@ def with_creep_noise(creep_std: float) -> Callable[[int, int], list[dict[str, An
     """Peak from the dry creeps up to 0.03 with noise on mu and on the creep: plain, compensated, maximum likelihood."""
 
     def rows(runs: int, seed: int) -> list[dict[str, Any]]:
-        creeps = rise(RAMP)[: round(RAMP * ENOUGH / LAMBDA_M)]
-        data = measure(creeps, on_one(creeps), runs, seed, in_mu=True, creep_std=creep_std)
-        variances = np.full(data.creep.shape, creep_std**2), np.full(data.creep.shape, NOISE_STD**2)
-        expected = noise_products(data.creep, data.adhesion, SLOPE, *variances)
+        creeps = he.rise(he.RAMP)[: round(he.RAMP * he.ENOUGH / he.LAMBDA_M)]
+        data = he.measure(creeps, he.on_one(creeps), runs, seed, in_mu=True, creep_std=creep_std)
+        variances = np.full(data.creep.shape, creep_std**2), np.full(data.creep.shape, he.NOISE_STD**2)
+        expected = noise_products(data.creep, data.adhesion, he.SLOPE, *variances)
         found = {
-            "least squares": peaks(identify(ONE, data).theta[-1]),
-            "compensated least squares": peaks(identify(ONE, data, expected).theta[-1]),
+            "least squares": he.peaks(he.identify(he.ONE, data).theta[-1]),
+            "compensated least squares": he.peaks(he.identify(he.ONE, data, expected).theta[-1]),
             "errors in variables": _likeliest(data, creep_std),
         }
-        return [_row(f"creep noise {creep_std:g}, {method}", values) for method, values in found.items()]
+        table = [
+            he.peak_row(f"creep noise {creep_std:g}, {method}", he.DRY_PEAK, values, he.ENOUGH / he.LAMBDA_M)
+            for method, values in found.items()
+        ]
+        return [row | {"bias_percent": 100.0 * (row["peak_estimated_mean"] / he.DRY_PEAK - 1.0)} for row in table]
 
     return rows
 
 
-def _row(name: str, found: Array) -> dict[str, Any]:
-    mean = float(np.mean(found))
-    return {
-        "experiment": name,
-        "peak_true": DRY_PEAK,
-        "peak_estimated_mean": mean,
-        "peak_estimated_std": float(np.std(found)),
-        "used_fraction": ENOUGH / LAMBDA_M,
-        "bias_percent": 100.0 * (mean / DRY_PEAK - 1.0),
-    }
-
-
-def _likeliest(data: Data, creep_std: float) -> Array:
-    noise = creep_eiv.NoiseStd(creep_std, NOISE_STD)
+def _likeliest(data: he.Data, creep_std: float) -> Array:
+    noise = creep_eiv.NoiseStd(creep_std, he.NOISE_STD)
     thetas = [
-        creep_eiv.fit(creeps, adhesions, SLOPE, START_SHARE * DRY, noise).theta
+        creep_eiv.fit(creeps, adhesions, he.SLOPE, he.START_SHARE * he.DRY, noise).theta
         for creeps, adhesions in zip(data.creep.T, data.adhesion.T, strict=True)
     ]
-    return peaks(np.array(thetas))
+    return he.peaks(np.array(thetas))
 
 
 def coverage(seed: int) -> dict[str, float]:
     """Share of runs whose 95 % interval of mu_max, and of l_m, holds the truth after one rise, by kind of noise."""
-    creeps, shares = rise(), {}
+    creeps, shares = he.rise(), {}
     for name, in_mu in (("v of (7)", False), ("mu", True)):
-        trace = identify(ONE, measure(creeps, on_one(creeps), MANY, seed, in_mu=in_mu))
-        last = trace.last
-        stds = np.sqrt(np.diagonal(_covariance(last), axis1=-2, axis2=-1))
+        last = he.identify(he.ONE, he.measure(creeps, he.on_one(creeps), MANY, seed, in_mu=in_mu)).last
         for index, (what, values, truth) in enumerate(
-            zip(("mu_max", "lambda_m"), peak(SLOPE, last.theta), peak(SLOPE, DRY), strict=True)
+            zip(("mu_max", "lambda_m"), peak(he.SLOPE, last.theta), peak(he.SLOPE, he.DRY), strict=True)
         ):
-            inside = np.abs(values - truth) <= 1.96 * stds[..., 2 + index]
+            inside = np.abs(values - truth) <= 1.96 * _stds(last)[..., 2 + index]
             shares[f"{what}, noise in {name}"] = float(np.mean(inside))
     return shares
 
@@ -110,14 +81,14 @@ def withholding(seed: int) -> list[dict[str, float]]:
 
     Dry and wet rises, half of the runs each, noise in mu.
     """
-    ends = [round(RISE * share) for share in (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 1.0)]
+    ends = [round(he.RISE * share) for share in (0.1, 0.2, 0.25, 0.3, 0.4, 0.5, 1.0)]
     tallies: dict[int, list[tuple[Array, NDArray[np.bool_]]]] = {end: [] for end in ends}
-    for theta, truth in ((DRY, DRY_PEAK), (WET, WET_PEAK)):
-        creeps = rise()
-        data = measure(creeps, on_one(creeps, theta), MANY // 2, seed, in_mu=True)
+    for theta, truth in ((he.DRY, he.DRY_PEAK), (he.WET, he.WET_PEAK)):
+        creeps = he.rise()
+        data = he.measure(creeps, he.on_one(creeps, theta), MANY // 2, seed, in_mu=True)
         for end in ends:
-            last = identify(ONE, Data(data.creep[:end], data.adhesion[:end], data.theta[:end])).last
-            wrong = np.abs(peaks(last.theta) - truth) > WRONG * truth
+            last = he.identify(he.ONE, he.Data(data.creep[:end], data.adhesion[:end], data.theta[:end])).last
+            wrong = np.abs(he.peaks(last.theta) - truth) > WRONG * truth
             tallies[end].append((_published(last), wrong))
     rows = []
     for end, halves in tallies.items():
@@ -125,7 +96,7 @@ def withholding(seed: int) -> list[dict[str, float]]:
         share = float(np.mean(wrong[published])) if published.any() else 0.0
         rows.append(
             {
-                "creep_reached": float(rise()[end - 1]),
+                "creep_reached": float(he.rise()[end - 1]),
                 "published": float(np.mean(published)),
                 "wrong_of_published": share,
                 "wrong_of_all": float(np.mean(wrong)),
@@ -136,15 +107,16 @@ def withholding(seed: int) -> list[dict[str, float]]:
 
 def _published(last: Recursion) -> Array:
     """Which runs tell the peak by the criteria of `core.creep_recursion.judge`; on one surface none is changing."""
-    values = peaks(last.theta)
-    std = np.sqrt(np.diagonal(_covariance(last), axis1=-2, axis2=-1))[..., 2]
+    values = he.peaks(last.theta)
     positive = (last.theta > 0.0).all(axis=-1)
-    enough = last.sums.weight >= ONE.min_samples
-    return np.asarray(enough & positive & (std <= ONE.max_relative_std * values))
+    enough = last.sums.weight >= he.ONE.min_samples
+    return np.asarray(enough & positive & (_stds(last)[..., 2] <= he.ONE.max_relative_std * values))
 
 
-def _covariance(last: Recursion) -> Array:
-    return full_covariance(SLOPE, last.theta, creep_fit.covariance(last.sums, last.theta))
+def _stds(last: Recursion) -> Array:
+    """Standard deviations of p1, p2, mu_max and l_m, shape (runs, 4)."""
+    covariance = full_covariance(he.SLOPE, last.theta, creep_fit.covariance(last.sums, last.theta))
+    return np.asarray(np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1)))
 
 
 def dfp_difference(runs: int, seed: int) -> float:
@@ -152,9 +124,9 @@ def dfp_difference(runs: int, seed: int) -> float:
 
     From the 50th sample on: before, the data hardly span two directions and both minima are as good.
     """
-    creeps = rise()
-    data = measure(creeps, on_one(creeps), runs, seed)
-    exact, iterated = (identify(replace(ONE, solver=solver), data).theta[50:] for solver in ("exact", "dfp"))
+    creeps = he.rise()
+    data = he.measure(creeps, he.on_one(creeps), runs, seed)
+    exact, iterated = (he.identify(replace(he.ONE, solver=solver), data).theta[50:] for solver in ("exact", "dfp"))
     return float(np.max(np.abs(iterated - exact) / np.maximum(np.abs(exact), 1.0)))
 
 

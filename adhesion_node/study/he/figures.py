@@ -21,21 +21,7 @@ from ...core.creep.curve import adhesion
 from ...core.physics.train import Array
 from ...report.picture import BLACK, BLUE, GREY, ORANGE
 from ..trial.drawing import draw_lines, picture
-from .runs import (
-    BAND,
-    DRY,
-    DRY_PEAK,
-    ENOUGH,
-    NOISE_STD,
-    SLOPE,
-    WET,
-    WET_PEAK,
-    measure,
-    on_one,
-    peaks,
-    rise,
-    swings,
-)
+from . import runs as he
 
 CREEPS = np.linspace(0.0, 0.3, 301)
 
@@ -90,13 +76,13 @@ class Panel(NamedTuple):
 
 PEAK = "largest adhesion coefficient"
 PANELS = (
-    Panel(5, "1", "p1", (DRY[0],), "one surface"),
-    Panel(6, "1", "p2", (DRY[1],), "one surface"),
-    Panel(7, "1", PEAK, (DRY_PEAK,), "one surface"),
-    Panel(8, "2", "p1", (DRY[0], WET[0]), "dry to wet, factor 0.99"),
-    Panel(9, "2", "p2", (DRY[1], WET[1]), "dry to wet, factor 0.99"),
-    Panel(10, "2", PEAK, (DRY_PEAK, WET_PEAK), "dry to wet, factor 0.99"),
-    Panel(11, "3", PEAK, (DRY_PEAK, WET_PEAK), "dry to wet, varying factor"),
+    Panel(5, "1", "p1", (he.DRY[0],), "one surface"),
+    Panel(6, "1", "p2", (he.DRY[1],), "one surface"),
+    Panel(7, "1", PEAK, (he.DRY_PEAK,), "one surface"),
+    Panel(8, "2", "p1", (he.DRY[0], he.WET[0]), "dry to wet, factor 0.99"),
+    Panel(9, "2", "p2", (he.DRY[1], he.WET[1]), "dry to wet, factor 0.99"),
+    Panel(10, "2", PEAK, (he.DRY_PEAK, he.WET_PEAK), "dry to wet, factor 0.99"),
+    Panel(11, "3", PEAK, (he.DRY_PEAK, he.WET_PEAK), "dry to wet, varying factor"),
 )
 
 
@@ -112,7 +98,7 @@ def draw(thetas: Mapping[str, Array], folder: Path) -> None:
 
 def _values(theta: Array, quantity: str) -> Array:
     """What a panel shows, shape (samples, runs)."""
-    return peaks(theta) if quantity == PEAK else theta[..., int(quantity[1]) - 1]
+    return he.peaks(theta) if quantity == PEAK else theta[..., int(quantity[1]) - 1]
 
 
 def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
@@ -126,11 +112,11 @@ def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
         ends = edges[index : index + 2]
         axis.plot(ends, [truth, truth], color=BLACK, ls="--", lw=1.8, label="true" if index == 0 else None)
         if panel.quantity == PEAK:
-            band = [truth * (1 - BAND), truth * (1 + BAND)]
+            band = [truth * (1 - he.BAND), truth * (1 + he.BAND)]
             axis.hlines(band, *ends, color=BLUE, ls=":", lw=1.2, label="true +- 5 %" if index == 0 else None)
-    mark = ENOUGH if len(panel.truths) == 1 else edges[1]
+    mark = he.ENOUGH if len(panel.truths) == 1 else edges[1]
     axis.axvline(mark, color=GREY, lw=1.0)
-    named = f" creep {ENOUGH}" if len(panel.truths) == 1 else " the surface changes"
+    named = f" creep {he.ENOUGH}" if len(panel.truths) == 1 else " the surface changes"
     axis.annotate(named, (mark, 0.02), xycoords=("data", "axes fraction"), color="0.25", fontsize="small")
     axis.set_ylim(0.0, 2.0 * max(panel.truths))
     axis.set_xlim(places[0], places[-1])
@@ -142,18 +128,18 @@ def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
 def _places(panel: Panel) -> Array:
     """Where the samples stand on the horizontal axis: at their creep, or at the share of their surface's samples."""
     if len(panel.truths) == 1:
-        return rise()
-    samples = swings().size
+        return he.rise()
+    samples = he.swings().size
     return np.arange(1, 2 * samples + 1) / samples
 
 
 def _draw_models(folder: Path) -> None:
     with picture(folder / "fig01.png", "Fig. 1: adhesion as measured, simulated") as axis:
-        truth = adhesion(CREEPS, SLOPE, DRY)
-        measured = measure(CREEPS, on_one(CREEPS), 1, 1, in_mu=True).adhesion[:, 0]
+        truth = adhesion(CREEPS, he.SLOPE, he.DRY)
+        measured = he.measure(CREEPS, he.on_one(CREEPS), 1, 1, in_mu=True).adhesion[:, 0]
         axis.plot(CREEPS, measured, color="0.0", marker="+", ls="", label="measured")
         for sign, label in ((1, "within two standard deviations"), (-1, None)):
-            axis.plot(CREEPS, truth + sign * 2.0 * NOISE_STD, color=BLUE, ls="--", label=label)
+            axis.plot(CREEPS, truth + sign * 2.0 * he.NOISE_STD, color=BLUE, ls="--", label=label)
         axis.set(xlabel="creep", ylabel="adhesion coefficient")
         axis.legend(loc="lower right")
     with picture(folder / "fig02.png", "Fig. 2: Burckhardt's model, roads") as axis:

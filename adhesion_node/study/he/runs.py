@@ -11,12 +11,9 @@ v/(1 + p1 l + p2 l^2). A rise of the creep from 0 to 0.1 has `RISE` samples.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ...core.creep.config import FIXED, VARYING, CreepConfig
 from ...core.creep.curve import adhesion, parameters, peak
@@ -93,11 +90,7 @@ def measure(
     noise = np.stack([stream.standard_normal((creeps.size, 2)) for stream in streams], axis=1)
     bottom = 1.0 if in_mu else 1.0 + surfaces[:, :1] * creeps[:, None] + surfaces[:, 1:] * creeps[:, None] ** 2
     true = adhesion(creeps, SLOPE, surfaces)[:, None]
-    return Data(
-        creeps[:, None] + creep_std * noise[..., 1],
-        true + NOISE_STD * noise[..., 0] / bottom,
-        surfaces,
-    )
+    return Data(creeps[:, None] + creep_std * noise[..., 1], true + NOISE_STD * noise[..., 0] / bottom, surfaces)
 
 
 def on_one(creeps: Array, theta: Array = DRY) -> Array:
@@ -122,7 +115,8 @@ def used_fraction(found: Array, truth: float) -> Array:
     [0.6]
     """
     wrong = np.abs(found - truth) > BAND * truth
-    return _share(wrong.shape[0] - np.argmax(wrong[::-1], axis=0), wrong)
+    since = np.where(wrong.any(axis=0), wrong.shape[0] - np.argmax(wrong[::-1], axis=0), 0)
+    return np.asarray(since / wrong.shape[0])
 
 
 def first_fraction(found: Array, truth: float) -> Array:
@@ -136,12 +130,15 @@ def first_fraction(found: Array, truth: float) -> Array:
     return np.asarray(first / wrong.shape[0])
 
 
-def _share(count: NDArray[np.int_], wrong: NDArray[np.bool_]) -> Array:
-    return np.asarray(np.where(wrong.any(axis=0), count, 0) / wrong.shape[0])
-
-
-MOVEMENTS: Mapping[str, Callable[[int], Array]] = MappingProxyType({"swings": swings, "rise": rise})
-"""How the creep moves on each of two surfaces, by the samples of a rise."""
+def peak_row(name: str, truth: float, found: Array, used: float) -> dict[str, Any]:
+    """What every row of the study says of the peaks that its runs found."""
+    return {
+        "experiment": int(name) if name.isdigit() else name,
+        "peak_true": truth,
+        "peak_estimated_mean": float(np.mean(found)),
+        "peak_estimated_std": float(np.std(found)),
+        "used_fraction": used,
+    }
 
 
 class Experiment(NamedTuple):
@@ -153,7 +150,7 @@ class Experiment(NamedTuple):
     samples: int = RISE
     """Of a rise."""
     movement: str | None = None
-    """None: one surface."""
+    """Of the creep on each of two surfaces, "rise" or "swings"; None: one rise on one surface."""
     in_mu: bool = False
     """Noise of mu itself."""
 
@@ -170,7 +167,7 @@ class Experiment(NamedTuple):
     @property
     def creeps(self) -> Array:
         """Creep on each surface."""
-        return rise(self.samples) if self.movement is None else MOVEMENTS[self.movement](self.samples)
+        return swings(self.samples) if self.movement == "swings" else rise(self.samples)
 
     @property
     def weight(self) -> float:

@@ -21,21 +21,9 @@ from ...command.options import DONE, report
 from ...core.physics.train import Array
 from ..trial.running import add_running_options, run_all, running
 from ..trial.text import Column, lines
+from . import runs as he
 from .beyond import BEYOND, Beyond, value_of
-from .runs import (
-    BAND,
-    DRY_PEAK,
-    ENOUGH,
-    FIXED_ETA,
-    LAMBDA_M,
-    RAMP,
-    VARYING_ETA,
-    WET_PEAK,
-    Experiment,
-    first_fraction,
-    peaks,
-    used_fraction,
-)
+from .runs import RAMP
 
 RUNS, SEED = 20, 1
 
@@ -45,7 +33,7 @@ SCAN_SWINGS, SCAN_RAMPS = (600, 800, 1000, 1200), (1000, 2000, 4000, 8000)
 SCAN_GAINS = (0.3, 1.0)
 """Other gains K_p of (13) for experiment 3 with one rise per surface."""
 
-SWITCHES = {"2": FIXED_ETA, "3": VARYING_ETA}
+SWITCHES = {"2": he.FIXED_ETA, "3": he.VARYING_ETA}
 """The experiments on two surfaces."""
 
 COLUMNS = (
@@ -97,22 +85,22 @@ def run(options: argparse.Namespace) -> int:
     return DONE
 
 
-def experiments(runs: int, seed: int) -> dict[str, Experiment]:
+def experiments(runs: int, seed: int) -> dict[str, he.Experiment]:
     """Experiments 1, 2 and 3 by name, 1 with the noise in mu, 2 and 3 with one single rise per surface."""
-    one = Experiment(runs, seed)
+    one = he.Experiment(runs, seed)
     swinging = {name: one._replace(config=config, movement="swings") for name, config in SWITCHES.items()}
     return {"1": one, **swinging, "1, noise in mu": one._replace(in_mu=True), **single_rises(one, RAMP)}
 
 
-def single_rises(one: Experiment, samples: int, suffix: str = "") -> dict[str, Experiment]:
+def single_rises(one: he.Experiment, samples: int, suffix: str = "") -> dict[str, he.Experiment]:
     """Experiments 2 and 3 with one single rise per surface."""
     single = one._replace(movement="rise", samples=samples)
     return {f"{name}, single rise{suffix}": single._replace(config=config) for name, config in SWITCHES.items()}
 
 
-def sensitivity(runs: int, seed: int) -> dict[str, Experiment]:
+def sensitivity(runs: int, seed: int) -> dict[str, he.Experiment]:
     """Experiments 2 and 3 with other numbers of samples, experiment 3 with other gains."""
-    one = Experiment(runs, seed)
+    one = he.Experiment(runs, seed)
     wanted = {
         f"{name}, {samples} samples per rise": one._replace(config=config, movement="swings", samples=samples)
         for samples in SCAN_SWINGS
@@ -121,23 +109,23 @@ def sensitivity(runs: int, seed: int) -> dict[str, Experiment]:
     for samples in SCAN_RAMPS:
         wanted |= single_rises(one, samples, f" of {samples}")
     for gain in SCAN_GAINS:
-        config = replace(VARYING_ETA, gain=gain)
+        config = replace(he.VARYING_ETA, gain=gain)
         wanted[f"3, single rise, K_p {gain:g}"] = one._replace(config=config, movement="rise", samples=RAMP)
     return wanted
 
 
-def row_of(name: str, experiment: Experiment, theta: Array) -> dict[str, Any]:
+def row_of(name: str, experiment: he.Experiment, theta: Array) -> dict[str, Any]:
     """Row of an experiment: on one surface the estimate at a creep of 0.03, after a switch that at the end."""
-    found, samples = peaks(theta), experiment.creeps.size
+    found, samples = he.peaks(theta), experiment.creeps.size
     if experiment.movement is None:
-        share = ENOUGH / LAMBDA_M
-        row = _row(name, DRY_PEAK, found[round(samples * share) - 1], share)
-        return row | {"creep_used": ENOUGH, "samples": samples}
+        share = he.ENOUGH / he.LAMBDA_M
+        row = he.peak_row(name, he.DRY_PEAK, found[round(samples * share) - 1], share)
+        return row | {"creep_used": he.ENOUGH, "samples": samples}
     before, after = found[samples // 2 : samples], found[samples:]
-    used = used_fraction(after, WET_PEAK)
-    return _row(name, WET_PEAK, after[-1], float(np.mean(used))) | {
+    used = he.used_fraction(after, he.WET_PEAK)
+    return he.peak_row(name, he.WET_PEAK, after[-1], float(np.mean(used))) | {
         "used_fraction_5_to_95": np.quantile(used, [0.05, 0.95]).tolist(),
-        "first_fraction": float(np.mean(first_fraction(after, WET_PEAK))),
+        "first_fraction": float(np.mean(he.first_fraction(after, he.WET_PEAK))),
         "std_before_switch": float(np.mean(np.std(before, axis=0))),
         "samples": samples,
     }
@@ -156,7 +144,7 @@ def text(
         [
             *lines(COLUMNS, rows + noise),
             "",
-            f"used: share of the new surface's samples after which the peak stays within {BAND:.0%} of the truth",
+            f"used: share of the new surface's samples after which the peak stays within {he.BAND:.0%} of the truth",
             "",
             f"share of 95 % intervals that hold the truth: {shares}",
             "",
@@ -165,13 +153,3 @@ def text(
             *lines(WITHHELD, withheld),
         ]
     )
-
-
-def _row(name: str, truth: float, peaks: Array, used: float) -> dict[str, Any]:
-    return {
-        "experiment": int(name) if name.isdigit() else name,
-        "peak_true": truth,
-        "peak_estimated_mean": float(np.mean(peaks)),
-        "peak_estimated_std": float(np.std(peaks)),
-        "used_fraction": used,
-    }
