@@ -30,7 +30,7 @@ from ...core.prediction import Prediction
 from ...run import offline
 from ...run.pipeline import Pipeline
 from ...run.score import Truth
-from ..xie.identified import BRAKINGS
+from ..xie.distances import BRAKINGS
 from ..xie.published import WORST
 
 SPEEDS_KMH = {"tunnel_entry": (280, 250, 200, 150), "tunnel_exit": (230, 200, 150, 100)}

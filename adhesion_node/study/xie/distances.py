@@ -14,21 +14,29 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ...command.options import DONE, report
 from ...core.physics import braking
-from ...core.physics.train import CRH3, KMH
+from ...core.physics.adhesion import WET, AdhesionLaw
+from ...core.physics.train import CRH3, KMH, Array
+from ...run.score import CONVERGED_AFTER_MPS
 from ..trial.running import Running, add_running_options, running
 from ..trial.text import Column, lines
-from ..trial.trials import grouped
-from . import identified
+from ..trial.trials import Results, Rows, each_trial, grouped
 from .methods import METHODS, trials
 from .published import BRAKING_CASES, SAVINGS, WORST
+
+BRAKINGS = {"tunnel_entry": (300.0, 100.0), "tunnel_exit": (250.0, 50.0)}
+"""Speeds of the scenarios, km/h."""
 
 IDENTIFYING = ("particle_em", "rail_condition")
 """The paper's method and the default one."""
 
+SPEEDS = Column("km/h", 12, "", lambda row: f"{row['from_kmh']:>5g} -> {row['to_kmh']:>3g}")
+
 COLUMNS = (
-    Column("km/h", 12, "", lambda row: f"{row['from_kmh']:>5g} -> {row['to_kmh']:>3g}"),
+    SPEEDS,
     Column("mu", 8, "", "case"),
     Column("m", 8, ".1f", "distance_m"),
     Column("paper", 8, ".1f", "paper_distance_m"),
@@ -39,29 +47,46 @@ COLUMNS = (
 )
 
 SAVED = (
-    COLUMNS[0],
+    SPEEDS,
     Column("m, %", 8, ".2f", "distance_percent"),
     Column("paper", 8, ".2f", "paper_distance_percent"),
     Column("s, %", 6, ".2f", "time_percent"),
     Column("paper", 6, ".2f", "paper_time_percent"),
 )
 
+IDENTIFIED = (
+    SPEEDS,
+    Column("method", 14, "", "method"),
+    *(
+        Column(head, width, form, name + end)
+        for name, unit, width in (("distance_m", "m", 8), ("time_s", "s", 6))
+        for head, form, end in (
+            *((unit, ".1f", ""), ("5 %", ".1f", "_p5"), ("95 %", ".1f", "_p95")),
+            *(("true", ".1f", "_true_law"), ("saved %", ".2f", "_saved_percent")),
+        )
+    ),
+)
+
+
+def braked(mu: float | AdhesionLaw, from_kmh: float, to_kmh: float) -> dict[str, float]:
+    """Braking distance, m, and time, s, of the paper's train by an adhesion."""
+    curve = braking.curve(CRH3, from_kmh * KMH, mu, to_kmh * KMH)
+    return {"distance_m": float(curve.distance_m[-1]), "time_s": float(curve.time_s[-1])}
+
 
 def rows() -> Iterator[dict[str, Any]]:
     """Our distances and times beside the published ones, a row per braking."""
     for case in BRAKING_CASES:
-        ours = braking.curve(CRH3, case.from_kmh * KMH, case.mu, case.to_kmh * KMH)
-        distance, time = float(ours.distance_m[-1]), float(ours.time_s[-1])
+        ours = braked(case.mu, case.from_kmh, case.to_kmh)
         yield {
             "from_kmh": case.from_kmh,
             "to_kmh": case.to_kmh,
             "case": case.case,
-            "distance_m": distance,
-            "time_s": time,
+            **ours,
             "paper_distance_m": case.distance_m,
             "paper_time_s": case.time_s,
-            "distance_deviation_percent": 100.0 * (distance / case.distance_m - 1.0),
-            "time_deviation_percent": 100.0 * (time / case.time_s - 1.0),
+            "distance_deviation_percent": 100.0 * (ours["distance_m"] / case.distance_m - 1.0),
+            "time_deviation_percent": 100.0 * (ours["time_s"] / case.time_s - 1.0),
         }
 
 
@@ -80,6 +105,42 @@ def savings(table: Sequence[Mapping[str, Any]]) -> Iterator[dict[str, float]]:
         }
 
 
+def by_identified(rows: Rows, from_kmh: float, to_kmh: float) -> dict[str, float]:
+    """Braking distance, m, and time, s, by the adhesion that a run identified.
+
+    The first 30 km/h take the first value after them; raises ValueError where there is none.
+    """
+    converged = rows[rows["true_speed_mps"] < from_kmh * KMH - CONVERGED_AFTER_MPS]
+    if not converged.size:
+        raise ValueError("run without an estimate after the first 30 km/h of braking")
+    converged = converged[np.argsort(converged["true_speed_mps"])]
+
+    def law(speed_mps: Array) -> Array:
+        return np.asarray(np.interp(speed_mps, converged["true_speed_mps"], converged["mu"]), dtype=np.float64)
+
+    return braked(law, from_kmh, to_kmh)
+
+
+def identified(cells: Mapping[tuple[str, str], Results]) -> Iterator[dict[str, Any]]:
+    """A row per scenario and method: distance and time by the identified adhesion, by the true law, and the saving."""
+    for (scenario, method), found in cells.items():
+        from_kmh, to_kmh = BRAKINGS[scenario]
+        by_run = [by_identified(own, from_kmh, to_kmh) for own in each_trial(found.rows)]
+        true, worst = (braked(mu, from_kmh, to_kmh) for mu in (WET, WORST))
+        row: dict[str, Any] = {"from_kmh": from_kmh, "to_kmh": to_kmh, "case": "identified", "method": method}
+        row["runs"] = np.unique(found.runs["seed"]).size
+        for name in true:
+            values = np.array([of_run[name] for of_run in by_run])
+            row |= {
+                name: float(values.mean()),
+                f"{name}_p5": float(np.percentile(values, 5)),
+                f"{name}_p95": float(np.percentile(values, 95)),
+                f"{name}_true_law": true[name],
+                f"{name}_saved_percent": 100.0 * (1.0 - float(values.mean()) / worst[name]),
+            }
+        yield row
+
+
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study distances`."""
     parser.add_argument(
@@ -89,16 +150,6 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 2, 3, 10-13, 20 and 21 into DIR")
 
 
-def by_identified(runs: int, where: Running) -> list[dict[str, Any]]:
-    """Distances by the adhesion that each of the methods identified in the runs of `study tables`."""
-    wanted = [
-        ((scenario, method), trials(scenario, METHODS[method], runs))
-        for scenario in identified.BRAKINGS
-        for method in IDENTIFYING
-    ]
-    return list(identified.rows(grouped(wanted, where)))
-
-
 def run(options: argparse.Namespace) -> int:
     """Print the table and the savings, and the distances by the identified adhesion where runs are asked for."""
     if options.runs < 0:
@@ -106,13 +157,21 @@ def run(options: argparse.Namespace) -> int:
     table = list(rows())
     text = [*lines(COLUMNS, table), "", f"saved by the wet law against the fixed {WORST}"]
     text += lines(SAVED, savings(table))
-    found = by_identified(options.runs, running(options)) if options.runs else []
-    if found:
+    if options.runs:
+        found = _identified_in(options.runs, running(options))
         text += ["", f"by the mu identified in {options.runs} runs from each start; saved against the fixed {WORST}"]
-        text += lines(identified.COLUMNS, found)
+        text += lines(IDENTIFIED, found)
+        table += found
     if options.figures:
-        from .braking_figures import draw_all
+        from .figures import draw_brakings
 
-        draw_all(options.figures)
-    report(options.json, table + found, "\n".join(text))
+        draw_brakings(options.figures)
+    report(options.json, table, "\n".join(text))
     return DONE
+
+
+def _identified_in(runs: int, where: Running) -> list[dict[str, Any]]:
+    """Identify by each of the methods in the runs of `study tables`."""
+    cells = [(scenario, method) for scenario in BRAKINGS for method in IDENTIFYING]
+    wanted = [((scenario, method), trials(scenario, METHODS[method], runs)) for scenario, method in cells]
+    return list(identified(grouped(wanted, where)))

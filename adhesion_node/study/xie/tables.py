@@ -74,9 +74,9 @@ def run(options: argparse.Namespace) -> int:
     cells = grouped(wanted, running(options))
     table = [row for cell, found in cells.items() for row in rows(cell, found)]
     if options.figures:
-        from .curves import draw_all
+        from .figures import draw_estimates
 
-        draw_all(cells, options.figures)
+        draw_estimates(cells, options.figures)
     text = ["mean relative error of mu, %, beside the paper's (its EKF beside ours); spread over the runs"]
     text += [*lines(COLUMNS, table), "", *_speed_lines(cells), "", *_digest_lines(table)]
     report(options.json, table, "\n".join(text))

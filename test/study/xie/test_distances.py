@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from adhesion_node.study.__main__ import main
-from adhesion_node.study.xie import braking_figures, distances
+from adhesion_node.study.xie import distances, figures
 from adhesion_node.study.xie.published import SAVINGS
 
 PUBLISHED = {
@@ -101,9 +101,9 @@ def test_savings_beside_the_papers() -> None:
     assert printed == pytest.approx([saving.distance_percent for saving in SAVINGS], abs=0.01)
 
 
-@pytest.mark.parametrize("scene", braking_figures.SCENES)
-def test_the_rail_drops_as_the_paper_says(scene: braking_figures.Scene) -> None:
-    speeds, adhesion = braking_figures.rail(scene)
+@pytest.mark.parametrize("scene", figures.SCENES)
+def test_the_rail_drops_as_the_paper_says(scene: figures.Scene) -> None:
+    speeds, adhesion = figures.rail(scene)
     assert (speeds[0], speeds[1], speeds[-1]) == (scene.from_kmh, scene.from_kmh, scene.to_kmh)
     printed = {300: [0.1432, 0.0726, 0.1023], 250: [0.1514, 0.0770, 0.1206]}
     assert adhesion[[0, 1, -1]] == pytest.approx(printed[round(scene.from_kmh)], abs=6e-5)

@@ -19,7 +19,7 @@ from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.trial.running import Running
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results, Rows, Trials
-from adhesion_node.study.xie import distances, identified, sensitivity, tables
+from adhesion_node.study.xie import distances, sensitivity, tables
 from adhesion_node.study.xie.methods import METHODS, STARTS, trials
 
 Key = tuple[str, ...]
@@ -44,7 +44,7 @@ def results(runs: Sequence[Rows]) -> Results:
 
 
 def test_the_true_law_gives_its_own_distance_save_for_the_first_30_kmh() -> None:
-    distance, time = identified.distance_and_time(a_run(250.0, 50.0, 1.0), 250.0, 50.0)
+    distance, time = distances.by_identified(a_run(250.0, 50.0, 1.0), 250.0, 50.0).values()
     # By hand: down to 220 km/h with the adhesion of 220 km/h, from there with the law.
     first = braking.curve(CRH3, 250 * KMH, float(WET(np.array(220 * KMH))), 220 * KMH)
     rest = braking.curve(CRH3, 220 * KMH, WET, 50 * KMH)
@@ -54,15 +54,15 @@ def test_the_true_law_gives_its_own_distance_save_for_the_first_30_kmh() -> None
 
 def test_a_run_without_converged_estimates_is_refused() -> None:
     with pytest.raises(ValueError, match="without an estimate after the first 30 km/h"):
-        identified.distance_and_time(a_run(250.0, 225.0, 1.0), 250.0, 50.0)
+        distances.by_identified(a_run(250.0, 225.0, 1.0), 250.0, 50.0)
 
 
 def test_rows_tell_mean_band_and_saving() -> None:
     cells = {
         (name, "particle_em"): results([a_run(*speeds, scale) for scale in (0.9, 0.95, 1.0, 1.05, 1.1)])
-        for name, speeds in identified.BRAKINGS.items()
+        for name, speeds in distances.BRAKINGS.items()
     }
-    entry, leaving = identified.rows(cells)
+    entry, leaving = distances.identified(cells)
     assert (entry["from_kmh"], entry["runs"], leaving["to_kmh"]) == (300.0, 1, 50.0)
     for row in (entry, leaving):
         assert row["distance_m_p5"] < row["distance_m"] < row["distance_m_p95"]
@@ -82,7 +82,7 @@ def test_both_methods_stand_beside_each_other_on_the_trials_of_the_tables(
         for key, some in wanted:
             asked.append(some)
             scale = 0.9 if some.estimator.way == "lockstep" else 1.0
-            run = a_run(*identified.BRAKINGS[some.world.scenario], scale)
+            run = a_run(*distances.BRAKINGS[some.world.scenario], scale)
             found[key] = results([run.copy() for _ in STARTS])
         return found
 
