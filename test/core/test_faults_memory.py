@@ -21,7 +21,8 @@ from adhesion_node.core import Config
 from adhesion_node.core.intake import stream
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample, WheelSample
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire import codecs as reading
+from adhesion_node.wire.codecs import Rejected
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
 TURN = 2700
@@ -142,11 +143,11 @@ def take(pipeline: Pipeline, sent: Sent) -> None:
     if isinstance(sent, (PressureSample, PositionSample, SpeedSample, WheelSample)):
         pipeline.push(sent)
         return
-    name = "position" if hasattr(sent, "pose") else "brake_pressure"
+    topic = POSITION if hasattr(sent, "pose") else BRAKE_PRESSURE
     try:
-        getattr(reading, name)(sent)
-    except reading.Rejected as refusal:
-        pipeline.refuse(name, refusal.reason)
+        topic.read(sent)
+    except Rejected as refusal:
+        pipeline.refuse(topic.name, refusal.reason)
 
 
 def held(pipeline: Pipeline) -> int:
