@@ -64,7 +64,7 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
-            return Subject(name, "as recorded", read_run(reader), setup.config)
+            return Subject(name, "as recorded", read_run(reader, setup.line), setup.config)
         run = estimate_run(reader, _selection(reader, options), setup)
         return Subject(name, "estimated from the recorded sensors", run, setup.config)
 

@@ -10,7 +10,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.physics.train import KMH, Train
-from ..wire.codecs import ATMOSPHERE_PA
 from .findings import distances
 from .run import FIXED_MU, Run
 from .series import Series
@@ -57,7 +56,7 @@ def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
         Line("estimated", "identified", run.speed.map(lambda mps: mps / KMH)),
     )
     forces = (
-        Line("brake B", "fixed", run.pressure.map(lambda pa: train.brake_force(pa - ATMOSPHERE_PA) / 1e3)),
+        Line("brake B", "fixed", run.pressure.map(lambda pa: train.brake_force(pa) / 1e3)),
         Line("adhesion F, true", "truth", run.true_mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
         Line("adhesion F, identified", "identified", run.mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
     )

@@ -39,7 +39,7 @@ def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) 
     def column(value: Callable[[Estimate], Any]) -> Series:
         return Series(t_ns, np.array([value(prediction.estimate) for prediction in predictions]))
 
-    return read_inputs(reader, {ours: recorded for recorded, ours in selection.items()})._replace(
+    return read_inputs(reader, {ours: recorded for recorded, ours in selection.items()}, setup.line)._replace(
         mu=column(lambda estimate: estimate.mu),
         mu_lower=column(lambda estimate: estimate.mu_lower),
         position=column(lambda estimate: estimate.position_m),

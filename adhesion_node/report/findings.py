@@ -13,7 +13,6 @@ import numpy as np
 from ..core import Config, Regime
 from ..core.physics.train import KMH, Array, Train
 from ..run.score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
-from ..wire.codecs import ATMOSPHERE_PA
 from .run import FIXED_MU, Run, distance_to_target
 
 AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
@@ -106,6 +105,6 @@ def listed(counts: Mapping[str, int]) -> str:
 
 def _error(run: Run, config: Config) -> float | None:
     """The score of an offline replay; None where the recording holds no truth of the estimates' stamps."""
-    pressure_pa = run.pressure.map(lambda absolute: np.maximum(absolute - ATMOSPHERE_PA, 0.0)).by_time()
+    pressure_pa = run.pressure.by_time()
     truth = Truth(mu=run.true_mu.by_time(), speed_mps=run.true_speed.by_time(), pressure_pa=pressure_pa)
     return mean_relative_error_percent(config, truth, [_Point(*row) for row in run.mu.by_time().items()])

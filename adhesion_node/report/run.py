@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from itertools import groupby
+from operator import attrgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -18,9 +19,19 @@ from ..core import Regime
 from ..core.physics import braking
 from ..core.physics.train import GRAVITY, Array, Train
 from ..wire import topics
-from ..wire.codecs import stamp_ns
+from ..wire.codecs import NOMINAL, Line
 from ..wire.topics import Topic
-from .series import NONE, Series, Times, read_last_status, read_remarks, read_series, read_status, read_unstamped
+from .series import (
+    NONE,
+    Series,
+    Times,
+    read_last_status,
+    read_remarks,
+    read_series,
+    read_status,
+    read_topic,
+    read_unstamped,
+)
 
 FIXED_MU = 0.0726
 """The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""
@@ -56,7 +67,7 @@ class Run(NamedTuple):
     true_position: Series = NONE
     true_speed: Series = NONE
     pressure: Series = NONE
-    """Absolute, Pa."""
+    """Gauge, Pa."""
     mu: Series = NONE
     mu_lower: Series = NONE
     position: Series = NONE
@@ -100,13 +111,13 @@ class Run(NamedTuple):
         return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
 
 
-def read_run(reader: BagReader) -> Run:
+def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
     """Read the series. Raises ValueError when the recording holds no estimates."""
-    run = read_inputs(reader, {})._replace(
+    run = read_inputs(reader, {}, line)._replace(
         mu=_read_mu(reader),
         mu_lower=read_unstamped(reader, topics.MU_LOWER, (topics.STATE, topics.DECELERATION)),
-        position=read_series(reader, topics.STATE, _position),
-        speed=read_series(reader, topics.STATE, _speed),
+        position=read_series(reader, topics.STATE, attrgetter("position_m")),
+        speed=read_series(reader, topics.STATE, attrgetter("speed_mps")),
         regime=read_status(reader, topics.DIAGNOSTICS, "regime"),
         safe=_read_curves(reader, topics.BRAKING_CURVE),
         nominal=_read_curves(reader, topics.BRAKING_CURVE_NOMINAL),
@@ -120,17 +131,20 @@ def read_run(reader: BagReader) -> Run:
     return run
 
 
-def read_inputs(reader: BagReader, recorded: Mapping[str, str]) -> Run:
-    """Read the truth and the brake pressure; `recorded` has their names in the recording where these differ."""
+def read_inputs(reader: BagReader, recorded: Mapping[str, str], line: Line) -> Run:
+    """Read the truth and the brake pressure above the air of `line`.
+
+    `recorded` has their names in the recording where these differ.
+    """
 
     def series(topic: Topic, value: Callable[[Any], Any]) -> Series:
-        return read_series(reader, topic._replace(name=recorded.get(topic.name, topic.name)), value)
+        return read_series(reader, topic._replace(name=recorded.get(topic.name, topic.name)), value, line)
 
     return Run(
-        true_mu=series(topics.TRUTH_MU, lambda message: message.data),
-        true_position=series(topics.TRUTH_STATE, _position),
-        true_speed=series(topics.TRUTH_STATE, _speed),
-        pressure=series(topics.BRAKE_PRESSURE, lambda message: message.fluid_pressure),
+        true_mu=series(topics.TRUTH_MU, float),
+        true_position=series(topics.TRUTH_STATE, attrgetter("position_m")),
+        true_speed=series(topics.TRUTH_STATE, attrgetter("speed_mps")),
+        pressure=series(topics.BRAKE_PRESSURE, attrgetter("pressure_pa")),
     )
 
 
@@ -165,25 +179,12 @@ def _held(train: Train, speed_mps: float, mu: float, target_mps: float) -> float
     return float(braking.curve(train, speed_mps, mu, target_mps).distance_m[-1])
 
 
-def _position(odometry: Any) -> float:
-    return float(odometry.pose.pose.position.x)
-
-
-def _speed(odometry: Any) -> float:
-    return float(odometry.twist.twist.linear.x)
-
-
 def _read_mu(reader: BagReader) -> Series:
     """Read mu from its stamped form, the deceleration -mu g, where it was recorded, else from the number alone."""
-    stamped = read_series(reader, topics.DECELERATION, lambda message: -message.accel.accel.linear.x / GRAVITY)
+    stamped = read_series(reader, topics.DECELERATION, lambda read: -read.acceleration_mps2 / GRAVITY)
     return stamped if stamped.t_ns.size else read_unstamped(reader, topics.MU, (topics.STATE,))
 
 
 def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
-    return tuple(_curve(record.message) for record in reader.messages([topic.name]) if record.message.points)
-
-
-def _curve(message: Any) -> Curve:
-    rows = [(point.positions[0], point.velocities[0]) for point in message.points]
-    place, speed = np.array(rows).T
-    return Curve(stamp_ns(message.header), place, speed)
+    placed = (sample.read for sample in read_topic(reader, topic) if sample.read is not None)
+    return tuple(Curve(one.t_ns, one.position_m + one.curve.distance_m, one.curve.speed_mps) for one in placed)

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from ..bag import BagReader
 from ..core.physics.train import Array
-from ..wire.codecs import stamp_ns
-from ..wire.results import Status
-from ..wire.topics import DIAGNOSTICS, Topic
+from ..wire.codecs import NOMINAL, Line, Rejected, stamp_ns
+from ..wire.results import Status, Statuses
+from ..wire.topics import Frame, Topic
 
 Times = NDArray[np.int64]
 
@@ -44,12 +44,34 @@ NONE = Series(np.array([], dtype=np.int64), np.array([]))
 """Of what was not recorded."""
 
 
-def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any]) -> Series:
-    """Read `value` of every message of a topic, by its stamp, or by its log time where there is no header.
+class Sample(NamedTuple):
+    """What was read of one message; None where it was refused. `t_ns` is its stamp, or the log time without one."""
+
+    log_ns: int
+    t_ns: int
+    read: Any
+
+
+def read_topic(reader: BagReader, topic: Topic, line: Line = NOMINAL) -> Iterator[Sample]:
+    """Yield what is read of every message of a topic, whatever its frame."""
+    read = topic._replace(frame=Frame.ANY).read
+    for record in reader.messages([topic.name]):
+        message = record.message
+        header = getattr(message, "header", None)
+        t_ns = record.log_ns if header is None else stamp_ns(header)
+        try:
+            yield Sample(record.log_ns, t_ns, read(message, line))
+        except Rejected:
+            yield Sample(record.log_ns, t_ns, None)
+
+
+def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any], line: Line = NOMINAL) -> Series:
+    """Take `value` of all that is read of a topic, by its stamp or log time; NaN where a message is refused.
 
     Empty when the recording lacks the topic.
     """
-    rows = [(_time(record.message, record.log_ns), value(record.message)) for record in reader.messages([topic.name])]
+    samples = read_topic(reader, topic, line)
+    rows = [(sample.t_ns, np.nan if sample.read is None else value(sample.read)) for sample in samples]
     rows.sort(key=lambda row: row[0])  # stamps may come late; log times do not tell
     return Series(np.array([t for t, _ in rows], dtype=np.int64), np.array([v for _, v in rows]))
 
@@ -60,10 +82,8 @@ def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> 
     What is published together is logged together, so a lost message leaves a gap and moves no other one. Of several
     that would take one stamp the nearest in log time does. Empty when either is missing.
     """
-    anchors = sorted(
-        (record.log_ns, _time(record.message, 0)) for name in beside for record in reader.messages([name.name])
-    )
-    rows = [(record.log_ns, record.message.data) for record in reader.messages([topic.name])] if anchors else []
+    anchors = sorted((sample.log_ns, sample.t_ns) for name in beside for sample in read_topic(reader, name))
+    rows = [(sample.log_ns, sample.read) for sample in read_topic(reader, topic) if anchors and sample.read is not None]
     nearest: dict[int, tuple[int, Any]] = {}
     for log_ns, value in rows:
         after = bisect_left(anchors, (log_ns,))
@@ -75,9 +95,7 @@ def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read the value of `key` in a topic of diagnostics, as texts."""
-    return read_series(
-        reader, topic, lambda message: next((status.values[key] for status in _with_key(message, key)), "")
-    )
+    return read_series(reader, topic, lambda read: next((status.values[key] for status in _with_key(read, key)), ""))
 
 
 def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
@@ -85,23 +103,18 @@ def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
     return read_series(
         reader,
         topic,
-        lambda message: "; ".join(status.message for status in _with_key(message, key) if status.level != 0),
+        lambda read: "; ".join(status.message for status in _with_key(read, key) if status.level != 0),
     )
 
 
 def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str]:
     """Read the last values, by their keys, of the status that has `key`; {} where there is none."""
     last: dict[str, str] = {}
-    for record in reader.messages([topic.name]):
-        for status in _with_key(record.message, key):
+    for sample in read_topic(reader, topic):
+        for status in _with_key(sample.read, key):
             last = dict(status.values)
     return last
 
 
-def _with_key(message: Any, key: str) -> list[Status]:
-    return [status for status in DIAGNOSTICS.read(message).entries if key in status.values]
-
-
-def _time(message: Any, log_ns: int) -> int:
-    header = getattr(message, "header", None)
-    return log_ns if header is None else stamp_ns(header)
+def _with_key(read: Statuses, key: str) -> list[Status]:
+    return [status for status in read.entries if key in status.values]

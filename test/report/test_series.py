@@ -17,6 +17,7 @@ from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
 
 from adhesion_node.bag import BagReader, BagWriter
+from adhesion_node.core.atp.supervision import TrainState
 from adhesion_node.report.series import Series, read_series, read_status
 from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE, Topic
 
@@ -35,8 +36,8 @@ def state(t_ns: int, speed_mps: float) -> Any:
     return messages.state_message(t_ns, 0.0, 1.0, speed_mps, 1.0)
 
 
-def speed_of(message: Any) -> float:
-    return float(message.twist.twist.linear.x)
+def speed_of(state: TrainState) -> float:
+    return state.speed_mps
 
 
 def test_the_stamp_counts_before_the_log_time(tmp_path: Path) -> None:
@@ -51,7 +52,7 @@ def test_the_stamp_counts_before_the_log_time(tmp_path: Path) -> None:
 def test_without_a_header_the_log_time_counts(tmp_path: Path) -> None:
     path = write(tmp_path / "bag", (MU, Float64(data=0.08), 5 * S), (MU, Float64(data=0.09), 7 * S))
     with BagReader(path) as reader:
-        series = read_series(reader, MU, lambda message: message.data)
+        series = read_series(reader, MU, float)
     assert (series.t_ns.tolist(), series.values.tolist()) == ([5 * S, 7 * S], [0.08, 0.09])
 
 
@@ -61,14 +62,14 @@ def test_times_increase_even_where_messages_came_late(tmp_path: Path) -> None:
         for t_ns, log_ns in ((S, S), (3 * S, 2 * S), (2 * S, 3 * S), (4 * S, 4 * S)):
             writer.write("/position", POSITION.type, cdrs.position(t_ns, t_ns / S, 1.0), log_ns)
     with BagReader(path) as reader:
-        series = read_series(reader, POSITION, lambda message: message.pose.pose.position.x)
+        series = read_series(reader, POSITION, lambda sample: sample.position_m)
     assert (series.t_ns.tolist(), series.values.tolist()) == ([S, 2 * S, 3 * S, 4 * S], [1.0, 2.0, 3.0, 4.0])
 
 
 def test_only_the_topic_that_was_asked_for(tmp_path: Path) -> None:
     path = write(tmp_path / "bag", (MU, Float64(data=0.08), S), (MU_LOWER, Float64(data=0.05), S))
     with BagReader(path) as reader:
-        assert read_series(reader, MU_LOWER, lambda message: message.data).values.tolist() == [0.05]
+        assert read_series(reader, MU_LOWER, float).values.tolist() == [0.05]
 
 
 def test_a_topic_that_is_not_there_is_empty(tmp_path: Path) -> None:
