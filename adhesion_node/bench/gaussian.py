@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..core.methods.rail_condition.problem import Belief, Model, Problem
-from ..core.methods.rail_condition.smoother import Search, posterior, smooth
+from ..core.methods.rail_condition.smoother import KappaSearch, posterior, smooth
 from ..core.physics.adhesion import SpeedLaw
 from .scene import Scene, Update, braking_window
 from .timing import SLOW, Contender, Timed, beside, interleave
@@ -59,7 +59,7 @@ def _ours(scene: Scene) -> Update:
     covariance[:2, :2] = prior.covariance
     belief = Belief(np.append(prior.mean, START_MU), covariance)
     problem = Problem(Model(motion, SpeedLaw(1.0), tail_dof=0.0), window, belief)
-    smoothed = smooth(problem, Search(START_MU, 0.0, TOLERANCE, MOST_ITERATIONS))
+    smoothed = smooth(problem, KappaSearch(START_MU, 0.0, TOLERANCE, MOST_ITERATIONS))
     posterior(problem, smoothed, -math.inf)
     return Update(smoothed.kappa, smoothed.trajectory[:, 1], smoothed.iterations)
 

@@ -61,6 +61,12 @@ class Config:
     position_step_spacing_m: float = setting(
         200.0, "Distance behind such a step within which there is no other one", "m", 0.0, 1e6
     )
+    position_step_speed_share: float = setting(
+        0.3,
+        "Standard deviation of the speed behind such a step, over its size per time of the window",
+        low=0.0,
+        high=10.0,
+    )
     restart_sigma: float = setting(
         5.0,
         "Difference of its speed from the tracker's, in standard deviations, at which a window has lost the train",
@@ -85,6 +91,8 @@ class Config:
     identify_noise: bool = setting(
         False, "Identify the variance of the positions by the same EM, from the given one on"
     )
+    noise_trust_steps: float = setting(50.0, "Steps of a window that the given variance is worth", low=1.0, high=1e9)
+    noise_memory_steps: float = setting(1950.0, "Steps from which the variance is learnt at most", low=1.0, high=1e9)
     window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
     step: int = setting(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
     particles: int = setting(20, "Particles, M, of particle_em", low=2, high=100_000)
@@ -101,10 +109,30 @@ class Config:
     coasting_noise_mps: float = setting(
         0.03, "Random walk of the speed while no brake is applied, standard deviation over 0.1 s", "m/s", 1e-6, 10.0
     )
+    braking_noise_mps: float = setting(
+        1.0,
+        "The same under the brake, over 1 s, for the tracker: an unknown deceleration of about 1 m/s^2",
+        "m/s",
+        1e-3,
+        10.0,
+    )
+    settled_ratio: float = setting(
+        1.5,
+        "Variance of the tracker's speed, over its stationary value, from which on a window may open",
+        low=1.0,
+        high=100.0,
+    )
+    unknown_speed_mps: float = setting(
+        50.0, "Mean and standard deviation of the speed of a train just met", "m/s", 1.0, 200.0
+    )
+    slowest_mps: float = setting(
+        3.0, "Speed below which there are no windows: a train about to stand says nothing of the rail", "m/s", 0.1, 50.0
+    )
     speed_std_mps: float = setting(0.3, "Standard deviation of a measured speed", "m/s", 1e-4, 100.0)
     speed_while_braking: bool = setting(
         False, "Use a measured speed under the brake too (a radar; an axle slides and would mislead)"
     )
+    creep_samples: int = setting(10, "Newest measurements whose creep tells sliding wheels", low=1, high=1000)
     sliding_creep: float = setting(
         0.03, "Creep of the median axle from which the wheels slide; below half of it they roll", low=1e-3, high=1.0
     )
@@ -113,6 +141,9 @@ class Config:
     )
     assumed_pressure_pa: float = setting(
         410e3, "Brake-cylinder pressure (gauge) taken where none is measured", "Pa", 0.0, 2e6
+    )
+    lowest_net_mu: float = setting(
+        -0.05, "Least net adhesion where no pressure is measured: traction may be at work", low=-1.0, high=0.0
     )
     pressure_wait_s: float = setting(
         0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
@@ -126,6 +157,15 @@ class Config:
     rotating_mass_std: float = setting(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
     low_adhesion: str = setting(
         "snow", "Adhesion law to fall back to where nothing is known", choices=tuple(sorted(LAWS))
+    )
+    undecided_share: float = setting(
+        0.5, "Share of unknown_std above which a window has seen too little to tell what limits", low=0.0, high=10.0
+    )
+    undecided_start_share: float = setting(
+        0.5, "Share of its start left in particle_em's mu above which it has seen too little", low=0.0, high=1.0
+    )
+    plausible_probability: float = setting(
+        0.005, "Probability from which a shape of the law may lower the bound", low=0.0, high=1.0
     )
     unknown_std: float = setting(0.04, "Standard deviation of mu where nothing is known", low=1e-3, high=1.0)
     memory_s: float = setting(60.0, "Time in which knowledge that is not renewed fades to 1/e", "s", 1e-3, 1e6)
@@ -167,6 +207,10 @@ class Config:
     def motion(self) -> Motion:
         """The train's state-space model with the configured noise."""
         return Motion(self.train, self.track, self.position_noise_m**2 / 0.1, self.speed_noise_mps**2 / 0.1)
+
+    def speed_noise_rate(self, braked: bool) -> float:
+        """Variance rate of the tracker's speed, (m/s)^2/s."""
+        return self.braking_noise_mps**2 if braked else self.coasting_noise_mps**2 / 0.1
 
     def brake(self, pressure_pa: float | None) -> float:
         """Brake B/(M g) of a measured gauge pressure; 0 below the threshold, the assumed one without a measurement."""

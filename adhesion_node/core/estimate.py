@@ -19,9 +19,6 @@ from .intake.samples import Measurement
 from .methods.protocol import AnyMethod, Context, MethodWindow, Verdict
 from .physics.adhesion import SpeedLaw
 
-LOWEST_NET_ADHESION = -0.05
-"""Where the brake pressure is not measured, traction may be at work: the net force may point forward."""
-
 
 class Estimate(NamedTuple):
     """What is known at `t_ns`, the time of the newest measurement."""
@@ -110,7 +107,7 @@ def judge(
         rail=rail,
         mu=knowledge.mu,
         pressure_measured=measured,
-        lowest_mu=0.0 if measured else LOWEST_NET_ADHESION,
+        lowest_mu=0.0 if measured else config.lowest_net_mu,
         rng=np.random.default_rng([seed, knowledge.windows]),
     )
     verdict = method.evaluate(config, window, context)

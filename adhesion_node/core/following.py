@@ -8,8 +8,8 @@ from __future__ import annotations
 import math
 
 from .belief import tracker
-from .belief.gaussian import Gaussian
-from .belief.window import Sample as WindowSample
+from .belief.gaussian import Gaussian, coast
+from .belief.window import WindowSample
 from .config import Config
 from .estimate import Estimate, blind_estimate, estimate_of, judge
 from .intake.outcome import Event, Outcome, counted
@@ -17,9 +17,6 @@ from .intake.plausibility import is_kmh
 from .intake.samples import Measurement
 from .methods.protocol import Verdict
 from .state import State
-
-SLOWEST_MPS = 3.0
-"""Speed below which the windows stop: a train about to stand still says nothing of the adhesion."""
 
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
@@ -33,10 +30,10 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         detail = f"speed x = {measurement.speed_mps:g} at {seen.speed_mps:.3g} m/s"
         state, measurement = state.told(Event(Outcome.SPEED_IN_KMH, detail)), measurement._replace(speed_mps=None)
     if state.newest is None or state.belief is None:
-        return _accept(config, state, measurement, tracker.meet(measurement), 0.0)
+        return _accept(config, state, measurement, tracker.meet(measurement, config.unknown_speed_mps), 0.0)
     dt_s = (measurement.t_ns - state.newest.t_ns) * 1e-9
     braked = config.brake(state.newest.brake_pressure_pa) > 0.0
-    belief = tracker.predict(state.belief, dt_s, braked, config.coasting_noise_mps**2 / 0.1)
+    belief = coast(state.belief, dt_s, config.speed_noise_rate(braked))
     innovation = tracker.innovation(belief, measurement)
     if innovation > config.gate_sigma:
         detail = f"position x = {measurement.position_m:.12g}, innovation {innovation:.3g} standard deviations"
@@ -44,7 +41,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
             return state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail)), None
         state = state.forgotten()._replace(seen=seen, repeated=repeated)
         state = state.told(Event(Outcome.RESET, detail))
-        return _accept(config, state, measurement, tracker.meet(measurement), 0.0)
+        return _accept(config, state, measurement, tracker.meet(measurement, config.unknown_speed_mps), 0.0)
     belief = tracker.correct(belief, measurement, _speed_variance(config, measurement))
     return _accept(config, state, measurement, belief, dt_s)
 
@@ -82,9 +79,11 @@ def _accept(
         outliers=0,
         since_estimate=state.since_estimate + 1,
     )
-    if brake == 0.0 or belief.mean[1] < SLOWEST_MPS:
+    if brake == 0.0 or belief.mean[1] < config.slowest_mps:
         return _release(config, state)
-    if window is None and tracker.is_settled(belief, measurement.variance_m2 * dt_s):
+    if window is None and tracker.is_settled(
+        belief, measurement.variance_m2 * dt_s, config.speed_noise_rate(True), config.settled_ratio
+    ):
         state = state._replace(window=state.method.open(belief, sample))
     if state.since_estimate < config.step:
         return state, None

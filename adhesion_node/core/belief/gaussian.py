@@ -37,18 +37,18 @@ class Gaussian(NamedTuple):
         return gain
 
 
-def coast(law: Gaussian, dt_s: float, speed_noise_rate: float) -> Gaussian:
+def coast(belief: Gaussian, dt_s: float, speed_noise_rate: float) -> Gaussian:
     """Predict over `dt_s` with the speed a random walk of variance rate `speed_noise_rate`, (m/s)^2/s."""
     step = np.array([[1.0, dt_s], [0.0, 1.0]])
     walk = speed_noise_rate * np.array([[dt_s**3 / 3.0, dt_s**2 / 2.0], [dt_s**2 / 2.0, dt_s]])
-    return Gaussian(step @ law.mean, step @ law.covariance @ step.T + walk)
+    return Gaussian(step @ belief.mean, step @ belief.covariance @ step.T + walk)
 
 
-def observe(law: Gaussian, index: int, value: float, variance: float) -> Gaussian:
+def observe(belief: Gaussian, index: int, value: float, variance: float) -> Gaussian:
     """Condition on a measured position (`index` 0) or speed (`index` 1)."""
-    gain = law.gain(index, variance)
+    gain = belief.gain(index, variance)
     kept = UNIT.copy()
     kept[:, index] -= gain
     # Joseph form: stays symmetric and positive however small the variance is
-    covariance = kept @ law.covariance @ kept.T + variance * (gain[:, None] * gain)
-    return Gaussian(law.mean + gain * (value - law.mean[index]), covariance)
+    covariance = kept @ belief.covariance @ kept.T + variance * (gain[:, None] * gain)
+    return Gaussian(belief.mean + gain * (value - belief.mean[index]), covariance)

@@ -59,7 +59,7 @@ def kept_of_start(observed: float, complete: float, iterations: int) -> float:
     return min(max(1.0 - observed / complete, 0.0), 1.0) ** iterations
 
 
-class Finding(NamedTuple):
+class Identification(NamedTuple):
     """What EM found in a window."""
 
     mu: float
@@ -71,18 +71,18 @@ class Finding(NamedTuple):
     """Share of the start that is still in `mu`."""
 
 
-def learn(before: Rail, finding: Finding, quantile: float) -> Rail:
+def learn(before: Rail, identification: Identification, quantile: float) -> Rail:
     """Knowledge after a window: what EM kept of its start is replaced by what was known before.
 
     The errors of overlapping windows go together, so the standard deviations add up linearly. `quantile` is that of
     the lower bound's confidence.
     """
-    kept = finding.kept
+    kept = identification.kept
     if kept >= 1.0:  # nothing learnt; the window's standard deviation may be infinite
         return before
-    mu = max(finding.mu + kept * (before.mu - finding.start), 0.0)
-    lower = kept * before.lower + (1.0 - kept) * (mu - quantile * finding.std)
-    return Rail(mu, (1.0 - kept) * finding.std + kept * before.std, min(max(lower, 0.0), mu))
+    mu = max(identification.mu + kept * (before.mu - identification.start), 0.0)
+    lower = kept * before.lower + (1.0 - kept) * (mu - quantile * identification.std)
+    return Rail(mu, (1.0 - kept) * identification.std + kept * before.std, min(max(lower, 0.0), mu))
 
 
 def lower_bound(mu: Array, std: Array, known: Rail | None, confidence: float) -> Array:

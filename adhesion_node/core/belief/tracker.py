@@ -1,7 +1,7 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""Position and speed without the adhesion: a Kalman filter whose speed is a random walk.
+"""Position and speed without the adhesion: a Kalman filter whose speed is a random walk (`gaussian.coast`).
 
 It follows the train while it coasts, tells outliers, finds the speed again after a start or a gap, and gives the
 first window of every braking its prior.
@@ -14,27 +14,13 @@ import math
 import numpy as np
 
 from ..intake.samples import Measurement
-from .gaussian import Gaussian, coast, observe
-
-MET_SPEED_MPS = 50.0
-"""Mean and standard deviation of the speed of a train just met."""
-
-BRAKED_NOISE_RATE = 1.0
-"""(m/s)^2/s: an unknown deceleration of up to about 1 m/s^2, taken as a random walk."""
-
-SETTLED = 1.5
-"""Ratio of the speed's variance to its stationary value at which the tracker counts as settled."""
+from .gaussian import Gaussian, observe
 
 
-def meet(measurement: Measurement) -> Gaussian:
-    """Law of a train of which one position is known and no speed."""
-    mean = np.array([measurement.position_m, MET_SPEED_MPS])
-    return Gaussian(mean, np.diag([measurement.variance_m2, MET_SPEED_MPS**2]))
-
-
-def predict(law: Gaussian, dt_s: float, braked: bool, coasting_noise_rate: float) -> Gaussian:
-    """Predict over `dt_s`; variance rate of the coasting speed in (m/s)^2/s."""
-    return coast(law, dt_s, BRAKED_NOISE_RATE if braked else coasting_noise_rate)
+def meet(measurement: Measurement, unknown_speed_mps: float) -> Gaussian:
+    """Belief of a train of which one position is known, and of the speed only how large it may be."""
+    mean = np.array([measurement.position_m, unknown_speed_mps])
+    return Gaussian(mean, np.diag([measurement.variance_m2, unknown_speed_mps**2]))
 
 
 def innovation(predicted: Gaussian, measurement: Measurement) -> float:
@@ -45,10 +31,10 @@ def innovation(predicted: Gaussian, measurement: Measurement) -> float:
 
 def correct(predicted: Gaussian, measurement: Measurement, speed_variance: float) -> Gaussian:
     """Take in the measured position, and the measured speed unless `speed_variance` is infinite."""
-    law = observe(predicted, 0, measurement.position_m, measurement.variance_m2)
+    belief = observe(predicted, 0, measurement.position_m, measurement.variance_m2)
     if measurement.speed_mps is not None and math.isfinite(speed_variance):
-        law = observe(law, 1, measurement.speed_mps, speed_variance)
-    return law
+        belief = observe(belief, 1, measurement.speed_mps, speed_variance)
+    return belief
 
 
 def speed_apart(tracked: Gaussian, other: Gaussian) -> float:
@@ -60,11 +46,11 @@ def speed_apart(tracked: Gaussian, other: Gaussian) -> float:
     return abs(float(other.mean[1] - tracked.mean[1])) / math.sqrt(variance)
 
 
-def is_settled(law: Gaussian, measured_rate: float) -> bool:
-    """Whether the speed is known about as well as the tracker can know it under the brake.
+def is_settled(belief: Gaussian, measured_rate: float, noise_rate: float, ratio: float) -> bool:
+    """Whether the variance of the speed is below `ratio` times what the tracker comes to in the long run.
 
-    `measured_rate` is a position's variance times the time between two, m^2 s. With it and the noise rate q, the
-    stationary variance of the speed is sqrt(2) q^(3/4) rate^(1/4), the Riccati equation's solution.
+    `measured_rate` is a position's variance times the time between two, m^2 s. With it and the noise rate q,
+    (m/s)^2/s, that is sqrt(2) q^(3/4) rate^(1/4), the Riccati equation's solution.
     """
-    stationary = math.sqrt(2.0) * BRAKED_NOISE_RATE**0.75 * measured_rate**0.25
-    return bool(law.covariance[1, 1] <= SETTLED * stationary)
+    stationary = math.sqrt(2.0) * noise_rate**0.75 * measured_rate**0.25
+    return bool(belief.covariance[1, 1] <= ratio * stationary)

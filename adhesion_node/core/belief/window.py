@@ -16,7 +16,7 @@ import numpy as np
 from ..physics.train import Array
 
 
-class Sample(NamedTuple):
+class WindowSample(NamedTuple):
     """One accepted measurement as the window keeps it; `brake` is B/(M g), `speed_variance` inf without a speed."""
 
     t_ns: int
@@ -62,7 +62,7 @@ class Window:
         return 1.0 / np.stack((self.variance_m2, self.speed_variance), axis=1)
 
 
-def window_of(samples: Sequence[Sample], noise: float = 1.0) -> Window:
+def window_of(samples: Sequence[WindowSample], noise: float = 1.0) -> Window:
     """Build the window that starts at the first sample: K + 1 samples make K steps.
 
     The first sample gives its time and its brake; its position belongs to the prior. The brake of a step is the

@@ -17,7 +17,7 @@ import numpy as np
 from ..belief.gaussian import Gaussian
 from ..belief.rail import Rail
 from ..belief.regime import Regime
-from ..belief.window import Sample
+from ..belief.window import WindowSample
 from ..physics.adhesion import SpeedLaw
 
 if TYPE_CHECKING:  # Config offers the methods' names, so it stands above them
@@ -28,7 +28,7 @@ class MethodWindow(Protocol):
     """A method's window of one braking, immutable."""
 
     @property
-    def samples(self) -> tuple[Sample, ...]:
+    def samples(self) -> tuple[WindowSample, ...]:
         """Its measurements; the first one shaped the belief of (s, v) that the window began with."""
         ...
 
@@ -89,14 +89,14 @@ class Method(Protocol[Window]):
         """What it does, for the description of the setting `method`."""
         ...
 
-    def open(self, prior: Gaussian, sample: Sample, replaced: Window | None = None) -> Window:
+    def open(self, prior: Gaussian, sample: WindowSample, replaced: Window | None = None) -> Window:
         """Open a window at a sample; `prior` is the belief of (s, v) there, the sample included.
 
         `replaced` is the window that it takes the place of within a braking, as that had lost the train.
         """
         ...
 
-    def extend(self, window: Window, sample: Sample) -> Window:
+    def extend(self, window: Window, sample: WindowSample) -> Window:
         """Return the window with one more sample."""
         ...
 
@@ -108,7 +108,7 @@ class Method(Protocol[Window]):
 AnyMethod = Method[Any]
 
 
-def spent(config: Config, samples: Sequence[Sample]) -> int:
+def spent(config: Config, samples: Sequence[WindowSample]) -> int:
     """Samples to leave behind, so that L more fill the window again; 0 while it still grows."""
     count = len(samples) - config.window + config.step
     return count if count >= config.step else 0

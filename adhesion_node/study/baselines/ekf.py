@@ -80,7 +80,7 @@ def ekf_step(config: EkfConfig, state: EkfState, measurement: Measurement) -> tu
     if not measurement.is_valid() or (newest is not None and measurement.t_ns <= newest.t_ns):
         return state, None
     if newest is None:
-        mean, covariance = _joined(meet(measurement), config)
+        mean, covariance = _joined(meet(measurement, base.unknown_speed_mps), config)
     else:
         mean, covariance = _predict(config, state, (measurement.t_ns - newest.t_ns) * 1e-9, newest)
         mean, covariance = _observe(mean, covariance, measurement)

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...core import Config, Estimate, Measurement, State, finish, init, step
 from ...core.belief.gaussian import Gaussian
-from ...core.belief.window import Sample
+from ...core.belief.window import WindowSample
 from ...core.methods.particle_em.method import ParticleEm, ParticleWindow, evaluate
 from ...core.methods.protocol import Context, Verdict
 
@@ -47,10 +47,10 @@ class Prepared(NamedTuple):
     verdicts: Iterator[Verdict]
     summary: str = METHOD.summary
 
-    def open(self, prior: Gaussian, sample: Sample, replaced: ParticleWindow | None = None) -> ParticleWindow:
+    def open(self, prior: Gaussian, sample: WindowSample, replaced: ParticleWindow | None = None) -> ParticleWindow:
         return METHOD.open(prior, sample, replaced)
 
-    def extend(self, window: ParticleWindow, sample: Sample) -> ParticleWindow:
+    def extend(self, window: ParticleWindow, sample: WindowSample) -> ParticleWindow:
         return METHOD.extend(window, sample)
 
     def evaluate(self, config: Config, window: ParticleWindow, context: Context) -> Verdict:

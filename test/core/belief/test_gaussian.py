@@ -81,14 +81,14 @@ def test_the_oracle_itself_is_the_dense_gaussian_posterior() -> None:
 
 @pytest.mark.parametrize(("sigma_m", "period_s"), [(0.1, 0.1), (0.5, 0.1), (5.0, 0.1), (0.5, 1.0)])
 def test_the_tracker_settles_where_its_riccati_equation_does(sigma_m: float, period_s: float) -> None:
-    law = tracker.meet(Measurement(0, 0.0, sigma_m**2))
+    law = tracker.meet(Measurement(0, 0.0, sigma_m**2), 50.0)
     rate = sigma_m**2 * period_s
-    assert not tracker.is_settled(law, rate)
+    assert not tracker.is_settled(law, rate, 1.0, 1.5)
     for k in range(1, 200):
-        predicted = tracker.predict(law, period_s, True, 0.009)
+        predicted = coast(law, period_s, 1.0)
         law = tracker.correct(predicted, Measurement(k, float(predicted.mean[0]), sigma_m**2), math.inf)
         if k == 1 and period_s < 1.0:
-            assert not tracker.is_settled(law, rate)  # two positions alone: an unknown speed
-    assert tracker.is_settled(law, rate)
+            assert not tracker.is_settled(law, rate, 1.0, 1.5)  # two positions alone: an unknown speed
+    assert tracker.is_settled(law, rate, 1.0, 1.5)
     # continuous limit: sqrt(2) q^(3/4) (r T)^(1/4) with q = 1
     assert law.covariance[1, 1] == pytest.approx(math.sqrt(2.0) * rate**0.25, rel=0.45)

@@ -10,7 +10,16 @@ import math
 import numpy as np
 import pytest
 
-from adhesion_node.core.belief.rail import Finding, Rail, age, ignorance, kept_of_start, learn, learn_bound, lower_bound
+from adhesion_node.core.belief.rail import (
+    Identification,
+    Rail,
+    age,
+    ignorance,
+    kept_of_start,
+    learn,
+    learn_bound,
+    lower_bound,
+)
 
 NOTHING = ignorance(0.05, 0.04)
 
@@ -50,7 +59,7 @@ def test_share_of_the_start_by_hand() -> None:
 
 
 def test_learning_from_a_window_that_kept_nothing_of_its_start() -> None:
-    learnt = learn(NOTHING, Finding(0.08, 0.004, start=0.0, kept=0.0), 1.5)
+    learnt = learn(NOTHING, Identification(0.08, 0.004, start=0.0, kept=0.0), 1.5)
     assert learnt.mu == 0.08
     assert learnt.std == pytest.approx(0.004)
     assert learnt.lower == pytest.approx(0.074)  # 0.08 - 1.5 x 0.004
@@ -58,11 +67,11 @@ def test_learning_from_a_window_that_kept_nothing_of_its_start() -> None:
 
 def test_learning_nothing_changes_nothing() -> None:
     for std in (0.3, math.inf):
-        assert learn(NOTHING, Finding(0.0, std, start=0.0, kept=1.0), 1.645) == NOTHING
+        assert learn(NOTHING, Identification(0.0, std, start=0.0, kept=1.0), 1.645) == NOTHING
 
 
 def test_a_bound_is_never_negative() -> None:
-    assert learn(NOTHING, Finding(0.01, 0.05, start=0.3, kept=0.0), 1.645).lower == 0.0
+    assert learn(NOTHING, Identification(0.01, 0.05, start=0.3, kept=0.0), 1.645).lower == 0.0
 
 
 def test_a_limited_brake_only_raises() -> None:
@@ -74,17 +83,17 @@ def test_a_limited_brake_only_raises() -> None:
 @pytest.mark.parametrize("start_mu", [0.0, 0.03, 0.12])
 def test_the_bound_stays_below_the_adhesion_however_em_was_started(start_mu: float) -> None:
     """A short window repeats its start (kept 0.98): what is published must still agree with itself."""
-    learnt = learn(NOTHING, Finding(start_mu, 0.04, start_mu, 0.98), 1.645)
+    learnt = learn(NOTHING, Identification(start_mu, 0.04, start_mu, 0.98), 1.645)
     assert learnt.lower <= learnt.mu
 
 
 def test_what_em_kept_of_its_start_is_replaced_by_what_was_known() -> None:
     # EM went from 0 to 0.04 where 0.75 of the start is left: 0.04 + 0.75 (0.05 - 0); std 0.25 x 0.02 + 0.75 x 0.04;
     # lower 0.75 x 0.05 + 0.25 (0.0775 - 1.5 x 0.02)
-    learnt = learn(NOTHING, Finding(0.04, 0.02, start=0.0, kept=0.75), 1.5)
+    learnt = learn(NOTHING, Identification(0.04, 0.02, start=0.0, kept=0.75), 1.5)
     assert learnt == pytest.approx((0.0775, 0.035, 0.049375))
     # hence the start does not matter: EM from 0.12 arrives 0.75 x 0.12 higher
-    assert learn(NOTHING, Finding(0.13, 0.02, start=0.12, kept=0.75), 1.5) == pytest.approx(learnt)
+    assert learn(NOTHING, Identification(0.13, 0.02, start=0.12, kept=0.75), 1.5) == pytest.approx(learnt)
 
 
 @pytest.mark.parametrize("known", [NOTHING, Rail(0.08, 0.03, 0.06)])

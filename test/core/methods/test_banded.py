@@ -73,7 +73,7 @@ def test_half_way_are_the_quadratic_form_and_the_end(dense: Array) -> None:
 
 def test_law_at_the_end_is_the_corner_of_the_inverse(dense: Array) -> None:
     factor, inverse = _factor(dense), np.linalg.inv(dense)
-    assert factor.law_at_end() == pytest.approx(inverse[-3:, -3:], rel=1e-9, abs=1e-12)
+    assert factor.covariance_at_end() == pytest.approx(inverse[-3:, -3:], rel=1e-9, abs=1e-12)
     assert factor.information == pytest.approx(1.0 / inverse[-1, -1])
 
 

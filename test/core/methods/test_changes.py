@@ -16,7 +16,7 @@ from oracles_kappa import Conditioned, draw, joint
 from adhesion_node.core.belief.window import Window
 from adhesion_node.core.methods.rail_condition.changes import Change, Indices, change
 from adhesion_node.core.methods.rail_condition.problem import Belief
-from adhesion_node.core.methods.rail_condition.smoother import Search, smooth
+from adhesion_node.core.methods.rail_condition.smoother import KappaSearch, smooth
 
 NOMINAL = Linear(c0=0.79, c1=0.02)
 """The process noise of every published figure."""
@@ -26,7 +26,7 @@ PRIOR = Belief(
     np.array([100.0, 80.0, 1.1]), np.array([[0.04, 0.005, 0.01], [0.005, 0.01, -0.005], [0.01, -0.005, 0.09]])
 )
 SURE = Belief(PRIOR.mean, np.diag([0.04, 0.01, 1e-3]))
-SEARCH = Search(start=1.0, lowest=0.0, tolerance=1e-9, iterations=50)
+SEARCH = KappaSearch(start=1.0, lowest=0.0, tolerance=1e-9, iterations=50)
 CANDIDATES = np.arange(5, 46, dtype=np.intp)
 JUMP_STD = 0.6
 

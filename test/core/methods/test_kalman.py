@@ -15,7 +15,7 @@ from oracles import Linear, dense_information, make_window, ride, rts
 from adhesion_node.core import Config
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.rail import ignorance
-from adhesion_node.core.belief.window import Sample, Window, window_of
+from adhesion_node.core.belief.window import Window, WindowSample, window_of
 from adhesion_node.core.methods.particle_em.kalman import Filtered, filter_windows
 from adhesion_node.core.methods.particle_em.method import ParticleEm, ParticleWindow
 from adhesion_node.core.methods.particle_em.windows import stack
@@ -105,7 +105,7 @@ def test_extended_filter_with_the_published_resistance() -> None:
 
 
 def test_the_state_of_a_window_includes_what_mu_leaves_open() -> None:
-    samples = tuple(Sample(m.t_ns, 0.0952, m.position_m, 0.25, 0.0, math.inf) for m in ride([(2.5, 410e3)]))
+    samples = tuple(WindowSample(m.t_ns, 0.0952, m.position_m, 0.25, 0.0, math.inf) for m in ride([(2.5, 410e3)]))
     config = Config(window=20, step=5, particles=8, iterations=8)
     prior = Gaussian(np.array([0.0, 80.0]), np.diag([0.01, 0.01]))
     context = Context(ignorance(0.05, 0.04), 0.07, True, 0.0, np.random.default_rng(0))

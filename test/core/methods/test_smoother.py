@@ -15,11 +15,14 @@ from oracles_kappa import Conditioned, draw, em_kappa, joint, smoothed
 from scipy import stats
 from scipy.optimize import least_squares, minimize_scalar
 
+from adhesion_node.core import Config
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.window import Window
+from adhesion_node.core.methods.rail_condition.branch import log_likelihood, smoothed_branch
+from adhesion_node.core.methods.rail_condition.hypotheses import Hypothesis
 from adhesion_node.core.methods.rail_condition.problem import Belief, Model, Problem
-from adhesion_node.core.methods.rail_condition.smoother import Search, posterior, smooth
-from adhesion_node.core.physics.adhesion import WET
+from adhesion_node.core.methods.rail_condition.smoother import KappaSearch, posterior, smooth
+from adhesion_node.core.physics.adhesion import WET, SpeedLaw
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import Grade, Track
 from adhesion_node.core.physics.train import Train
@@ -32,7 +35,7 @@ STATE = np.array([[0.04, 0.005], [0.005, 0.01]])
 PRIOR = Belief(
     np.array([100.0, 80.0, 1.2]), np.array([[0.04, 0.005, 0.01], [0.005, 0.01, -0.005], [0.01, -0.005, 0.09]])
 )
-SEARCH = Search(start=0.3, lowest=0.0, tolerance=1e-9, iterations=50)
+SEARCH = KappaSearch(start=0.3, lowest=0.0, tolerance=1e-9, iterations=50)
 TIMID = np.where(np.arange(30) < 12, 0.02, 0.0952)
 """A brake that builds up: at its limit in the first steps for any kappa of interest."""
 
@@ -98,6 +101,32 @@ def test_evidence_of_two_laws_differs_as_their_densities_do(brake: float | Array
             brute.append(joint(other, prior, window).log_evidence)
         assert np.diff(ours) == pytest.approx(np.diff(brute), abs=1e-7)
         assert np.max(np.abs(np.diff(brute))) > 0.1
+
+
+@pytest.mark.parametrize("speeds", [0, 4])
+def test_the_log_likelihood_is_that_of_a_kalman_filter(speeds: int) -> None:
+    """Of one hypothesis, and of two by their weights; a Gaussian with as many degrees of freedom is nearly the same."""
+    rail, window = _window(3, speeds=speeds)
+    other = PRIOR._replace(mean=PRIOR.mean + np.array([0.0, 0.0, 0.3]))
+    exact = [smoothed(rail, belief, window).log_likelihood for belief in (PRIOR, other)]
+    motion = rail.train.motion
+    noise_m, noise_mps = (math.sqrt(float(variance)) for variance in motion.noise(0.1))
+    config = Config(motion.train, tail_dof=0.0, position_noise_m=noise_m, speed_noise_mps=noise_mps, tolerance=1e-12)
+    ours = []
+    for log_weights in ([0.0], [math.log(0.3), math.log(0.1)]):
+        hypotheses = [
+            Hypothesis(SpeedLaw(rail.floor), belief, weight)
+            for belief, weight in zip((PRIOR, other), log_weights, strict=False)
+        ]
+        ours.append(log_likelihood([smoothed_branch(config, window, each, None, None, 0.0) for each in hypotheses]))
+    assert ours[0] == pytest.approx(exact[0], abs=1e-6)
+    assert ours[1] == pytest.approx(np.logaddexp(exact[0] + math.log(0.75), exact[1] + math.log(0.25)), abs=1e-6)
+    heavy = [
+        log_likelihood([smoothed_branch(replace(config, tail_dof=dof), window, hypotheses[0], None, None, 0.0)])
+        for dof in (1e6, 4.0)
+    ]
+    assert heavy[0] == pytest.approx(exact[0], abs=1e-3)
+    assert abs(heavy[1] - exact[0]) > 0.1
 
 
 @pytest.mark.parametrize("count", [1, 10, 29])

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from adhesion_node.core.belief.window import Sample, window_of
+from adhesion_node.core.belief.window import WindowSample, window_of
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL, Grade, Track, Tunnel
 from adhesion_node.core.physics.train import CRH3
@@ -93,9 +93,9 @@ def test_noise_grows_with_the_step() -> None:
 
 def test_a_window_keeps_times_brakes_and_measurements_together() -> None:
     samples = [
-        Sample(1_000_000_000, 0.01, 0.0, 0.25, 0.0, math.inf),
-        Sample(1_100_000_000, 0.02, 8.0, 0.36, 80.0, 0.09),
-        Sample(1_350_000_000, 0.03, 28.0, 0.49, 0.0, math.inf),
+        WindowSample(1_000_000_000, 0.01, 0.0, 0.25, 0.0, math.inf),
+        WindowSample(1_100_000_000, 0.02, 8.0, 0.36, 80.0, 0.09),
+        WindowSample(1_350_000_000, 0.03, 28.0, 0.49, 0.0, math.inf),
     ]
     window = window_of(samples)
     assert window.steps == 2
@@ -107,5 +107,5 @@ def test_a_window_keeps_times_brakes_and_measurements_together() -> None:
 
 def test_a_window_keeps_nanoseconds_of_an_epoch() -> None:
     start = 1_700_000_000_000_000_001
-    window = window_of([Sample(start + k * 100_000_001, 0.1, 0.0, 1.0, 0.0, math.inf) for k in range(3)])
+    window = window_of([WindowSample(start + k * 100_000_001, 0.1, 0.0, 1.0, 0.0, math.inf) for k in range(3)])
     assert window.dt_s == pytest.approx([0.100000001, 0.100000001], abs=1e-15)

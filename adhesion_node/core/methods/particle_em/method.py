@@ -15,9 +15,9 @@ import numpy as np
 from scipy.special import ndtri
 
 from ...belief.gaussian import Gaussian
-from ...belief.rail import Finding, Rail, kept_of_start, learn, learn_bound
+from ...belief.rail import Identification, Rail, kept_of_start, learn, learn_bound
 from ...belief.regime import Regime
-from ...belief.window import Sample, window_of
+from ...belief.window import WindowSample, window_of
 from ..protocol import Context, Fit, Verdict, spent
 from .em import Identified, ParticleEStep, Search, identify
 from .kalman import Filtered, filter_windows
@@ -26,15 +26,12 @@ from .windows import stack
 if TYPE_CHECKING:
     from ...config import Config
 
-UNDECIDED = 0.5
-"""Share of the EM's start in its result above which a window has seen too little to tell what limits the motion."""
-
 
 class ParticleWindow(NamedTuple):
     """Samples of the window and the belief of (s, v) at the first one, which the first one's measurement shaped."""
 
     prior: Gaussian
-    samples: tuple[Sample, ...]
+    samples: tuple[WindowSample, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,12 +40,12 @@ class ParticleEm:
 
     summary: str = "constant mu, the paper's"
 
-    def open(self, prior: Gaussian, sample: Sample, replaced: ParticleWindow | None = None) -> ParticleWindow:
+    def open(self, prior: Gaussian, sample: WindowSample, replaced: ParticleWindow | None = None) -> ParticleWindow:
         """Open a window at the sample, of which `prior` holds the position already."""
         del replaced  # it knows nothing that would outlive it
         return ParticleWindow(prior, (sample,))
 
-    def extend(self, window: ParticleWindow, sample: Sample) -> ParticleWindow:
+    def extend(self, window: ParticleWindow, sample: WindowSample) -> ParticleWindow:
         """Return the window with one more sample."""
         return window._replace(samples=(*window.samples, sample))
 
@@ -87,7 +84,7 @@ def _verdict(
     std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
     kept = kept_of_start(float(filtered.information), identified.weight, identified.iterations)
     start = min(_search(config, context).start, identified.limit)
-    regime, rail = judge(config, Finding(identified.mu, std, start, kept), identified.limit, context)
+    regime, rail = judge(config, Identification(identified.mu, std, start, kept), identified.limit, context)
     spread = filtered.sensitivity * min(std, config.unknown_std)
     gone = spent(config, window.samples)
     following = ParticleWindow(filtered.belief(gone - 1), window.samples[gone:]) if gone else window
@@ -103,13 +100,13 @@ def _verdict(
     return Verdict(regime, rail, belief, following, mu=identified.mu, fit=fit)
 
 
-def judge(config: Config, finding: Finding, limit: float, context: Context) -> tuple[Regime, Rail]:
+def judge(config: Config, identification: Identification, limit: float, context: Context) -> tuple[Regime, Rail]:
     """What the window shows, no brake, the brake's limit, or the adhesion, and what is known of the rail then."""
     before = context.rail
-    learnt = learn(before, finding, float(ndtri(config.confidence)))
+    learnt = learn(before, identification, float(ndtri(config.confidence)))
     if not context.pressure_measured and learnt.mu <= 2.0 * learnt.std:
         return Regime.COASTING, before
-    if finding.kept > UNDECIDED:
+    if identification.kept > config.undecided_start_share:
         return Regime.COASTING, learnt
     if learnt.mu + learnt.std < limit:
         return Regime.ADHESION_LIMITED, learnt

@@ -52,7 +52,7 @@ class Factor(NamedTuple):
         """Last state of the solutions whose right-hand sides `forward` took half way, shape (2, C)."""
         return self._root.T @ half[-2:] - np.outer(self.solved[-2:], parameters)
 
-    def law_at_end(self) -> Array:
+    def covariance_at_end(self) -> Array:
         """Covariance of the last state and the parameter, shape (3, 3)."""
         along = np.array([-self.solved[-2], -self.solved[-1], 1.0])
         covariance: Array = along[:, None] * along / self.information

@@ -6,13 +6,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
 
 from ...belief.window import Window
 from ...physics.train import Array
 from .hypotheses import Hypothesis
 from .problem import Model, Problem
-from .smoother import Search, Smoothed, posterior, smooth
+from .smoother import KappaSearch, Smoothed, posterior, smooth
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -33,6 +36,19 @@ class Branch(NamedTuple):
         return config.limit_margin_sigma * math.sqrt(self.now.belief.covariance[2, 2])
 
 
+def log_likelihood(branches: Sequence[Branch]) -> float:
+    """ln p(y) of the window's measurements given all that was known before them, over all hypotheses.
+
+    Each hypothesis' evidence by Laplace's approximation, which is exact while the motion is linear and the
+    measurements are Gaussian.
+    """
+    before, now = (
+        np.logaddexp.reduce([hypothesis.log_weight for hypothesis in each])
+        for each in zip(*((branch.before, branch.now) for branch in branches), strict=True)
+    )
+    return float(now - before) + branches[0].problem.log_constant
+
+
 def smoothed_branch(
     config: Config,
     window: Window,
@@ -49,7 +65,7 @@ def smoothed_branch(
     _, speed, kappa = before.belief.mean
     scale = float(before.law(speed))
     problem = Problem(Model(config.motion, before.law, config.tail_dof), window, before.belief)
-    search = Search(
+    search = KappaSearch(
         start=kappa if start_mu is None else start_mu / scale,
         lowest=lowest_mu / scale,
         tolerance=config.tolerance / scale,

@@ -24,8 +24,8 @@ from .smoother import Smoothed
 
 Indices = NDArray[np.intp]
 
-FAR = 6.0
-"""Deviation in standard deviations that no change explains."""
+OUTLIER_SIGMA = 6.0
+"""Deviation, in standard deviations, that no change explains; it only chooses the weights to begin with."""
 
 
 class _Jumps(NamedTuple):
@@ -100,7 +100,7 @@ class Change(NamedTuple):
         mean = means @ likely
         apart = means - mean[:, None]
         spread = apart * likely @ apart.T + per_jump * (likely / self.information) @ per_jump.T
-        return Belief(mean, factor.law_at_end() + spread)
+        return Belief(mean, factor.covariance_at_end() + spread)
 
     def squared(self, problem: Problem) -> Array:
         """Squared deviations of the positions from the likeliest trajectory, in variances, shape (K,)."""
@@ -133,7 +133,7 @@ def _likeliest(problem: Problem, smoothed: Smoothed, candidates: Indices, jumps:
     if that makes a change likely, the measurements are weighted as the likeliest change has them.
     """
     good = problem.model.weights(np.zeros(problem.window.steps))
-    weights = np.where(problem.squared(smoothed.trajectory) > FAR**2, smoothed.weights, good)
+    weights = np.where(problem.squared(smoothed.trajectory) > OUTLIER_SIGMA**2, smoothed.weights, good)
     found = _try(problem, smoothed, candidates, weights, jumps(weights))
     if found.log_odds > 0.0:
         weights = problem.model.weights(found.squared(problem))

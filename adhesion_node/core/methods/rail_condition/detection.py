@@ -55,16 +55,17 @@ def detect(config: Config, branches: Sequence[Branch], leading: Branch, stepped_
     lasts_s = float(np.sum(window.dt_s))
     # the hypotheses as they weighed before: each explains a part of the step as best it can
     return Detected(
-        tuple(_stepped(each.before, _position_step(config, each), lasts_s) for each in branches),
+        tuple(_stepped(config, each, lasts_s) for each in branches),
         of_rail=False,
         certain=step.log_odds > needed,
     )
 
 
-def _stepped(before: Hypothesis, step: Change, lasts_s: float) -> Hypothesis:
+def _stepped(config: Config, branch: Branch, lasts_s: float) -> Hypothesis:
     """The hypothesis behind a step; a speed wrong by size / `lasts_s` would have moved the positions as far."""
-    size = float(step.sizes[step.best])
-    return before._replace(belief=widened(step.belief, 1, (size / lasts_s) ** 2))
+    step = _position_step(config, branch)
+    wrong_mps = config.position_step_speed_share * float(step.sizes[step.best]) / lasts_s
+    return branch.before._replace(belief=widened(step.belief, 1, wrong_mps**2))
 
 
 def _rail_change(config: Config, branch: Branch) -> Change:

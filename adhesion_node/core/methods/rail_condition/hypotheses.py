@@ -21,8 +21,8 @@ from ...physics.adhesion import SpeedLaw
 from ...physics.train import Array
 from .problem import Belief
 
-NEGLIGIBLE = 1e-4
-"""Probability below which a hypothesis is given up, until the rail changes."""
+NEGLIGIBLE_PROBABILITY = 1e-4
+"""Below it a hypothesis is given up until the rail changes: it could not move an estimate, but costs a smoother."""
 
 
 class Hypothesis(NamedTuple):

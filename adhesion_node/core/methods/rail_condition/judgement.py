@@ -13,31 +13,22 @@ import numpy as np
 
 from ...belief.rail import Rail, learn_bound, lower_bound
 from ...belief.regime import Regime
-from ...belief.window import Sample
+from ...belief.window import WindowSample
 from ...physics.train import Array
 from .hypotheses import Hypothesis, probabilities
 
 if TYPE_CHECKING:
     from ...config import Config
 
-UNDECIDED = 0.5
-"""Share of ignorance's standard deviation above which a window has seen too little to tell what limits the motion."""
 
-PLAUSIBLE = 0.005
-"""Probability from which a hypothesis may lower the bound."""
-
-RECENT = 10
-"""Samples over which the wheels are taken to roll or to slide."""
-
-
-def most_used(config: Config, samples: Sequence[Sample], speeds_mps: Array, mu: float) -> float:
+def most_used(config: Config, samples: Sequence[WindowSample], speeds_mps: Array, mu: float) -> float:
     """The most that the brake can use at the newest sample, as far as the wheels do not tell better.
 
     `speeds_mps` are the train's at the samples, `mu` the adhesion identified.
 
     Sliding wheels show that adhesion limits, whatever the brake; rolling ones that the brake does, however weak.
     """
-    recent = np.array([sample.wheel_mps for sample in samples[-RECENT:]])
+    recent = np.array([sample.wheel_mps for sample in samples[-config.creep_samples :]])
     creep = 1.0 - recent / speeds_mps[-recent.size :]
     measured = creep[np.isfinite(creep)]
     if measured.size == 0:
@@ -63,8 +54,8 @@ def judge(
     limit_std = config.brake_error * limit if math.isfinite(limit) else 0.0
     spreads = np.sqrt(variances + np.where(mus < limit, 0.0, limit_std**2))
     bounds = lower_bound(np.minimum(mus, limit), spreads, known, config.confidence)
-    lower = min(max(float(np.min(bounds[weights >= PLAUSIBLE])), 0.0), mu)
-    if std > UNDECIDED * config.unknown_std:
+    lower = min(max(float(np.min(bounds[weights >= config.plausible_probability])), 0.0), mu)
+    if std > config.undecided_share * config.unknown_std:
         return Regime.COASTING, Rail(mu, std, lower) if known is None else before
     if mu + math.hypot(std, limit_std) < limit:
         return Regime.ADHESION_LIMITED, Rail(mu, std, lower)

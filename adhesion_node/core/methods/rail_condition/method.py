@@ -19,12 +19,12 @@ import numpy as np
 from ...belief.gaussian import Gaussian
 from ...belief.rail import Rail
 from ...belief.regime import Regime
-from ...belief.window import Sample, window_of
+from ...belief.window import WindowSample, window_of
 from ...physics.train import Array
 from ..protocol import Context, Fit, Verdict, spent
-from .branch import Branch, smoothed_branch
+from .branch import Branch, log_likelihood, smoothed_branch
 from .detection import detect
-from .hypotheses import NEGLIGIBLE, Hypothesis, hypotheses, probabilities, widened, with_rail
+from .hypotheses import NEGLIGIBLE_PROBABILITY, Hypothesis, hypotheses, probabilities, widened, with_rail
 from .judgement import judge, most_used
 from .noise import Noise, learn_noise
 from .problem import Belief
@@ -38,7 +38,7 @@ class ConditionWindow(NamedTuple):
     """Samples of the window and the belief of (s, v) at the first one, which the first one's measurement shaped."""
 
     prior: Gaussian
-    samples: tuple[Sample, ...]
+    samples: tuple[WindowSample, ...]
     hypotheses: tuple[Hypothesis, ...] = ()
     """Joint beliefs with the rail condition at the first sample; empty until such a window is evaluated."""
     noise: Noise = Noise()
@@ -57,7 +57,7 @@ class RailCondition:
 
     summary: str = "a factor on the speed law, by a Gaussian smoother"
 
-    def open(self, prior: Gaussian, sample: Sample, replaced: ConditionWindow | None = None) -> ConditionWindow:
+    def open(self, prior: Gaussian, sample: WindowSample, replaced: ConditionWindow | None = None) -> ConditionWindow:
         """Open a window at the sample, of which `prior` holds the position already.
 
         Of a window that it takes the place of, it keeps what is known of the position sensor.
@@ -66,7 +66,7 @@ class RailCondition:
             return ConditionWindow(prior, (sample,))
         return ConditionWindow(prior, (sample,), noise=replaced.noise, stepped_m=replaced.stepped_m)
 
-    def extend(self, window: ConditionWindow, sample: Sample) -> ConditionWindow:
+    def extend(self, window: ConditionWindow, sample: WindowSample) -> ConditionWindow:
         """Return the window with one more sample."""
         return window._replace(samples=(*window.samples, sample))
 
@@ -98,7 +98,7 @@ class RailCondition:
             window=len(window.samples),
             iterations=leading.smoothed.iterations,
             converged=leading.smoothed.converged,
-            log_likelihood=leading.now.log_weight,
+            log_likelihood=log_likelihood(branches),
             shape=leading.now.law,
         )
         rail_changed = detected is not None and detected.of_rail
@@ -135,9 +135,13 @@ def _following(config: Config, window: ConditionWindow, branches: Sequence[Branc
     kept = tuple(
         hypothesis._replace(log_weight=math.log(probability))
         for hypothesis, probability in zip(passed, probabilities(passed), strict=True)
-        if probability >= NEGLIGIBLE
+        if probability >= NEGLIGIBLE_PROBABILITY
     )
-    learnt = learn_noise(window.noise, first.problem, first.smoothed, count) if config.identify_noise else window.noise
+    learnt = (
+        learn_noise(config, window.noise, first.problem, first.smoothed, count)
+        if config.identify_noise
+        else window.noise
+    )
     return window._replace(
         prior=_state(kept[0].belief),
         samples=window.samples[count:],

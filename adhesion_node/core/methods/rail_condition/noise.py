@@ -10,28 +10,25 @@ hold next to nothing of 0.02 km/h per step, and EM would stay where it starts.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from .problem import Model, Problem
 from .smoother import Smoothed
 
-BELIEVED = 50.0
-"""Steps that the given variances are worth."""
-
-MEMORY = 2000.0
-"""Steps after which older ones begin to be forgotten."""
+if TYPE_CHECKING:
+    from ...config import Config
 
 
 class Noise(NamedTuple):
-    """Factor on the variance of the measured positions, and the steps behind it."""
+    """Factor on the variance of the measured positions, and the steps that it was learnt from."""
 
     factor: float = 1.0
-    steps: float = BELIEVED
+    steps: float = 0.0
 
 
-def learn_noise(noise: Noise, problem: Problem, smoothed: Smoothed, spent: int) -> Noise:
+def learn_noise(config: Config, noise: Noise, problem: Problem, smoothed: Smoothed, spent: int) -> Noise:
     """Take in the first `spent` steps of a smoothed window, whose variances already have the factor of `noise`."""
     trajectory = smoothed.trajectory
     factor = problem.normal(smoothed.steps, trajectory, smoothed.kappa, smoothed.weights).factor
@@ -42,8 +39,8 @@ def learn_noise(noise: Noise, problem: Problem, smoothed: Smoothed, spent: int) 
     variances = np.sum(positions * states, axis=0) / problem.window.variance_m2[:spent]
     squared = problem.squared(trajectory)[:spent] + variances
     found = float(np.mean(smoothed.weights[:spent] * squared)) / _expected(problem.model)
-    share = spent / (noise.steps + spent)
-    return Noise(noise.factor * (1.0 + share * (found - 1.0)), min(noise.steps + spent, MEMORY))
+    share = spent / (config.noise_trust_steps + noise.steps + spent)
+    return Noise(noise.factor * (1.0 + share * (found - 1.0)), min(noise.steps + spent, config.noise_memory_steps))
 
 
 def _expected(model: Model) -> float:

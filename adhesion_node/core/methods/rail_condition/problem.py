@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -17,6 +18,8 @@ from ...physics.adhesion import SpeedLaw
 from ...physics.motion import Motion
 from ...physics.train import GRAVITY, Array
 from .banded import Factor, factorise
+
+LOG_2PI = math.log(2.0 * math.pi)
 
 
 class Belief(NamedTuple):
@@ -51,6 +54,16 @@ class Model:
         if self.tail_dof == 0.0:
             return 0.5 * float(squared.sum())
         return 0.5 * (self.tail_dof + 1.0) * float(np.log1p(squared / self.tail_dof).sum())
+
+    def log_peak(self, variances: Array) -> float:
+        """ln p of measurements without deviation, by their variances: the constant that `loss` leaves out."""
+        scale = -0.5 * float(np.log(variances).sum())
+        if self.tail_dof == 0.0:
+            return scale - 0.5 * LOG_2PI * variances.size
+        half = 0.5 * self.tail_dof
+        return scale + variances.size * (
+            math.lgamma(half + 0.5) - math.lgamma(half) - 0.5 * math.log(2.0 * math.pi * half)
+        )
 
 
 class Steps(NamedTuple):
@@ -129,6 +142,14 @@ class Problem:
         band[:-1, 0, 2] = -self.certainty[0]
         band[0, :, 0] += np.diag(self.precision)[:2]
         return band
+
+    @property
+    def log_constant(self) -> float:
+        """What all hypotheses share of ln p(y), and so `Posterior.log_evidence` leaves out."""
+        window = self.window
+        speeds = window.speed_variance[np.isfinite(window.speed_variance)]
+        gaussian = 0.5 * float(np.log(self.certainty).sum()) - 0.5 * float((np.log(speeds) + LOG_2PI).sum())
+        return gaussian + self.model.log_peak(window.variance_m2)
 
     def squared(self, trajectory: Array, shift: float | Array = 0.0) -> Array:
         """Squared deviations of the measured positions, less their shift, from the trajectory, in variances: (K,)."""

@@ -20,14 +20,14 @@ import numpy as np
 from ...physics.train import GRAVITY, Array
 from .problem import Belief, Problem, Steps
 
-SAME_WEIGHT = 1e-2
-"""Change of a measurement's weight below which it counts as settled."""
+WEIGHT_TOLERANCE = 1e-2
+"""Change of a measurement's weight below which it has converged; what is left moves kappa by far less than sigma."""
 
-AT_LIMIT = 1e-3
-"""Relative width of the interval in which kappa is known to end at the brake's limit."""
+LIMIT_TOLERANCE = 1e-3
+"""Relative width of the interval in which kappa is known to end at the brake's limit: bisection stops there."""
 
 
-class Search(NamedTuple):
+class KappaSearch(NamedTuple):
     """Where the search for kappa starts, and when it stops."""
 
     start: float
@@ -59,7 +59,7 @@ class Posterior(NamedTuple):
     """ln p(y), up to a term that all speed laws share."""
 
 
-def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoothed:
+def smooth(problem: Problem, search: KappaSearch, near: Array | None = None) -> Smoothed:
     """Iterate E- and M-step to the most probable trajectory and kappa.
 
     `near` is where to begin: a trajectory of the window or of its beginning, from an earlier or a similar one.
@@ -84,8 +84,8 @@ def smooth(problem: Problem, search: Search, near: Array | None = None) -> Smoot
         trajectory, change, kappa = trajectory + moved, following - kappa, following
         steps = problem.linearise(trajectory, kappa)
         before, weights = weights, problem.model.weights(problem.squared(trajectory))
-        settled = abs(change) <= search.tolerance or high - low <= AT_LIMIT * kappa
-        if settled and float(np.abs(weights - before).max()) <= SAME_WEIGHT:
+        settled = abs(change) <= search.tolerance or high - low <= LIMIT_TOLERANCE * kappa
+        if settled and float(np.abs(weights - before).max()) <= WEIGHT_TOLERANCE:
             return Smoothed(trajectory, kappa, weights, steps, iteration, True)
     return Smoothed(trajectory, kappa, weights, steps, search.iterations, False)
 
@@ -105,7 +105,7 @@ def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
     misfit += 0.5 * float(window.information[:, 1] @ (window.speed_mps - trajectory[1:, 1]) ** 2)
     misfit -= 0.5 * (float(normal.states @ moved.ravel()) + normal.kappa * change)
     spread = normal.factor.log_determinant - 2.0 * float(np.log(problem.whitening.diagonal()).sum())
-    return Posterior(Belief(mean, normal.factor.law_at_end()), -misfit - 0.5 * spread)
+    return Posterior(Belief(mean, normal.factor.covariance_at_end()), -misfit - 0.5 * spread)
 
 
 def _begin(problem: Problem, kappa: float, near: Array) -> tuple[Array, float]:
