@@ -30,6 +30,11 @@ class CreepPipeline(EstimatorPipeline[CreepState, CreepEstimate, CreepEstimate])
     def _output(self, estimate: CreepEstimate) -> CreepEstimate:
         return estimate
 
+    @property
+    def tally(self) -> str:
+        """How much has come and what was made of it, in words."""
+        return f"{self.accepted} samples"
+
     def stamp_ns(self, output: CreepEstimate) -> int:
         """When it was so."""
         return output.t_ns

@@ -127,6 +127,11 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
             outputs.append(output)
         return outputs
 
+    @property
+    @abstractmethod
+    def tally(self) -> str:
+        """How much has come and what was made of it, in words."""
+
     @abstractmethod
     def stamp_ns(self, output: Output) -> int:
         """When it was so."""

@@ -34,6 +34,11 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         self.windows += estimate.window > 0
         return predict(self.config, estimate)
 
+    @property
+    def tally(self) -> str:
+        """How much has come and what was made of it, in words."""
+        return f"{self.measurements} measurements, {self.windows} windows"
+
     def stamp_ns(self, output: Prediction) -> int:
         """When it was so."""
         return output.estimate.t_ns

@@ -15,8 +15,8 @@ class Outcome(Enum):
     """What an estimator did with a sample; the value says it in words, with the remedy."""
 
     ACCEPTED = "accepted"
-    LATE = "older than the newest one by more than max_lag_s: dropped"
-    DUPLICATE = "a second measurement with the same stamp: dropped"
+    LATE = "older than the newest one by more than max_lag_s: dropped; raise it, or is there a second publisher?"
+    DUPLICATE = "a second measurement with the same stamp: dropped; does the publisher's clock stand still?"
     REPEATED = "a second sample of another sensor with the same stamp: dropped"
     STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
     TOO_OFTEN = "publish at most 200 messages a second: no more are used"
@@ -36,11 +36,10 @@ class Outcome(Enum):
 DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "CHANGED", "RESET"))
 """Outcomes of a sample that is not used."""
 
+QUIET = ("ACCEPTED", "REPEATED", "OUTLIER", "SLOW", "IDLE", "CHANGED")
+"""Names of those that an operator need not hear of beyond their counts: they are part of good days."""
 
 NO_COUNTS: Mapping[Outcome, int] = MappingProxyType(dict.fromkeys(Outcome, 0))
-
-
-TOLD = ("STRAY", "TOO_OFTEN", "INVALID", "STUCK", "SPEED_IN_KMH", "UNPAIRED", "AXLES", "UNEQUAL", "RESET")
 
 
 class Event(NamedTuple):
@@ -57,7 +56,7 @@ class Event(NamedTuple):
     @property
     def is_told(self) -> bool:
         """Whether an operator must hear of it, not only see it counted."""
-        return self.outcome.name in TOLD
+        return self.outcome.name not in QUIET
 
 
 def counted(counts: Mapping[Outcome, int], *events: Event) -> Mapping[Outcome, int]:

@@ -90,8 +90,8 @@ class EstimatingNode(Node, Generic[P]):
     def close(self) -> None:
         """Use what still waits and publish what it gives."""
         self._publish(self.pipeline.finish())
-        counts = f"{self.pipeline.measurements} measurements, {self.pipeline.accepted} accepted"
-        self.get_logger().info(f"{counts}, dropped {self.pipeline.dropped or 'none'}, digest {self.digest}")
+        tally, dropped = self.pipeline.tally, self.pipeline.dropped or "none"
+        self.get_logger().info(f"{tally}, dropped {dropped}, digest {self.digest}")
 
     def take(self, sample: Any) -> tuple[Event, ...]:
         """Use a sample and publish what it completes."""
