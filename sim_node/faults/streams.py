@@ -37,22 +37,29 @@ class Dose:
         """Whether the fault is on at this sample."""
         return 0.0 <= truth.t_ns * 1e-9 - self.start_s < self.duration_s
 
+    def hits(self, truth: Truth, rng: np.random.Generator) -> bool:
+        """Whether the fault meets this sample; draws one number in any case."""
+        return rng.random() < self.share and self.now(truth)
+
 
 Change = Callable[[Iterator[Tick], Dose, np.random.Generator], Iterator[Tick]]
 
-Alter = Callable[[SensorMessage, Dose, np.random.Generator], SensorMessage | None]
+Alter = Callable[[Messages, Dose, np.random.Generator], Messages]
 
 
-def each(topic: Topic, alter: Alter) -> Change:
-    """Alter the messages of a topic one by one; None loses the message."""
+def hit(alter: Alter) -> Change:
+    """Alter the messages of the samples that the fault meets."""
 
     def change(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
         for truth, messages in ticks:
-            hit = rng.random() < dose.share and dose.now(truth)
-            altered = (alter(m, dose, rng) if hit and m.topic == topic else m for m in messages)
-            yield truth, tuple(message for message in altered if message is not None)
+            yield truth, alter(messages, dose, rng) if dose.hits(truth, rng) else messages
 
     return change
+
+
+def each(topic: Topic, alter: Callable[[SensorMessage, Dose, np.random.Generator], SensorMessage]) -> Change:
+    """Alter the messages of a topic one by one."""
+    return hit(lambda messages, dose, rng: tuple(alter(m, dose, rng) if m.topic == topic else m for m in messages))
 
 
 def moved(message: SensorMessage, by: float) -> SensorMessage:
@@ -60,7 +67,8 @@ def moved(message: SensorMessage, by: float) -> SensorMessage:
     return message._replace(values=(message.values[0] + by,))
 
 
-lost = each(POSITION, lambda message, dose, rng: None)
+lost = hit(lambda messages, dose, rng: tuple(m for m in messages if m.topic != POSITION))
+duplicated = hit(lambda messages, dose, rng: messages * 2)
 outlying = each(POSITION, lambda message, dose, rng: moved(message, math.copysign(dose.size, rng.standard_normal())))
 shifted = each(POSITION, lambda message, dose, rng: moved(message, dose.size))
 misframed = each(POSITION, lambda message, dose, rng: message._replace(frame="map"))
@@ -75,32 +83,22 @@ def bad(value: float | None = None, variance: float | None = None) -> Change:
         values = message.values if value is None else (value,) * len(message.values)
         return message._replace(values=values, variance=message.variance if variance is None else variance)
 
-    def change(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
-        for truth, messages in ticks:
-            hit = rng.random() < dose.share and dose.now(truth)
-            useless = (m for m in messages if value is not None or m.topic == POSITION)
-            yield truth, (*(map(spoilt, useless) if hit else ()), *messages)
+    def before(messages: Messages, dose: Dose, rng: np.random.Generator) -> Messages:
+        return *(spoilt(m) for m in messages if value is not None or m.topic == POSITION), *messages
 
-    return change
-
-
-def duplicated(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
-    """Send messages twice."""
-    for truth, messages in ticks:
-        hit = rng.random() < dose.share and dose.now(truth)
-        yield truth, messages * 2 if hit else messages
+    return hit(before)
 
 
 def late(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
     """Hold messages back: they leave `size` seconds after their time."""
     waiting: list[tuple[int, Messages]] = []
     for truth, messages in ticks:
-        hit = rng.random() < dose.share and dose.now(truth)
-        if hit:
+        if dose.hits(truth, rng):
             waiting.append((truth.t_ns + round(dose.size * 1e9), messages))
-        due = [held for until_ns, held in waiting if until_ns <= truth.t_ns]
+            messages = ()
+        due = [message for until_ns, held in waiting if until_ns <= truth.t_ns for message in held]
         waiting = [(until_ns, held) for until_ns, held in waiting if until_ns > truth.t_ns]
-        yield truth, (*(() if hit else messages), *(message for held in due for message in held))
+        yield truth, (*messages, *due)
 
 
 def restamped(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:

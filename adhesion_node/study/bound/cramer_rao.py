@@ -9,7 +9,7 @@ unknowns at k and of the next state together is
 
     diag(J_k, 0) + E[(A_k, -1)' Q^-1 (A_k, -1)]
 
-from which the old state is eliminated, kappa's random walk forgets and the next position adds 1/r: the recursion of
+from which the old state is eliminated and to which the next position adds 1/r: the recursion of
 Tichavský, Muravchik and Nehorai (IEEE Trans. Signal Processing 46, 1998) with kappa as an unknown that no noise
 moves within a step. The expectation is the mean over the given trajectories. Those of one braking differ little; of
 trajectories that differ much, as on both sides of the kink, the bound still holds but nobody reaches it.
@@ -66,29 +66,19 @@ class Bound(NamedTuple):
 
 
 def bound(
-    motion: Motion,
-    law: AdhesionLaw,
-    path: Path,
-    variance_m2: float,
-    start: Start,
-    *,
-    condition: float = 1.0,
-    condition_rate: float = 0.0,
+    motion: Motion, law: AdhesionLaw, path: Path, variance_m2: float, start: Start, condition: float = 1.0
 ) -> Bound:
     """Bound along trajectories on a rail of `condition` times `law`, positions measured with `variance_m2`.
 
-    Where the brake limits or is off, nothing is learnt of the condition. `condition_rate` is the variance per
-    second by which the condition wanders; 0 for a rail that stays the same.
+    Where the brake limits or is off, nothing is learnt of the condition.
     """
     path = Path(np.asarray(path.t_s), *np.broadcast_arrays(*(np.atleast_2d(column) for column in path[1:])))
-    dt_s = np.diff(path.t_s)
     steps = _step_information(motion, path, _jacobians(motion, law, path, condition))
     information = np.empty((path.t_s.size, 3, 3))
     information[0] = np.diag([std**-2.0 for std in start])
     for k, joint in enumerate(steps):
         joint[np.ix_([0, 1, 4], [0, 1, 4])] += information[k]
         following = joint[2:, 2:] - joint[2:, :2] @ np.linalg.solve(joint[:2, :2], joint[:2, 2:])
-        following -= _forgotten(following, condition_rate * float(dt_s[k]))
         following[0, 0] += 1.0 / variance_m2
         information[k + 1] = following
     return _bound(law, path, condition, np.asarray(np.linalg.inv(information)))
@@ -149,12 +139,6 @@ def _step_information(motion: Motion, path: Path, jacobians: Array) -> Array:
     variances = np.stack([np.asarray(v) for v in motion.noise(np.diff(path.t_s))], axis=-1)
     precision = 1.0 / (variances * jacobians.shape[1])
     return np.asarray(np.einsum("krni,kn,krnj->kij", deviation, precision, deviation))
-
-
-def _forgotten(information: Array, variance: float) -> Array:
-    """What is lost when the last unknown moves by a random amount of this variance: a matrix of rank one."""
-    column = information[:, 2]
-    return np.asarray(np.outer(column, column) * (variance / (1.0 + variance * column[2])))
 
 
 def _bound(law: AdhesionLaw, path: Path, condition: float, covariance: Array) -> Bound:

@@ -21,6 +21,9 @@ from ..trial.world import PERIOD_S, World
 WHOLE_RUN, BEFORE_BRAKING_S = 0.0, 10.0
 """Beginnings of a fault other than the usual one, which comes 10 s after the brakes."""
 
+MOMENT_S = 0.0
+"""Duration of a jump."""
+
 NOMINAL = Config()
 POSITIONS = SensorSettings()
 """Positions and pressures alone."""
@@ -61,25 +64,16 @@ def _lasting(
     start_s: float = Plan().fault_start_s,
     config: Config = NOMINAL,
     sensors: SensorSettings = POSITIONS,
+    size: float = 0.0,
 ) -> Case:
-    """A fault in its usual dose that lasts."""
-    plan = Plan(fault, start_s)
+    """A fault that lasts, in its usual dose or of a size."""
+    plan = Plan(fault, start_s, fault_size=size)
     return Case(name, World("tunnel_entry", sensors, plan, period_s=period_of(plan, PERIOD_S)), Estimator(config))
 
 
 def _passing(name: str, fault: str, lasts_s: float, scenario: str = "tunnel_entry") -> Case:
     """A fault in its usual dose that passes."""
     return Case(name, World(scenario, plan=Plan(fault, fault_duration_s=lasts_s), lasts_s=lasts_s))
-
-
-def _jump(name: str, fault: str) -> Case:
-    """A fault of one moment."""
-    return Case(name, World("tunnel_entry", plan=Plan(fault), lasts_s=0.0))
-
-
-def _balise(name: str, size_m: float) -> Case:
-    """Positions that are moved from one on."""
-    return Case(name, World("tunnel_entry", plan=Plan("balise_step", fault_size=size_m)))
 
 
 ENTRY = World("tunnel_entry")
@@ -136,8 +130,8 @@ FAULTS = (
     _lasting("0.3 s late, max_lag_s 0.5", "late", config=Config(max_lag_s=0.5)),
     _lasting("0.3 s late, too late", "late"),
     _lasting("sent twice", "duplicates"),
-    _jump("stamps 100 s back", "stamps_back"),
-    _jump("stamps 1 h forward", "stamps_forward"),
+    _passing("stamps 100 s back", "stamps_back", MOMENT_S),
+    _passing("stamps 1 h forward", "stamps_forward", MOMENT_S),
     _passing("stamps stand still for 60 s", "clock_pause", 60.0, "snow"),
     _passing("stuck position for 10 s", "stuck", 10.0),
     _lasting("10, 1, 50 Hz in turn, ±30 %", "irregular"),
@@ -146,8 +140,8 @@ FAULTS = (
     _lasting("10 % heavier", "mass", WHOLE_RUN),
     _lasting("the same, mass_std 0.1", "mass", WHOLE_RUN, Config(mass_std=0.1)),
     _lasting("balise step of 2 m forward", "balise_step"),
-    _balise("balise step of 2 m back", -2.0),
-    _balise("balise step of 1 m back", -1.0),
+    _lasting("balise step of 2 m back", "balise_step", size=-2.0),
+    _lasting("balise step of 1 m back", "balise_step", size=-1.0),
     _lasting("another frame", "wrong_frame"),
     _lasting("odometer in km/h", "kmh", BEFORE_BRAKING_S, sensors=ODOMETER),
     _lasting("gauge pressure", "gauge", BEFORE_BRAKING_S),

@@ -11,6 +11,8 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
+from sim_node.train.scenario import find
+
 from ...core import Config, Estimate, finish, init, step
 from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
@@ -71,8 +73,7 @@ class Estimator(NamedTuple):
 
     def config_in(self, lane: Lane) -> Config:
         """Settings for a lane."""
-        world = lane.run.world
-        track = world.of_plant.known_track(world) if self.knows_track else self.config.track
+        track = find(lane.run.world.scenario).track if self.knows_track else self.config.track
         return replace(self.config, track=track, start_mu=lane.start_mu)
 
     def seed_in(self, lane: Lane) -> int:

@@ -20,7 +20,7 @@ from ...core.prediction import Prediction
 from ...run.score import CONVERGED_AFTER_MPS
 from .estimators import WAYS, Estimator, Lane, LaneResult
 from .running import Arrays, Running, run_all
-from .world import World, simulate
+from .world import World, simulate, stopping_m
 
 FIRST_SEED = 1000
 """Run r of a table has simulator and estimator seed FIRST_SEED + r."""
@@ -167,8 +167,7 @@ def _rows(lane: Lane, result: LaneResult) -> Rows:
     )
     rows["scored"] = rows["limited"] & (rows["true_speed_mps"] < onset - CONVERGED_AFTER_MPS)
     if not np.isnan(rows["safe_m"]).all():
-        world = lane.run.world
-        rows["true_stopping_m"] = world.of_plant.stopping_m(world, rows["true_position_m"], rows["true_speed_mps"])
+        rows["true_stopping_m"] = stopping_m(lane.run.world, rows["true_position_m"], rows["true_speed_mps"])
     return rows
 
 

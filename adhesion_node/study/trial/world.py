@@ -1,12 +1,12 @@
 # Copyright 2026 the adhesion_node authors
 # SPDX-License-Identifier: Apache-2.0
 
-"""What a trial takes place in: a plant on its track, its sensors and what goes wrong with them."""
+"""What a trial takes place in: a train on its track, its sensors and what goes wrong with them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from types import MappingProxyType
 from typing import NamedTuple
@@ -20,7 +20,6 @@ from sim_node.train.stopping import stopping_distances
 
 from ...core import Config, Measurement, Sample
 from ...core.estimator import paired
-from ...core.physics.track import Track
 from ...core.physics.train import Array
 from ...wire.codecs import Rejected, plain
 
@@ -36,7 +35,7 @@ class Refusal(NamedTuple):
 
 
 class World(NamedTuple):
-    """A scenario of a plant, and all that the estimator is not told. With a seed it is a run."""
+    """A scenario, and all that the estimator is not told. With a seed it is a run."""
 
     scenario: str
     sensors: SensorSettings = SensorSettings()
@@ -45,13 +44,6 @@ class World(NamedTuple):
     """How long the fault of the plan lasts; infinite: to the end of the run."""
     period_s: float = PERIOD_S
     """Of the simulated run; the messages of a run without a fault come every `PERIOD_S` all the same."""
-    plant: str = "point_mass"
-    """One of `PLANTS`."""
-
-    @property
-    def of_plant(self) -> Plant:
-        """The train that runs in it."""
-        return PLANTS[self.plant]
 
     @property
     def over_s(self) -> float:
@@ -64,18 +56,8 @@ class World(NamedTuple):
         return self._replace(plan=Plan(NONE, 0.0), lasts_s=math.inf)
 
 
-class Plant(NamedTuple):
-    """A simulated train: all that a trial asks of it. Its scenarios are its own."""
-
-    ticks: Callable[[World, int], Iterator[Tick]]
-    """Truth and messages of every sample of a run, from world and seed."""
-    known_track: Callable[[World], Track]
-    """The track as an estimator may know it."""
-    stopping_m: Callable[[World, Array, Array], Array]
-    """True distances, m, from places, m, and speeds, m/s, to a standstill; shape (N,)."""
-
-
-def _point_mass(world: World, seed: int) -> Iterator[Tick]:
+def ticks(world: World, seed: int) -> Iterator[Tick]:
+    """Truth and messages of every sample of a run."""
     run = faulty_run(world.plan, find(world.scenario), world.period_s, seed, world.sensors)
     if world.plan.fault != NONE:
         return run
@@ -83,15 +65,10 @@ def _point_mass(world: World, seed: int) -> Iterator[Tick]:
     return ((truth, sent if index % every == 0 else ()) for index, (truth, sent) in enumerate(run))
 
 
-def _stopping(world: World, position_m: Array, speed_mps: Array) -> Array:
+def stopping_m(world: World, position_m: Array, speed_mps: Array) -> Array:
+    """True distances, m, from places, m, and speeds, m/s, to a standstill; shape (N,)."""
     true = FAULTS[world.plan.fault].scenario(find(world.scenario), world.plan.dose)
     return stopping_distances(true, position_m, speed_mps)
-
-
-PLANTS: Mapping[str, Plant] = MappingProxyType(
-    {"point_mass": Plant(_point_mass, lambda world: find(world.scenario).track, _stopping)}
-)
-"""By name: a further train is one line here."""
 
 
 class Sent(NamedTuple):
@@ -117,7 +94,7 @@ class SimulatedRun(NamedTuple):
 def simulate(world: World, seed: int) -> SimulatedRun:
     """Simulate a run of `world`."""
     born, sent = dict[int, Truth](), list[Sent]()
-    for truth, messages in world.of_plant.ticks(world, seed):
+    for truth, messages in ticks(world, seed):
         born.setdefault(truth.t_ns, truth)
         for message in messages:
             born.setdefault(message.t_ns, truth)

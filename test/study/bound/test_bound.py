@@ -99,15 +99,6 @@ def test_bound_is_the_inverse_of_the_whole_trajectorys_information(kappa: float,
     last_covariance_agrees(found, dense([states], brakes, sigma), states)
 
 
-def test_a_condition_that_wanders_is_known_less() -> None:
-    brakes, rate = [FULL] * 50, 0.02
-    states = drive(75.0, brakes)
-    found = bound(NOMINAL, WET, path_of([states], brakes), 0.25, START, condition_rate=rate)
-    last_covariance_agrees(found, dense([states], brakes, 0.5, rate * DT), states)
-    fixed = bound(NOMINAL, WET, path_of([states], brakes), 0.25, START)
-    assert found.condition_std[-1] > 1.2 * fixed.condition_std[-1]
-
-
 def test_the_expectation_is_over_the_trajectories() -> None:
     """One of the two runs is limited by the brake all the time."""
     brakes = [0.08] * 40

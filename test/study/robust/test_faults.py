@@ -19,7 +19,7 @@ from adhesion_node.study.robust.cases import FAULTS as CASES
 from adhesion_node.study.robust.cases import Case
 from adhesion_node.study.robust.faults import row
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results
-from adhesion_node.study.trial.world import World
+from adhesion_node.study.trial.world import World, ticks
 from adhesion_node.wire.codecs import Rejected, plain
 from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import FAULTS, Plan
@@ -41,7 +41,7 @@ def read(sent: SensorMessage, message: Any) -> Any:
 @pytest.mark.parametrize("fault", sorted(set(FAULTS) - {"irregular"}))
 def test_plain_messages_are_read_as_those_of_ros(fault: str) -> None:
     world = World("cruise", ALL_SENSORS, Plan(fault, 1.0))
-    sent = [message for _, messages in world.of_plant.ticks(world, 1) for message in messages][:400]
+    sent = [message for _, messages in ticks(world, 1) for message in messages][:400]
     assert {message.topic for message in sent} == set(ADHESION_INPUTS)
     assert [read(m, m.build(plain)) for m in sent] == [read(m, message_of(m)) for m in sent]
 

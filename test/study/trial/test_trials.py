@@ -18,7 +18,7 @@ from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning
 from adhesion_node.study.trial.estimators import WAYS, Estimator
 from adhesion_node.study.trial.running import Arrays, Running, file_name, load, save
 from adhesion_node.study.trial.trials import ROW, Trials, grouped
-from adhesion_node.study.trial.world import Refusal, World, simulate
+from adhesion_node.study.trial.world import Refusal, World, simulate, ticks
 from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import Plan
 from sim_node.train.sensors import SensorSettings
@@ -136,7 +136,7 @@ def test_the_pipeline_gives_the_estimates_of_the_core_and_curves_besides() -> No
 def test_b_is_the_same_train_at_the_usual_rate() -> None:
     """Also for the fault that needs a run of its own rate."""
     world = World("tunnel_entry", plan=Plan("irregular"), period_s=0.02)
-    faulty, clean = (list(islice(one.of_plant.ticks(one, 3), 1001)) for one in (world, world.without_fault))
+    faulty, clean = (list(islice(ticks(one, 3), 1001)) for one in (world, world.without_fault))
     assert [truth for truth, _ in faulty] == [truth for truth, _ in clean]
     stamps = [messages[-1].t_ns for _, messages in clean if messages]
     assert {later - earlier for earlier, later in pairwise(stamps)} == {100_000_000}
