@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
-from ..command.options import help_texts, json_option, run_tool
+from ..command.options import DONE, help_texts, json_option, report, run_tool
 from .bound import study as bound
 from .he import study as creep
 from .intervention import study as intervention
@@ -54,7 +54,13 @@ def main(args: Sequence[str] | None = None) -> int:
         own = studies.add_parser(name, help=summary, parents=[json_option()], **texts)
         study.add_options(own)
         own.set_defaults(run=study.run)
-    return run_tool(parser, lambda options: int(options.run(options)), args)
+    return run_tool(parser, _run, args)
+
+
+def _run(options: argparse.Namespace) -> int:
+    """Report the rows and the text that the study gives."""
+    report(options.json, *options.run(options))
+    return DONE
 
 
 if __name__ == "__main__":

@@ -13,13 +13,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
 from adhesion_node.core.physics.track import Grade, Track
 from adhesion_node.core.setting import check_settings, setting
 
-from ..train.messages import Tick, ticks
+from ..train.messages import Tick, messages_of
 from ..train.run import run
 from ..train.scenario import Scenario
 from ..train.sensors import SensorSettings
@@ -32,16 +33,8 @@ _LINE_M = 50e3
 """Longer than any run."""
 
 
-def _same_scenario(scenario: Scenario, dose: Dose) -> Scenario:
-    return scenario
-
-
-def _same_sensors(settings: SensorSettings, dose: Dose) -> SensorSettings:
-    return settings
-
-
-def _same_stream(stream: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
-    return stream
+def _same(given: Any, *_others: object) -> Any:
+    return given
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,9 +44,9 @@ class Fault:
     description: str
     dose: Dose = field(default_factory=Dose)
     size: str = ""
-    stream: Change = _same_stream
-    scenario: Callable[[Scenario, Dose], Scenario] = _same_scenario
-    sensors: Callable[[SensorSettings, Dose], SensorSettings] = _same_sensors
+    stream: Change = _same
+    scenario: Callable[[Scenario, Dose], Scenario] = _same
+    sensors: Callable[[SensorSettings, Dose], SensorSettings] = _same
     rate_hz: float | None = None
     """Rate of the run where the fault needs one of its own."""
 
@@ -152,9 +145,10 @@ def faulty_run(plan: Plan, scenario: Scenario, period_s: float, seed: int, setti
     fault, dose = FAULTS[plan.fault], plan.dose
     sensors = fault.sensors(settings, dose)
     samples = run(fault.scenario(scenario, dose), period_s, seed, sensors)
+    ticks = ((truth, messages_of(reading, sensors)) for truth, reading in samples)
     # `run` has the first three children of the seed.
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[3])
-    return fault.stream(ticks(samples, sensors), dose, rng)
+    return fault.stream(ticks, dose, rng)
 
 
 def period_of(plan: Plan, period_s: float) -> float:

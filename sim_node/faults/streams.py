@@ -93,12 +93,12 @@ def late(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterato
     """Hold messages back: they leave `size` seconds after their time."""
     waiting: list[tuple[int, Messages]] = []
     for truth, messages in ticks:
-        if dose.hits(truth, rng):
+        held_back = dose.hits(truth, rng)
+        if held_back:
             waiting.append((truth.t_ns + round(dose.size * 1e9), messages))
-            messages = ()
         due = [message for until_ns, held in waiting if until_ns <= truth.t_ns for message in held]
         waiting = [(until_ns, held) for until_ns, held in waiting if until_ns > truth.t_ns]
-        yield truth, (*messages, *due)
+        yield truth, (*(() if held_back else messages), *due)
 
 
 def restamped(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from adhesion_node.wire.codecs import FRAME, New
@@ -43,11 +42,6 @@ def messages_of(reading: Reading, settings: SensorSettings) -> tuple[SensorMessa
     return tuple(
         SensorMessage(topic, reading.t_ns, values, std**2) for topic, values, std in shown if values is not None
     )
-
-
-def ticks(samples: Iterator[tuple[Truth, Reading]], settings: SensorSettings) -> Iterator[Tick]:
-    """Yield a tick for every sample of a run."""
-    return ((truth, messages_of(reading, settings)) for truth, reading in samples)
 
 
 def _single(value: float | None) -> tuple[float, ...] | None:

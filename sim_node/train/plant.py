@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from adhesion_node.core.physics.train import KMH, Array
+from adhesion_node.core.setting import check_settings, setting
 
 from .scenario import RUN_ON_S, Scenario
 
@@ -37,13 +38,11 @@ class PlantNoise:
     Raises ValueError naming the value that is not finite or negative.
     """
 
-    position_m: float = 0.02
-    speed_mps: float = 0.02 * KMH
+    position_m: float = setting(0.02, "Of the position", "m", low=0.0)
+    speed_mps: float = setting(0.02 * KMH, "Of the speed", "m/s", low=0.0)
 
     def __post_init__(self) -> None:
-        for name, value in (("position_m", self.position_m), ("speed_mps", self.speed_mps)):
-            if not math.isfinite(value) or value < 0:
-                raise ValueError(f"process noise {name} = {value!r}: give a finite number of at least 0")
+        check_settings(self, "process noise ")
 
 
 NOMINAL_NOISE = PlantNoise()

@@ -11,8 +11,7 @@ import numpy as np
 
 from .plant import NOMINAL_NOISE, PlantNoise, Truth, simulate
 from .scenario import Scenario
-from .sensors import Reading, SensorSettings, measure
-from .wheels import wheel_speeds
+from .sensors import Reading, SensorSettings, measure, wheel_speeds
 
 
 def run(

@@ -17,6 +17,7 @@ import numpy as np
 from adhesion_node.core.physics.adhesion import DRY, SNOW, WET, SpeedLaw
 from adhesion_node.core.physics.track import LEVEL, Grade, Track, Tunnel
 from adhesion_node.core.physics.train import CRH3, KMH, Train
+from adhesion_node.core.setting import check_settings, setting
 
 RUN_ON_S = 2.0
 """A run goes on so long after its end speed is reached, so that the end is seen through noise."""
@@ -53,14 +54,11 @@ class Brake:
     """
 
     start_s: float
-    pressure_pa: float = CRH3.full_pressure_pa
-    build_up_s: float = 0.0
-    """0: full pressure at once, as in the paper's figures."""
+    pressure_pa: float = setting(CRH3.full_pressure_pa, "Pressure at the end", "Pa", low=0.0)
+    build_up_s: float = setting(0.0, "0: full pressure at once, as in the paper's figures", "s", low=0.0)
 
     def __post_init__(self) -> None:
-        for name, value in (("pressure_pa", self.pressure_pa), ("build_up_s", self.build_up_s)):
-            if not math.isfinite(value) or value < 0:
-                raise ValueError(f"brake {name} = {value!r}: give a finite number of at least 0")
+        check_settings(self, "brake ")
         if not self.start_s >= 0:
             raise ValueError(f"brake start_s = {self.start_s!r}: give a time of at least 0, or inf for no brake")
 
@@ -171,7 +169,6 @@ SCENARIOS: Mapping[str, Scenario] = MappingProxyType({scenario.name: scenario fo
 
 def find(name: str) -> Scenario:
     """Return the scenario of that name; ValueError naming it and listing the known ones when there is none."""
-    try:
-        return SCENARIOS[name]
-    except KeyError:
-        raise ValueError(f"scenario = {name!r}: give one of {', '.join(SCENARIOS)}") from None
+    if name not in SCENARIOS:
+        raise ValueError(f"scenario = {name!r}: give one of {', '.join(SCENARIOS)}")
+    return SCENARIOS[name]

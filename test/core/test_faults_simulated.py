@@ -174,7 +174,7 @@ def test_heavy_tails_are_heavy() -> None:
 
 
 def test_an_unknown_fault_is_named_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match="fault = 'drop': give one of none, dropout, loss"):
+    with pytest.raises(ValueError, match="fault = 'drop': choose one of none, dropout, loss"):
         Plan("drop")
 
 

@@ -11,8 +11,7 @@ import pytest
 from adhesion_node.core.physics.train import CRH3, Array
 from sim_node.train.run import run
 from sim_node.train.scenario import find
-from sim_node.train.sensors import SensorSettings
-from sim_node.train.wheels import GROUPS
+from sim_node.train.sensors import GROUPS, SensorSettings
 
 WHEELS = SensorSettings(wheel_speed_std_radps=1e-6)
 

@@ -12,7 +12,7 @@ there would never move.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.special import ndtri
@@ -47,16 +47,8 @@ NAIVE = Tuning(mu_std=0.1, mu_noise=7.5e-3)
 
 
 @dataclass(frozen=True, slots=True)
-class EkfConfig:
-    """Train, track, noise, `start_mu` and `step` of the estimator's configuration, and the filter's own tuning."""
-
-    base: Config = field(default_factory=Config)
-    tuning: Tuning = TUNED
-
-
-@dataclass(frozen=True, slots=True)
 class EkfState:
-    """Immutable: `ekf_step` returns a new one."""
+    """Immutable: `ekf_step` returns a new one. The default stands before the first measurement."""
 
     newest: Measurement | None = None
     mean: Array = field(default_factory=lambda: np.zeros(3))
@@ -65,36 +57,28 @@ class EkfState:
     since_estimate: int = 0
 
 
-def ekf_init(config: EkfConfig, seed: int) -> EkfState:
-    """State before the first measurement; the filter draws nothing, the seed belongs to the common signature."""
-    del config, seed
-    return EkfState()
+def ekf_step(
+    config: Config, tuning: Tuning, state: EkfState, measurement: Measurement
+) -> tuple[EkfState, Estimate | None]:
+    """Take one measurement; every `config.step` accepted ones return an estimate.
 
-
-def ekf_step(config: EkfConfig, state: EkfState, measurement: Measurement) -> tuple[EkfState, Estimate | None]:
-    """Take one measurement; every `config.base.step` accepted ones return an estimate.
-
-    Measurements that are invalid or not newer than the newest are dropped.
+    Of the configuration it takes train, track, noise, `start_mu` and `step`. Measurements that are invalid or not
+    newer than the newest are dropped.
     """
-    base, newest = config.base, state.newest
+    newest = state.newest
     if not measurement.is_valid() or (newest is not None and measurement.t_ns <= newest.t_ns):
         return state, None
     if newest is None:
-        mean, covariance = _joined(meet(measurement, base.unknown_speed_mps), config)
+        mean, covariance = _joined(config, tuning, meet(measurement, config.unknown_speed_mps))
     else:
-        mean, covariance = _predict(config, state, (measurement.t_ns - newest.t_ns) * 1e-9, newest)
+        dt_s, brake = (measurement.t_ns - newest.t_ns) * 1e-9, config.brake(newest.brake_pressure_pa)
+        mean, covariance = _predict(config, tuning, state, dt_s, brake)
         mean, covariance = _observe(mean, covariance, measurement)
-    if base.brake(measurement.brake_pressure_pa) > 0.0:
-        mean[2] = min(max(mean[2], 0.0), _limit(base, mean, measurement))
-    due = state.since_estimate + 1 >= base.step
-    state = replace(
-        state,
-        newest=measurement,
-        mean=mean,
-        covariance=covariance,
-        since_estimate=0 if due else state.since_estimate + 1,
-    )
-    return state, _estimate(base, state, measurement) if due else None
+    if config.brake(measurement.brake_pressure_pa) > 0.0:
+        mean[2] = min(max(mean[2], 0.0), _limit(config, mean, measurement))
+    due = state.since_estimate + 1 >= config.step
+    state = EkfState(measurement, mean, covariance, 0 if due else state.since_estimate + 1)
+    return state, _estimate(config, state, measurement) if due else None
 
 
 def jacobian(config: Config, mean: Array, dt_s: float, brake: float) -> Array:
@@ -107,22 +91,20 @@ def jacobian(config: Config, mean: Array, dt_s: float, brake: float) -> Array:
     return result
 
 
-def _joined(belief: Gaussian, config: EkfConfig) -> tuple[Array, Array]:
+def _joined(config: Config, tuning: Tuning, belief: Gaussian) -> tuple[Array, Array]:
     """A belief in (s, v) with the adhesion as at the start of a braking."""
     covariance = np.zeros((3, 3))
-    covariance[:2, :2], covariance[2, 2] = belief.covariance, config.tuning.mu_std**2
-    return np.append(belief.mean, config.base.start_mu), covariance
+    covariance[:2, :2], covariance[2, 2] = belief.covariance, tuning.mu_std**2
+    return np.append(belief.mean, config.start_mu), covariance
 
 
-def _predict(config: EkfConfig, state: EkfState, dt_s: float, newest: Measurement) -> tuple[Array, Array]:
-    base = config.base
-    brake = base.brake(newest.brake_pressure_pa)
+def _predict(config: Config, tuning: Tuning, state: EkfState, dt_s: float, brake: float) -> tuple[Array, Array]:
     if brake == 0.0:
         belief = Gaussian(state.mean[:2], state.covariance[:2, :2])
-        return _joined(coast(belief, dt_s, base.coasting_noise_mps**2 / 0.1), config)
-    slope = jacobian(base, state.mean, dt_s, brake)
-    position, speed = base.motion.advance(state.mean[0], state.mean[1], dt_s, brake, float(state.mean[2]))
-    noise = np.diag([*base.motion.noise(dt_s), config.tuning.mu_noise**2 * dt_s / 0.1])
+        return _joined(config, tuning, coast(belief, dt_s, config.coasting_noise_mps**2 / 0.1))
+    slope = jacobian(config, state.mean, dt_s, brake)
+    position, speed = config.motion.advance(state.mean[0], state.mean[1], dt_s, brake, float(state.mean[2]))
+    noise = np.diag([*config.motion.noise(dt_s), tuning.mu_noise**2 * dt_s / 0.1])
     return np.array([position, speed, state.mean[2]]), slope @ state.covariance @ slope.T + noise
 
 

@@ -19,7 +19,6 @@ from numpy.typing import NDArray
 from sim_node.train.plant import ADHESION_LIMITED, NO_NOISE, simulate
 from sim_node.train.scenario import find
 
-from ...command.options import DONE, report
 from ...core.config import Config
 from ...core.physics.adhesion import WET
 from ...core.physics.motion import Motion
@@ -112,11 +111,10 @@ def row(case: Case) -> dict[str, Any]:
     }
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print the table."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Return the table."""
     table = [row(case) for case in CASES]
-    report(options.json, table, "\n".join([HEAD, *lines(COLUMNS, table)]))
-    return DONE
+    return table, "\n".join([HEAD, *lines(COLUMNS, table)])
 
 
 HEAD = (

@@ -118,10 +118,8 @@ def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
     axis.axvline(mark, color=GREY, lw=1.0)
     named = f" creep {he.ENOUGH}" if len(panel.truths) == 1 else " the surface changes"
     axis.annotate(named, (mark, 0.02), xycoords=("data", "axes fraction"), color="0.25", fontsize="small")
-    axis.set_ylim(0.0, 2.0 * max(panel.truths))
-    axis.set_xlim(places[0], places[-1])
-    axis.set_xlabel("creep" if len(panel.truths) == 1 else "samples on a surface, each from 0 to 1")
-    axis.set_ylabel(panel.quantity)
+    along = "creep" if len(panel.truths) == 1 else "samples on a surface, each from 0 to 1"
+    axis.set(xlabel=along, ylabel=panel.quantity, xlim=(places[0], places[-1]), ylim=(0.0, 2.0 * max(panel.truths)))
     axis.legend(loc="upper right", fontsize="small")
 
 

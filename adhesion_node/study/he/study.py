@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import DONE, report
 from ...core.physics.train import Array
 from ..trial.running import add_running_options, run_all, running
 from ..trial.text import Column, lines
@@ -63,7 +62,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_running_options(parser)
 
 
-def run(options: argparse.Namespace) -> int:
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run the study; draw the figures where asked."""
     if options.runs < 2 or options.seed < 0:
         raise ValueError(f"runs = {options.runs}, seed = {options.seed}: give at least 2 runs and a seed of at least 0")
@@ -76,13 +75,12 @@ def run(options: argparse.Namespace) -> int:
     rows = [row_of(name, experiment, thetas[name]) for name, experiment in wanted.items()]
     *noises, covered, withheld, difference = map(value_of, found[len(wanted) :])
     rows[0] |= {"dfp_difference": difference, "coverage95": covered, "withholding": withheld}
-    noise = [row for rows_of_std in noises for row in rows_of_std]
+    rows += [row for rows_of_std in noises for row in rows_of_std]
     if options.figures:
         from .figures import draw
 
         draw(thetas, options.figures)
-    report(options.json, rows + noise, text(rows, noise, covered, withheld, difference))
-    return DONE
+    return rows, text(rows)
 
 
 def experiments(runs: int, seed: int) -> dict[str, he.Experiment]:
@@ -131,25 +129,20 @@ def row_of(name: str, experiment: he.Experiment, theta: Array) -> dict[str, Any]
     }
 
 
-def text(
-    rows: list[dict[str, Any]],
-    noise: list[dict[str, Any]],
-    covered: dict[str, float],
-    withheld: list[dict[str, float]],
-    difference: float,
-) -> str:
+def text(rows: list[dict[str, Any]]) -> str:
     """Return the tables for people."""
-    shares = ", ".join(f"{name} {share:.3f}" for name, share in covered.items())
+    one = rows[0]
+    shares = ", ".join(f"{name} {share:.3f}" for name, share in one["coverage95"].items())
     return "\n".join(
         [
-            *lines(COLUMNS, rows + noise),
+            *lines(COLUMNS, rows),
             "",
             f"used: share of the new surface's samples after which the peak stays within {he.BAND:.0%} of the truth",
             "",
             f"share of 95 % intervals that hold the truth: {shares}",
             "",
-            f"iteration against exact minimum: {difference:.1e} of p1, p2 at most",
+            f"iteration against exact minimum: {one['dfp_difference']:.1e} of p1, p2 at most",
             "",
-            *lines(WITHHELD, withheld),
+            *lines(WITHHELD, one["withholding"]),
         ]
     )

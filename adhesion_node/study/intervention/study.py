@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...bag import BagReader, select
-from ...command.options import DONE, progress, report
+from ...command.options import progress
 from ...core import Config
 from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
@@ -55,8 +55,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the limits at 200 km/h of tunnel_entry")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print the table."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Return the table."""
     if not 0.0 < options.kwet <= 1.0:
         raise ValueError(f"kwet = {options.kwet}: give a factor above 0 up to 1")
     table: list[dict[str, Any]] = []
@@ -65,8 +65,7 @@ def run(options: argparse.Namespace) -> int:
         table += rows(scenario, said, options.kwet)
         if scenario == "tunnel_entry" and options.figure is not None:
             _draw(said, options.figure)
-    report(options.json, table, "\n".join(lines(table)))
-    return DONE
+    return table, "\n".join(lines(table))
 
 
 def _draw(said: list[Prediction], path: Path) -> None:

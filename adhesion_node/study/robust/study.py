@@ -15,8 +15,8 @@ longest time from the end of the fault to a full window.
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
-from ...command.options import DONE, report
 from ..trial.running import add_running_options, running
 from ..trial.text import lines
 from . import faults, rails
@@ -32,10 +32,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_running_options(parser)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run what is missing and print a line per case."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Run what is missing and return a line per case."""
     names = [options.only] if options.only else list(TABLES)
     tables = {name: TABLES[name].rows(options.runs, running(options)) for name in names}
     texts = ["\n".join(lines(TABLES[name].COLUMNS, table)) for name, table in tables.items()]
-    report(options.json, [row for table in tables.values() for row in table], "\n\n".join(texts))
-    return DONE
+    return [row for table in tables.values() for row in table], "\n\n".join(texts)

@@ -16,7 +16,7 @@ from sim_node.train.scenario import find
 from ...core import Config, Estimate, finish, init, step
 from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
-from ..baselines.ekf import TUNED, EkfConfig, Tuning, ekf_init, ekf_step
+from ..baselines.ekf import TUNED, EkfState, Tuning, ekf_step
 from . import lockstep
 from .world import Refusal, SimulatedRun
 
@@ -117,10 +117,9 @@ def _by_core(estimator: Estimator, lane: Lane) -> LaneResult:
 
 def _by_ekf(estimator: Estimator, lane: Lane) -> LaneResult:
     """Measurement by measurement through the extended Kalman filter."""
-    config = EkfConfig(estimator.config_in(lane), estimator.tuning)
-    state, estimates = ekf_init(config, estimator.seed_in(lane)), list[Estimate]()
+    config, state, estimates = estimator.config_in(lane), EkfState(), list[Estimate]()
     for measurement in lane.run.measurements:
-        state, estimate = ekf_step(config, state, measurement)
+        state, estimate = ekf_step(config, estimator.tuning, state, measurement)
         estimates += [] if estimate is None else [estimate]
     return _estimated(estimates)
 

@@ -16,8 +16,7 @@ import socket
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
-from contextlib import AbstractContextManager
+from concurrent.futures import FIRST_COMPLETED, wait
 from functools import cache as once
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -99,27 +98,19 @@ def run_all(wanted: Sequence[Task], where: Running) -> Iterator[Arrays]:
 
 def _compute_all(missing: Sequence[Task], where: Running) -> None:
     """Compute tasks into the cache, and draw the bar on standard error, by weights; short work stays silent."""
-    with _executor(where, len(missing)) as executor:
+    workers = min(where.workers, len(missing))
+    with engines.cluster(where.scheduler) if where.scheduler else engines.processes(workers) as executor:
         futures = {executor.submit(_compute, task, file_name(task)): task for task in missing}
         started, finished, total = time.monotonic(), 0.0, sum(task.weight for task in missing)
         due = started + PROGRESS_S
         while futures:
-            for future in _done(futures, due):
+            for future in wait(futures, max(due - time.monotonic(), 0.0), FIRST_COMPLETED).done:
                 task = futures.pop(future)
                 save(task, future.result(), where.cache)
                 finished += task.weight
             if time.monotonic() >= due:
                 due = time.monotonic() + PROGRESS_S
                 _draw_bar(finished / total, time.monotonic() - started)
-
-
-def _executor(where: Running, tasks: int) -> AbstractContextManager[Executor]:
-    return engines.cluster(where.scheduler) if where.scheduler else engines.processes(min(where.workers, tasks))
-
-
-def _done(futures: dict[Future[Arrays], Task], due: float) -> set[Future[Arrays]]:
-    """Wait until something is done or `due` has come."""
-    return wait(futures, max(due - time.monotonic(), 0.0), FIRST_COMPLETED).done
 
 
 def _draw_bar(share: float, spent_s: float) -> None:

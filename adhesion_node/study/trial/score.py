@@ -41,7 +41,9 @@ def score(found: Results) -> dict[str, Any]:
     curves = rows[~np.isnan(rows["safe_m"])]
     moving = curves[curves["true_stopping_m"] > 0.0]
     brake_limits = rows[~rows["limited"]]
-    changes, hours = _sum(known, changes_told), _sum(rows, _braked_s) / 3600.0
+    changes = sum(map(changes_told, each_trial(known)))
+    hours = sum(float(own["t_ns"][-1] - own["t_ns"][0]) * 1e-9 for own in each_trial(rows)) / 3600.0
+    silences = np.concatenate([np.zeros(0), *(np.diff(own["out_s"]) for own in each_trial(rows))])
     return {
         "runs": np.unique(found.runs["seed"]).size,
         "mean_abs_error": statistic(np.mean, of_runs(counted, lambda own: np.abs(own["mu"] - own["true_mu"]))),
@@ -59,9 +61,9 @@ def score(found: Results) -> dict[str, Any]:
         "shortest_safe_curve": statistic(np.min, moving["safe_m"] / moving["true_stopping_m"]),
         "without_safe_curve": statistic(np.mean, np.isnan(rows["safe_m"])),
         "claimed_while_the_brake_limits": statistic(np.mean, brake_limits["claimed"]),
-        "changes_told": int(changes),
+        "changes_told": changes,
         "changes_per_hour": changes / hours if hours else None,
-        "longest_silence_s": statistic(np.max, _silences(rows)),
+        "longest_silence_s": statistic(np.max, silences),
     }
 
 
@@ -101,16 +103,3 @@ def over_speed(found: Results) -> Curve:
 def converged_kmh(curve: Curve) -> float | None:
     """Speed at which the error first falls below `CONVERGED_PERCENT`; None where it does not."""
     return statistic(lambda speeds: speeds[0], curve.speed_kmh[curve.relative_error_percent < CONVERGED_PERCENT])
-
-
-def _sum(rows: Rows, value: Callable[[Rows], float]) -> float:
-    return float(sum(map(value, each_trial(rows))))
-
-
-def _braked_s(rows: Rows) -> float:
-    return float(rows["t_ns"][-1] - rows["t_ns"][0]) * 1e-9
-
-
-def _silences(rows: Rows) -> NDArray[np.float64]:
-    """Times between an estimate and the next, s."""
-    return np.concatenate([np.zeros(0), *(np.diff(own["out_s"]) for own in each_trial(rows))])

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import DONE, report
 from ...core.physics import braking
 from ...core.physics.adhesion import WET, AdhesionLaw
 from ...core.physics.train import CRH3, KMH, Array
@@ -150,8 +149,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 2, 3, 10-13, 20 and 21 into DIR")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Print the table and the savings, and the distances by the identified adhesion where runs are asked for."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Return the table and the savings, and the distances by the identified adhesion where runs are asked for."""
     if options.runs < 0:
         raise ValueError(f"runs = {options.runs}: give at least 0")
     table = list(rows())
@@ -166,8 +165,7 @@ def run(options: argparse.Namespace) -> int:
         from .figures import draw_brakings
 
         draw_brakings(options.figures)
-    report(options.json, table, "\n".join(text))
-    return DONE
+    return table, "\n".join(text)
 
 
 def _identified_in(runs: int, where: Running) -> list[dict[str, Any]]:

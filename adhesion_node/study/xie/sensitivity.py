@@ -15,7 +15,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ...command.options import DONE, report
 from ..trial.running import add_running_options, running
 from ..trial.score import score
 from ..trial.text import Column, lines
@@ -70,12 +69,11 @@ def _changed(method: str, runs: int, setting: str, value: Any) -> Trials:
     return trials(SCENARIO, estimator._replace(config=replace(estimator.config, **{setting: value})), runs)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run what is missing and print a line per setting and value."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Run what is missing and return a line per setting and value."""
     found = grouped(variations(options.runs), running(options))
     table = [_row(*line, score(of_line)) for line, of_line in found.items()]
-    report(options.json, table, "\n".join(_text(table)))
-    return DONE
+    return table, "\n".join(_text(table))
 
 
 def _row(setting: str, value: float, method: str, of_line: dict[str, Any]) -> dict[str, Any]:

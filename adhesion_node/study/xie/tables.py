@@ -22,7 +22,6 @@ from typing import Any
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
-from ...command.options import DONE, report
 from ..bound.study import Case, nominal
 from ..trial.running import add_running_options, running
 from ..trial.score import over_speed, score
@@ -64,8 +63,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 4-9 and 14-19 into DIR")
 
 
-def run(options: argparse.Namespace) -> int:
-    """Run what is missing, print the tables, draw the figures."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Run what is missing, return the tables, draw the figures."""
     wanted = [
         ((scenario, method), trials(scenario, estimator, options.runs))
         for method, estimator in METHODS.items()
@@ -79,8 +78,7 @@ def run(options: argparse.Namespace) -> int:
         draw_estimates(cells, options.figures)
     text = ["mean relative error of mu, %, beside the paper's (its EKF beside ours); spread over the runs"]
     text += [*lines(COLUMNS, table), "", *_speed_lines(cells), "", *_digest_lines(table)]
-    report(options.json, table, "\n".join(text))
-    return DONE
+    return table, "\n".join(text)
 
 
 def rows(cell: Cell, found: Results) -> Iterator[dict[str, Any]]:

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import DONE, report
 from ..baselines.ekf import TUNED, Tuning
 from ..trial.running import add_running_options, running
 from ..trial.score import score
@@ -53,8 +52,8 @@ def grid(runs: int) -> Iterator[tuple[tuple[Tuning, str], Trials]]:
             yield (tuning, scenario), trials(scenario, estimator, runs)._replace(first_seed=FIRST_SEED)
 
 
-def run(options: argparse.Namespace) -> int:
-    """Search the grid and print it, best first."""
+def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
+    """Search the grid and return it, best first."""
     found = grouped(grid(options.runs), running(options))
     errors: dict[Tuning, list[float]] = {}
     for (tuning, _), results in found.items():
@@ -64,5 +63,4 @@ def run(options: argparse.Namespace) -> int:
         for tuning, of_scenarios in errors.items()
     ]
     table.sort(key=lambda row: float(row["mean_relative_error_percent"]))
-    report(options.json, table, "\n".join(lines(COLUMNS, table)))
-    return DONE
+    return table, "\n".join(lines(COLUMNS, table))

@@ -5,23 +5,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from oracles import Linear, ride
 
 from adhesion_node.core import Config, Estimate, Measurement, Regime
 from adhesion_node.core.physics.train import Train
-from adhesion_node.study.baselines.ekf import NAIVE, TUNED, EkfConfig, EkfState, Tuning, ekf_init, ekf_step, jacobian
+from adhesion_node.study.baselines.ekf import NAIVE, TUNED, EkfState, Tuning, ekf_step, jacobian
 
 BRAKE = 0.0952
 
 
-def _run(config: EkfConfig, measurements: list[Measurement]) -> tuple[EkfState, list[Estimate]]:
-    state, estimates = ekf_init(config, 1), []
+def _run(config: Config, measurements: list[Measurement], tuning: Tuning = TUNED) -> tuple[EkfState, list[Estimate]]:
+    state, estimates = EkfState(), []
     for measurement in measurements:
-        state, estimate = ekf_step(config, state, measurement)
+        state, estimate = ekf_step(config, tuning, state, measurement)
         estimates += [] if estimate is None else [estimate]
     return state, estimates
 
@@ -40,11 +38,11 @@ def test_jacobian_is_the_derivative_of_the_step(mu: float) -> None:
 def test_equals_the_textbook_filter_where_the_train_is_linear() -> None:
     model = Linear(c0=0.8, c1=0.006)
     train = Train(resistance_c0=0.8, resistance_c1=0.006, resistance_c2=0.0)
-    config = EkfConfig(Config(train=train, start_mu=0.06), Tuning(0.02, 1e-3))
+    config, tuning = Config(train=train, start_mu=0.06), Tuning(0.02, 1e-3)
     measurements = ride([(1.0, 0.0), (10.0, 410e3)], mu=0.07, seed=3)
-    state, _ = _run(config, measurements)
+    state, _ = _run(config, measurements, tuning)
 
-    start, _ = _run(config, measurements[:11])  # the last of the cruising
+    start, _ = _run(config, measurements[:11], tuning)  # the last of the cruising
     mean, covariance = start.mean, start.covariance
     a = np.eye(3)
     a[:2, :2] = model.matrix(0.1)
@@ -64,7 +62,7 @@ def test_equals_the_textbook_filter_where_the_train_is_linear() -> None:
 @pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])
 def test_finds_a_constant_adhesion_from_every_start(start_mu: float) -> None:
     measurements = ride([(20.0, 0.0), (40.0, 410e3)], mu=0.0726, speed_mps=83.0, seed=1)
-    _, estimates = _run(EkfConfig(Config(start_mu=start_mu)), measurements)
+    _, estimates = _run(Config(start_mu=start_mu), measurements)
     assert {e.regime for e in estimates if e.t_ns < 19e9} == {Regime.COASTING}
     late = [e for e in estimates if e.t_ns > 40e9]
     assert np.mean([abs(e.mu - 0.0726) for e in late]) < 0.003
@@ -75,7 +73,7 @@ def test_finds_a_constant_adhesion_from_every_start(start_mu: float) -> None:
 
 def test_the_brakes_limit_is_all_that_a_good_rail_shows() -> None:
     measurements = ride([(20.0, 0.0), (30.0, 410e3)], mu=0.15, speed_mps=83.0, seed=1)
-    _, estimates = _run(EkfConfig(), measurements)
+    _, estimates = _run(Config(), measurements)
     late = [e for e in estimates if e.t_ns > 35e9]
     assert all(e.mu <= BRAKE + 1e-4 for e in late)
     assert np.mean([e.regime is Regime.BRAKE_LIMITED for e in late]) > 0.8
@@ -85,7 +83,7 @@ def test_a_fast_walk_is_noisier() -> None:
     measurements = ride([(20.0, 0.0), (40.0, 410e3)], mu=0.0726, speed_mps=83.0, seed=2)
     errors = []
     for tuning in (TUNED, NAIVE):
-        _, estimates = _run(EkfConfig(tuning=tuning), measurements)
+        _, estimates = _run(Config(), measurements, tuning)
         errors.append(np.mean([abs(e.mu - 0.0726) for e in estimates if e.t_ns > 30e9]))
     assert errors[1] > 3 * errors[0]
 
@@ -93,9 +91,9 @@ def test_a_fast_walk_is_noisier() -> None:
 def test_drops_what_is_invalid_or_not_newer() -> None:
     measurements = ride([(3.0, 0.0)], seed=1)
     last = measurements[-1]
-    state, _ = _run(EkfConfig(), measurements)
+    state, _ = _run(Config(), measurements)
     for bad in (last, replace_position(last, float("nan")), last._replace(t_ns=0)):
-        assert ekf_step(EkfConfig(), state, bad) == (state, None)
+        assert ekf_step(Config(), TUNED, state, bad) == (state, None)
 
 
 def replace_position(measurement: Measurement, position_m: float) -> Measurement:
@@ -103,7 +101,7 @@ def replace_position(measurement: Measurement, position_m: float) -> Measurement
 
 
 def test_an_estimate_every_l_measurements() -> None:
-    config = EkfConfig(replace(Config(), step=7))
+    config = Config(step=7)
     _, estimates = _run(config, ride([(5.0, 0.0), (5.0, 410e3)], seed=1))
     assert [e.t_ns for e in estimates] == [round(0.1e9 * (7 * i + 6)) for i in range(14)]
 
