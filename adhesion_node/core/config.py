@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 from .methods import METHODS
 from .physics.adhesion import LAWS, SpeedLaw
@@ -14,6 +15,15 @@ from .physics.motion import Motion
 from .physics.track import LEVEL, Track
 from .physics.train import CRH3, KMH, Train
 from .setting import check_settings, setting
+
+_method = partial(setting, group="method")
+_rail = partial(setting, group="rail")
+_steps = partial(setting, group="steps of the positions")
+_motion = partial(setting, group="motion")
+_wheels = partial(setting, group="speed and wheels")
+_brake = partial(setting, group="brake")
+_unsure = partial(setting, group="what is not known well")
+_intake = partial(setting, group="intake")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,160 +35,156 @@ class Config:
 
     train: Train = CRH3
     track: Track = LEVEL
-    method: str = setting(
+    method: str = _method(
         "rail_condition",
         "; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()),
         choices=tuple(METHODS),
     )
-    law: str = setting(
+    law: str = _method(
         "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))
     )
-    law_probability: float = setting(
+    law_probability: float = _method(
         0.9, "Probability of that shape; else that of low_adhesion, or no dependence on speed", low=0.0, high=1.0
     )
-    rail_drift: float = setting(
-        0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0
-    )
-    change_threshold: float = setting(
+    rail_drift: float = _rail(0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0)
+    change_threshold: float = _rail(
         3.5, "Logarithm of the odds (evidence) from which the rail counts as changed within a window", low=0.0, high=1e6
     )
-    change_edge: int = setting(
-        5, "Steps at either end of a window in which a change is not looked for", low=1, high=1000
-    )
-    change_margin: float = setting(
+    change_edge: int = _rail(5, "Steps at either end of a window in which a change is not looked for", low=1, high=1000)
+    change_margin: float = _rail(
         2.0,
         "By how much the log odds of a changed rail must exceed those of a step of the positions, or fall below them; "
         "else the next windows decide",
         low=0.0,
         high=1e6,
     )
-    position_step_std_m: float = setting(
+    position_step_std_m: float = _steps(
         3.0, "By how much a balise may correct the positions, standard deviation", "m", 1e-3, 1e4
     )
-    position_step_log_odds: float = setting(
+    position_step_log_odds: float = _steps(
         5.0, "Log odds that such a step needs beyond change_threshold; heavy tails look like one", low=0.0, high=1e6
     )
-    position_step_spacing_m: float = setting(
+    position_step_spacing_m: float = _steps(
         200.0, "Distance behind such a step within which there is no other one", "m", 0.0, 1e6
     )
-    position_step_speed_share: float = setting(
+    position_step_speed_share: float = _steps(
         0.3,
         "Standard deviation of the speed behind such a step, over its size per time of the window",
         low=0.0,
         high=10.0,
     )
-    restart_sigma: float = setting(
+    restart_sigma: float = _steps(
         5.0,
         "Difference of its speed from the tracker's, in standard deviations, at which a window has lost the train",
         low=3.0,
         high=1e6,
     )
-    restart_s: float = setting(2.0, "Time after which such a window begins anew at the tracker", "s", 0.0, 60.0)
-    limit_margin_sigma: float = setting(
+    restart_s: float = _steps(2.0, "Time after which such a window begins anew at the tracker", "s", 0.0, 60.0)
+    limit_margin_sigma: float = _rail(
         2.0,
         "Standard deviations by which the rail condition must stay below the brake's limit for a step to tell of it",
         low=0.0,
         high=100.0,
     )
-    shortest_window_s: float = setting(
+    shortest_window_s: float = _method(
         4.5,
         "Time up to which a window grows beyond S while it cannot tell adhesion from the brake's limit",
         "s",
         0.0,
         60.0,
     )
-    tail_dof: float = setting(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
-    identify_noise: bool = setting(
+    tail_dof: float = _method(4.0, "Degrees of freedom of the positions' Student t; 0: Gaussian", low=0.0, high=1e6)
+    identify_noise: bool = _method(
         False, "Identify the variance of the positions by the same EM, from the given one on"
     )
-    noise_trust_steps: float = setting(50.0, "Steps of a window that the given variance is worth", low=1.0, high=1e9)
-    noise_memory_steps: float = setting(1950.0, "Steps from which the variance is learnt at most", low=1.0, high=1e9)
-    window: int = setting(50, "Measurements in a window, S", low=3, high=10_000)
-    step: int = setting(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
-    particles: int = setting(20, "Particles, M, of particle_em", low=2, high=100_000)
-    iterations: int = setting(50, "EM iterations at most", low=1, high=10_000)
-    tolerance: float = setting(1e-6, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
-    start_mu: float = setting(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
-    confidence: float = setting(0.95, "One-sided confidence of the lower bound", low=0.5, high=0.9999)
-    position_noise_m: float = setting(
+    noise_trust_steps: float = _method(50.0, "Steps of a window that the given variance is worth", low=1.0, high=1e9)
+    noise_memory_steps: float = _method(1950.0, "Steps from which the variance is learnt at most", low=1.0, high=1e9)
+    window: int = _method(50, "Measurements in a window, S", low=3, high=10_000)
+    step: int = _method(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
+    particles: int = _method(20, "Particles, M, of particle_em", low=2, high=100_000)
+    iterations: int = _method(50, "EM iterations at most", low=1, high=10_000)
+    tolerance: float = _method(1e-6, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
+    start_mu: float = _method(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
+    confidence: float = _method(0.95, "One-sided confidence of the lower bound", low=0.5, high=0.9999)
+    position_noise_m: float = _motion(
         0.02, "Process noise of the position, standard deviation over 0.1 s", "m", 1e-6, 100.0
     )
-    speed_noise_mps: float = setting(
+    speed_noise_mps: float = _motion(
         0.02 * KMH, "Process noise of the speed under the brake, standard deviation over 0.1 s", "m/s", 1e-7, 10.0
     )
-    coasting_noise_mps: float = setting(
+    coasting_noise_mps: float = _motion(
         0.03, "Random walk of the speed while no brake is applied, standard deviation over 0.1 s", "m/s", 1e-6, 10.0
     )
-    braking_noise_mps: float = setting(
+    braking_noise_mps: float = _motion(
         1.0,
         "The same under the brake, over 1 s, for the tracker: an unknown deceleration of about 1 m/s^2",
         "m/s",
         1e-3,
         10.0,
     )
-    settled_ratio: float = setting(
+    settled_ratio: float = _motion(
         1.5,
         "Variance of the tracker's speed, over its stationary value, from which on a window may open",
         low=1.0,
         high=100.0,
     )
-    unknown_speed_mps: float = setting(
+    unknown_speed_mps: float = _motion(
         50.0, "Mean and standard deviation of the speed of a train just met", "m/s", 1.0, 200.0
     )
-    slowest_mps: float = setting(
+    slowest_mps: float = _motion(
         3.0, "Speed below which there are no windows: a train about to stand says nothing of the rail", "m/s", 0.1, 50.0
     )
-    speed_std_mps: float = setting(0.3, "Standard deviation of a measured speed", "m/s", 1e-4, 100.0)
-    speed_while_braking: bool = setting(
+    speed_std_mps: float = _wheels(0.3, "Standard deviation of a measured speed", "m/s", 1e-4, 100.0)
+    speed_while_braking: bool = _wheels(
         False, "Use a measured speed under the brake too (a radar; an axle slides and would mislead)"
     )
-    creep_samples: int = setting(10, "Newest measurements whose creep tells sliding wheels", low=1, high=1000)
-    sliding_creep: float = setting(
+    creep_samples: int = _wheels(10, "Newest measurements whose creep tells sliding wheels", low=1, high=1000)
+    sliding_creep: float = _wheels(
         0.03, "Creep of the median axle from which the wheels slide; below half of it they roll", low=1e-3, high=1.0
     )
-    brake_threshold_pa: float = setting(
+    brake_threshold_pa: float = _brake(
         10e3, "Brake-cylinder pressure (gauge) from which the brake counts as applied", "Pa", 0.0, 1e6
     )
-    assumed_pressure_pa: float = setting(
+    assumed_pressure_pa: float = _brake(
         410e3, "Brake-cylinder pressure (gauge) taken where none is measured", "Pa", 0.0, 2e6
     )
-    lowest_net_mu: float = setting(
+    lowest_net_mu: float = _brake(
         -0.05, "Least net adhesion where no pressure is measured: traction may be at work", low=-1.0, high=0.0
     )
-    pressure_wait_s: float = setting(
+    pressure_wait_s: float = _intake(
         0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
     )
-    pressure_age_s: float = setting(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
-    grade_std: float = setting(
+    pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
+    grade_std: float = _unsure(
         0.0, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
-    mass_std: float = setting(0.0, "Standard deviation of the mass, relative", "", 0.0, 1.0)
-    brake_std: float = setting(0.0, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
-    rotating_mass_std: float = setting(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
-    low_adhesion: str = setting(
+    mass_std: float = _unsure(0.0, "Standard deviation of the mass, relative", "", 0.0, 1.0)
+    brake_std: float = _unsure(0.0, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
+    rotating_mass_std: float = _unsure(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
+    low_adhesion: str = _method(
         "snow", "Adhesion law to fall back to where nothing is known", choices=tuple(sorted(LAWS))
     )
-    undecided_share: float = setting(
+    undecided_share: float = _rail(
         0.5, "Share of unknown_std above which a window has seen too little to tell what limits", low=0.0, high=10.0
     )
-    undecided_start_share: float = setting(
+    undecided_start_share: float = _rail(
         0.5, "Share of its start left in particle_em's mu above which it has seen too little", low=0.0, high=1.0
     )
-    plausible_probability: float = setting(
+    plausible_probability: float = _rail(
         0.005, "Probability from which a shape of the law may lower the bound", low=0.0, high=1.0
     )
-    unknown_std: float = setting(0.04, "Standard deviation of mu where nothing is known", low=1e-3, high=1.0)
-    memory_s: float = setting(60.0, "Time in which knowledge that is not renewed fades to 1/e", "s", 1e-3, 1e6)
-    memory_m: float = setting(3000.0, "Distance over which it fades to 1/e", "m", 1e-3, 1e7)
-    max_lag_s: float = setting(
+    unknown_std: float = _rail(0.04, "Standard deviation of mu where nothing is known", low=1e-3, high=1.0)
+    memory_s: float = _rail(60.0, "Time in which knowledge that is not renewed fades to 1/e", "s", 1e-3, 1e6)
+    memory_m: float = _rail(3000.0, "Distance over which it fades to 1/e", "m", 1e-3, 1e7)
+    max_lag_s: float = _intake(
         0.0, "How late a measurement may come and still be sorted in; results wait as long", "s", 0.0, 60.0
     )
-    max_gap_s: float = setting(2.0, "Longest gap between measurements that a window may bridge", "s", 1e-3, 60.0)
-    reset_s: float = setting(60.0, "Jump of the stamps, either way, that starts the estimation anew", "s", 1.0, 1e6)
-    gate_sigma: float = setting(
+    max_gap_s: float = _intake(2.0, "Longest gap between measurements that a window may bridge", "s", 1e-3, 60.0)
+    reset_s: float = _intake(60.0, "Jump of the stamps, either way, that starts the estimation anew", "s", 1.0, 1e6)
+    gate_sigma: float = _intake(
         6.0, "Innovation in standard deviations from which a position is an outlier", low=3.0, high=1e6
     )
-    max_outliers: int = setting(
+    max_outliers: int = _intake(
         20, "Outliers in a row after which the train is taken to be elsewhere", low=1, high=10_000
     )
 
