@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from .reader import BagReader
 from .recordings import Record
-from .selection import parse_remap, select
+from .selection import parse_remap, select, select_from
 from .types import deserialize, encode, serialize, typestore
 from .writer import BagWriter, Limits
 
@@ -20,6 +20,7 @@ __all__ = [
     "encode",
     "parse_remap",
     "select",
+    "select_from",
     "serialize",
     "typestore",
 ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..wire import topics
+from .reader import BagReader
 from .types import same_name
 
 _OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}
@@ -47,6 +48,14 @@ def select(
         elif names is not None or (same_name(name, topics.POSITION.name) and not creep):
             raise ValueError(f"topic {name}: not in the recording. {_what_there_is(name, recorded)}")
     return selection
+
+
+def select_from(reader: BagReader, remaps: Sequence[str], names: Iterable[str] | None = None) -> dict[str, str]:
+    """Select as `select` does from a recording, by remaps in their written form; errors name the recording."""
+    try:
+        return select(reader.topics, [parse_remap(text) for text in remaps], names)
+    except ValueError as error:
+        raise ValueError(f"bag = {reader.path}: {error}") from error
 
 
 def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]]) -> dict[str, str]:

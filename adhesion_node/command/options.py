@@ -49,6 +49,20 @@ def json_option() -> argparse.ArgumentParser:
     return parent
 
 
+def remap_option(add: Callable[..., Any]) -> None:
+    """Add --remap by a parser's `add_argument`."""
+    shown = "which recorded topic is which of ours, for instance /odometry/position:=position"
+    add("--remap", metavar="FROM:=TO", action="extend", nargs="+", default=[], help=shown)
+
+
+def setting_options(add: Callable[..., Any]) -> None:
+    """Add the options that set an estimator up, by the `add_argument` of a parser or a group."""
+    add("--seed", type=int, help="seed of the estimator")
+    add("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
+    add("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
+    add("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
+
+
 def run_tool(
     parser: argparse.ArgumentParser,
     work: Callable[[argparse.Namespace], int],

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 from ..command.options import help_texts, run_tool
 from ..nodes.ros import runtime
-from .address import address_options
 from .node import Live
 
 EXAMPLES = ("live", "live --port 9000 --ros-args -r __ns:=/train1")
@@ -23,6 +22,23 @@ def main(args: Sequence[str] | None = None) -> int:
     usage = "%(prog)s [options] [--ros-args ...]"
     parser = argparse.ArgumentParser("live", parents=[address_options()], usage=usage, **help_texts(__doc__, *EXAMPLES))
     return run_tool(parser, lambda options: runtime.run(lambda: Live(options.host, options.port), ros), own)
+
+
+def address_options() -> argparse.ArgumentParser:
+    """Return the parent of the parsers of programs that serve the page."""
+    parent = argparse.ArgumentParser(add_help=False)
+    parent.add_argument(
+        "--host", default="127.0.0.1", help="address to serve the page at; 0.0.0.0: for everybody (default: 127.0.0.1)"
+    )
+    parent.add_argument("--port", type=_port, default=8080, help="0: any that is free (default: 8080)")
+    return parent
+
+
+def _port(text: str) -> int:
+    number = int(text)
+    if not 0 <= number <= 65535:
+        raise argparse.ArgumentTypeError(f"{text}: give a port from 0 to 65535")
+    return number
 
 
 if __name__ == "__main__":

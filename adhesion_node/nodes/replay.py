@@ -10,8 +10,8 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 
-from ..bag import BagReader, parse_remap, select
-from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
+from ..bag import BagReader, select_from
+from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
 from ..wire.topics import POSITION
 
 EXAMPLES = (
@@ -79,10 +79,7 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
     """Return the topics to replay and say what the recording lacks."""
     for loss in reader.damage:
         print(f"replay: {loss}", file=sys.stderr)
-    try:
-        return select(reader.topics, [parse_remap(text) for text in options.remap], options.topics)
-    except ValueError as error:
-        raise ValueError(f"bag = {reader.path}: {error}") from error
+    return select_from(reader, options.remap, options.topics)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -94,14 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("bag", metavar="BAG", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
-    add(
-        "--remap",
-        metavar="FROM:=TO",
-        action="extend",
-        nargs="+",
-        default=[],
-        help="which recorded topic is which of ours, for instance /odometry/position:=position",
-    )
+    remap_option(add)
     add(
         "--topics", metavar="TOPIC", nargs="+", help="replay these (after --remap) instead of the sensors and the truth"
     )
@@ -121,8 +111,5 @@ def _parser() -> argparse.ArgumentParser:
         choices=(ADHESION, CREEP),
         help="the adhesion under the brake, or the creep curve (default: by whether there is a position)",
     )
-    straight("--seed", type=int, help="seed of the estimator")
-    straight("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
-    straight("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
-    straight("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
+    setting_options(straight)
     return parser

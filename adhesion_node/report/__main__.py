@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag import BagReader, parse_remap, select
-from ..command.options import DONE, help_texts, json_option, report, run_tool
+from ..bag import BagReader, select_from
+from ..command.options import DONE, help_texts, json_option, remap_option, report, run_tool, setting_options
 from ..run.offline import parameters_of
 from ..wire.settings import Setup, setup_of
 from .curves import Subject
@@ -65,15 +65,8 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
             print(f"report: {loss}", file=sys.stderr)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
             return Subject(name, "as recorded", read_run(reader, setup.line), setup.config)
-        run = estimate_run(reader, _selection(reader, options), setup)
+        run = estimate_run(reader, select_from(reader, options.remap), setup)
         return Subject(name, "estimated from the recorded sensors", run, setup.config)
-
-
-def _selection(reader: BagReader, options: argparse.Namespace) -> Mapping[str, str]:
-    try:
-        return select(reader.topics, [parse_remap(text) for text in options.remap])
-    except ValueError as error:
-        raise ValueError(f"bag = {reader.path}: {error}") from error
 
 
 def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:
@@ -103,18 +96,8 @@ def _parser() -> argparse.ArgumentParser:
     add("--output", metavar="DIR", required=True, help="folder of the report; one that is there is written over")
     add("--target", metavar="KMH", type=float, default=0.0, help="speed to which distances count (default: 0)")
     add("--estimate", action="store_true", help="estimate anew, whatever results the recording holds")
-    add(
-        "--remap",
-        metavar="FROM:=TO",
-        action="extend",
-        nargs="+",
-        default=[],
-        help="which recorded topic is which of ours, for instance /odometry/position:=position",
-    )
-    add("--seed", type=int, help="seed of the estimator")
-    add("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
-    add("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
-    add("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
+    remap_option(add)
+    setting_options(add)
     return parser
 
 

@@ -112,6 +112,11 @@ def read_rows(file: TextIO, source: str, form: Format) -> Iterator[Row | Refusal
             yield row
 
 
+def option(column: str) -> str:
+    """Return the option that names a column."""
+    return "--" + column.removeprefix("brake_")
+
+
 def _columns(header: list[str], source: str, form: Format) -> dict[str, int]:
     """Return the index of every column in use by our name for it."""
     if not any(header):
@@ -124,8 +129,8 @@ def _columns(header: list[str], source: str, form: Format) -> dict[str, int]:
         if name in header:
             columns[ours] = header.index(name)
         elif ours in REQUIRED or ours in form.named:
-            option = "--" + ours.removeprefix("brake_")
-            raise ValueError(f"{source}: column {name!r} is missing: it has {header}; name one with {option} COL")
+            remedy = f"it has {header}; name one with {option(ours)} COL"
+            raise ValueError(f"{source}: column {name!r} is missing: {remedy}")
     return columns
 
 

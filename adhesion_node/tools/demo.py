@@ -27,7 +27,7 @@ from ..command.options import DONE, FAILED, help_texts, json_option, report, run
 from ..command.signals import stop_on_signals
 from ..core import Config, Estimate
 from ..core.physics.train import KMH
-from ..live.address import address_options
+from ..live.__main__ import address_options
 from ..report.picture import draw
 from ..report.run import read_run
 from ..report.series import read_status

@@ -81,25 +81,16 @@ def _write(rows: Iterable[Row | Refusal], writer: BagWriter, form: Format) -> di
 
 def _write_row(row: Row, writer: BagWriter, form: Format) -> list[str]:
     """Write the messages of a row, the position last as in a live run; return what the row does not have."""
-    empty = []
-    if row.absolute_pa is None:
-        empty.append("brake_pressure")
-    else:
-        _put(writer, topics.BRAKE_PRESSURE, row.t_ns, row.absolute_pa)
-    if row.speed_mps is None:
-        empty.append("speed")
-    else:
-        _put(writer, topics.SPEED, row.t_ns, row.speed_mps)
-    variance_m2 = row.variance_m2
-    if variance_m2 is None:
-        empty.append("variance")
-        variance_m2 = form.position_std_m**2
-    _put(writer, topics.POSITION, row.t_ns, row.position_m, variance_m2)
-    return empty
-
-
-def _put(writer: BagWriter, topic: topics.Topic, t_ns: int, value: float, variance: float = 0.0) -> None:
-    writer.write(f"/{topic.name}", topic.type, encode(topic, t_ns, (value,), variance), t_ns)
+    variance_m2 = form.position_std_m**2 if row.variance_m2 is None else row.variance_m2
+    for topic, value, variance in (
+        (topics.BRAKE_PRESSURE, row.absolute_pa, 0.0),
+        (topics.SPEED, row.speed_mps, 0.0),
+        (topics.POSITION, row.position_m, variance_m2),
+    ):
+        if value is not None:
+            writer.write(f"/{topic.name}", topic.type, encode(topic, row.t_ns, (value,), variance), row.t_ns)
+    optional = zip(csv_rows.OPTIONAL, (row.variance_m2, row.absolute_pa, row.speed_mps), strict=True)
+    return [column for column, value in optional if value is None]
 
 
 def _work(options: argparse.Namespace) -> int:
@@ -134,12 +125,11 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         "import_csv", parents=[json_option()], **help_texts(__doc__, *EXAMPLES, more=OUTCOME)
     )
-    parser.add_argument("file", metavar="FILE", help="the log: a header line, then one row per time")
-    parser.add_argument("--output", metavar="DIR", required=True, help="the recording, a new directory")
-    for column in (*csv_rows.REQUIRED, *csv_rows.OPTIONAL):
-        option = "--" + column.removeprefix("brake_")
-        parser.add_argument(option, dest=column, metavar="COL", help=f"name of the column, when not {column!r}")
     add = parser.add_argument
+    add("file", metavar="FILE", help="the log: a header line, then one row per time")
+    add("--output", metavar="DIR", required=True, help="the recording, a new directory")
+    for column in (*csv_rows.REQUIRED, *csv_rows.OPTIONAL):
+        add(csv_rows.option(column), dest=column, metavar="COL", help=f"name of the column, when not {column!r}")
     add("--delimiter", default=",", help="between two cells, \\t for a tab (default: ,)")
     add("--time-unit", choices=list(csv_rows.TIME_UNITS), default="s", help="default: s")
     add("--position-unit", choices=list(csv_rows.POSITION_UNITS), default="m", help="default: m; variance is in m^2")
