@@ -57,6 +57,7 @@ def test_names_are_unique() -> None:
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=named)
 def test_every_setting_says_what_it_is_and_what_it_may_be(setting: Setting) -> None:
+    assert setting.group
     assert len(setting.description.split()) > 1
     assert not setting.description.endswith(".")
     if isinstance(setting.default, str):
