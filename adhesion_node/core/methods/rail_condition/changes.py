@@ -88,7 +88,7 @@ class Change(NamedTuple):
 
     @property
     def belief(self) -> Belief:
-        """Joint law of the last state and kappa as they are now, over all instants."""
+        """Joint belief of the last state and kappa as they are now, over all instants."""
         factor, jumps = self.normal.factor, self.jumps
         per_jump = -np.vstack((factor.end(self.half, self.on_kappa), self.on_kappa))
         per_jump[jumps.adds_to] += 1.0

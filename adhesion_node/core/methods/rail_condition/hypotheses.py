@@ -3,7 +3,7 @@
 
 """What the rail's adhesion may do while the train slows down: follow a speed law, or stay as it is.
 
-Either way a factor kappa scales it. Each hypothesis has its own Gaussian law of (s, v, kappa) and a weight, which
+Either way a factor kappa scales it. Each hypothesis has its own Gaussian belief of (s, v, kappa) and a weight, which
 the measurements shift by their evidence.
 """
 
@@ -30,7 +30,7 @@ class Hypothesis(NamedTuple):
 
     law: SpeedLaw
     belief: Belief
-    """Law of (s, v, kappa) at some instant."""
+    """Belief of (s, v, kappa) at some instant."""
     log_weight: float
 
     @property
@@ -62,13 +62,13 @@ def hypotheses(law: SpeedLaw, other: SpeedLaw, probability: float, belief: Belie
 
 
 def scaled(belief: Belief, factor: float) -> Belief:
-    """Law of (s, v, factor x) of the law of (s, v, x)."""
+    """Belief of (s, v, factor x) of the belief of (s, v, x)."""
     by = np.array([1.0, 1.0, factor])
     return Belief(belief.mean * by, belief.covariance * np.outer(by, by))
 
 
 def with_rail(state: Gaussian, rail: Rail) -> Belief:
-    """Law of (s, v, mu) where the state tells nothing of the rail."""
+    """Belief of (s, v, mu) where the state tells nothing of the rail."""
     covariance = np.zeros((3, 3))
     covariance[:2, :2] = state.covariance
     covariance[2, 2] = rail.std**2

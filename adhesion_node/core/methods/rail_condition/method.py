@@ -3,7 +3,7 @@
 
 """The default method for one window: the rail condition kappa in mu(v) = kappa law(v), and the changes of the rail.
 
-The window's prior is the joint law of (s, v, kappa) that the measurements behind it left, so nothing is counted
+The window's prior is the joint belief of (s, v, kappa) that the measurements behind it left, so nothing is counted
 twice: what the window finds is its answer, and only what leaves it becomes prior.
 """
 

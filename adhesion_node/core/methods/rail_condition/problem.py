@@ -23,7 +23,7 @@ LOG_2PI = math.log(2.0 * math.pi)
 
 
 class Belief(NamedTuple):
-    """Gaussian law of position, m, speed, m/s, and a third quantity, kappa or mu: mean (3,), covariance (3, 3)."""
+    """Gaussian belief of position, m, speed, m/s, and a third quantity, kappa or mu: mean (3,), covariance (3, 3)."""
 
     mean: Array
     covariance: Array

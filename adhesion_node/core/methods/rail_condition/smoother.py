@@ -52,7 +52,7 @@ class Smoothed(NamedTuple):
 
 
 class Posterior(NamedTuple):
-    """What a window leaves: the joint law of its last state and kappa, and the evidence for its speed law."""
+    """What a window leaves: the joint belief of its last state and kappa, and the evidence for its speed law."""
 
     belief: Belief
     log_evidence: float
@@ -91,7 +91,7 @@ def smooth(problem: Problem, search: KappaSearch, near: Array | None = None) -> 
 
 
 def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
-    """Joint law of the last state and kappa, and evidence, of a window or the beginning of one.
+    """Joint belief of the last state and kappa, and evidence, of a window or the beginning of one.
 
     `smoothed` may be of a longer window: then it is where the beginning is linearised and weighted, with hindsight,
     but the measurements behind the beginning do not enter the law. `margin` as in `Problem.normal`.
