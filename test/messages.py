@@ -14,7 +14,7 @@ from adhesion_node.nodes.ros import types
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import codecs, curves, results, topics
 from adhesion_node.wire.topics import Topic
-from sim_node.train.messages import SensorMessage
+from sim_node.train.sensors import SensorMessage
 
 
 def message_class(topic: Topic) -> type[Any]:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,10 +19,9 @@ import numpy as np
 from adhesion_node.core.physics.track import Grade, Track
 from adhesion_node.core.setting import check_settings, setting
 
-from ..train.messages import Tick, messages_of
 from ..train.run import run
 from ..train.scenario import Scenario
-from ..train.sensors import SensorSettings
+from ..train.sensors import SensorSettings, Tick, messages_of
 from . import streams
 from .streams import Change, Dose
 
@@ -66,46 +64,42 @@ def _heavy_tailed(settings: SensorSettings, dose: Dose) -> SensorSettings:
 
 _RARELY = Dose(share=0.1)
 
-FAULTS: Mapping[str, Fault] = MappingProxyType(
-    {
-        NONE: Fault("all is well"),
-        "dropout": Fault("no positions", Dose(duration_s=5.0), stream=streams.lost),
-        "loss": Fault("positions lost at random", Dose(share=0.3), stream=streams.lost),
-        "outliers": Fault("positions far off", Dose(share=0.05, size=20.0), "m", streams.outlying),
-        "burst": Fault("positions far off in a row", Dose(duration_s=1.0, size=20.0), "m", streams.outlying),
-        "heavy_tails": Fault(
-            "position noise of Student's t, the whole run", Dose(size=2.0), "degrees of freedom", sensors=_heavy_tailed
-        ),
-        "nan": Fault("additional messages with NaN", _RARELY, stream=streams.bad(value=float("nan"))),
-        "inf": Fault("additional messages with -Inf", _RARELY, stream=streams.bad(value=float("-inf"))),
-        "huge": Fault("additional messages with 1e308", _RARELY, stream=streams.bad(value=1e308)),
-        "zero_variance": Fault(
-            "additional positions with an empty covariance", _RARELY, stream=streams.bad(variance=0.0)
-        ),
-        "negative_variance": Fault(
-            "additional positions with a negative variance", _RARELY, stream=streams.bad(variance=-0.25)
-        ),
-        "late": Fault("messages that leave late", Dose(share=0.1, size=0.3), "s", streams.late),
-        "duplicates": Fault("messages sent twice", Dose(share=0.1), stream=streams.duplicated),
-        "stamps_back": Fault("stamps that jump back", Dose(size=-100.0), "s", streams.restamped),
-        "stamps_forward": Fault("stamps that jump forward", Dose(size=3600.0), "s", streams.restamped),
-        "clock_pause": Fault("stamps that stand still", Dose(duration_s=60.0), stream=streams.paused),
-        "stuck": Fault("one position again and again, freshly stamped", Dose(duration_s=10.0), stream=streams.stuck),
-        "irregular": Fault(
-            "10, 1 and 50 Hz in turn, unevenly",
-            Dose(duration_s=10.0, size=0.3),
-            "part of the period",
-            streams.irregular,
-            rate_hz=streams.FINE_HZ,
-        ),
-        "grade": Fault("a downhill grade, the whole run", Dose(size=0.005), "m/m", scenario=_graded),
-        "mass": Fault("a train of another mass", Dose(size=1.1), "times its mass", scenario=_loaded),
-        "balise_step": Fault("positions moved from one on", Dose(size=2.0), "m", streams.shifted),
-        "wrong_frame": Fault("positions in another frame", stream=streams.misframed),
-        "kmh": Fault("speeds in km/h", stream=streams.in_kmh),
-        "gauge": Fault("gauge for absolute pressures", stream=streams.gauge),
-    }
-)
+FAULTS: Mapping[str, Fault] = {
+    NONE: Fault("all is well"),
+    "dropout": Fault("no positions", Dose(duration_s=5.0), stream=streams.lost),
+    "loss": Fault("positions lost at random", Dose(share=0.3), stream=streams.lost),
+    "outliers": Fault("positions far off", Dose(share=0.05, size=20.0), "m", streams.outlying),
+    "burst": Fault("positions far off in a row", Dose(duration_s=1.0, size=20.0), "m", streams.outlying),
+    "heavy_tails": Fault(
+        "position noise of Student's t, the whole run", Dose(size=2.0), "degrees of freedom", sensors=_heavy_tailed
+    ),
+    "nan": Fault("additional messages with NaN", _RARELY, stream=streams.bad(value=float("nan"))),
+    "inf": Fault("additional messages with -Inf", _RARELY, stream=streams.bad(value=float("-inf"))),
+    "huge": Fault("additional messages with 1e308", _RARELY, stream=streams.bad(value=1e308)),
+    "zero_variance": Fault("additional positions with an empty covariance", _RARELY, stream=streams.bad(variance=0.0)),
+    "negative_variance": Fault(
+        "additional positions with a negative variance", _RARELY, stream=streams.bad(variance=-0.25)
+    ),
+    "late": Fault("messages that leave late", Dose(share=0.1, size=0.3), "s", streams.late),
+    "duplicates": Fault("messages sent twice", Dose(share=0.1), stream=streams.duplicated),
+    "stamps_back": Fault("stamps that jump back", Dose(size=-100.0), "s", streams.restamped),
+    "stamps_forward": Fault("stamps that jump forward", Dose(size=3600.0), "s", streams.restamped),
+    "clock_pause": Fault("stamps that stand still", Dose(duration_s=60.0), stream=streams.paused),
+    "stuck": Fault("one position again and again, freshly stamped", Dose(duration_s=10.0), stream=streams.stuck),
+    "irregular": Fault(
+        "10, 1 and 50 Hz in turn, unevenly",
+        Dose(duration_s=10.0, size=0.3),
+        "part of the period",
+        streams.irregular,
+        rate_hz=streams.FINE_HZ,
+    ),
+    "grade": Fault("a downhill grade, the whole run", Dose(size=0.005), "m/m", scenario=_graded),
+    "mass": Fault("a train of another mass", Dose(size=1.1), "times its mass", scenario=_loaded),
+    "balise_step": Fault("positions moved from one on", Dose(size=2.0), "m", streams.shifted),
+    "wrong_frame": Fault("positions in another frame", stream=streams.misframed),
+    "kmh": Fault("speeds in km/h", stream=streams.in_kmh),
+    "gauge": Fault("gauge for absolute pressures", stream=streams.gauge),
+}
 """The faults by name."""
 
 

@@ -17,9 +17,8 @@ import numpy as np
 
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, Topic
 
-from ..train.messages import SensorMessage, Tick
 from ..train.plant import Truth
-from ..train.sensors import ATMOSPHERE_PA
+from ..train.sensors import ATMOSPHERE_PA, SensorMessage, Tick
 
 Messages = tuple[SensorMessage, ...]
 

@@ -24,9 +24,8 @@ from adhesion_node.wire import topics
 from ..faults.plan import Plan, faulty_run, period_of
 from ..settings import SIMULATOR
 from ..train import scenario
-from ..train.messages import SensorMessage
 from ..train.plant import Truth
-from ..train.sensors import SensorSettings
+from ..train.sensors import SensorMessage, SensorSettings
 from .pace import RunNode
 
 PARAMETERS = SIMULATOR

@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from types import MappingProxyType
 
 import numpy as np
 
@@ -75,15 +74,13 @@ class SlipScenario:
         return [surface for start, surface in self.surfaces if start <= position_m or start == self.surfaces[0][0]][-1]
 
 
-SCENARIOS: Mapping[str, SlipScenario] = MappingProxyType(
-    {
-        scenario.name: scenario
-        for scenario in (
-            SlipScenario("creep_dry", ((0.0, DRY),), 40.0),
-            SlipScenario("creep_switch", ((0.0, DRY), (450.0, WET)), 90.0),
-        )
-    }
-)
+SCENARIOS: Mapping[str, SlipScenario] = {
+    scenario.name: scenario
+    for scenario in (
+        SlipScenario("creep_dry", ((0.0, DRY),), 40.0),
+        SlipScenario("creep_switch", ((0.0, DRY), (450.0, WET)), 90.0),
+    )
+}
 """The scenarios by name."""
 
 

@@ -3,6 +3,8 @@
 
 """The true train: a point mass integrated in steps of at most 10 ms, with process noise once per sample.
 
+How far it really runs until it stands, what a braking curve is held against, is integrated over speed instead.
+
 It shares the forces (`core.train`, `core.track`) with the estimator but not the motion model: this one integrates
 by the midpoint rule, so that an error in the estimator's steps shows instead of cancelling.
 """
@@ -19,13 +21,16 @@ import numpy as np
 from adhesion_node.core.physics.train import KMH, Array
 from adhesion_node.core.setting import check_settings, setting
 
-from .scenario import RUN_ON_S, Scenario
+from .scenario import RUN_ON_S, Rail, Scenario
 
 SUBSTEP_S = 0.01
 """Longest step of the integration."""
 
 REFERENCE_PERIOD_S = 0.1
 """Period to which the noise of `PlantNoise` belongs."""
+
+STOPPING_STEPS = 500
+"""Equal steps of speed to a standstill: 1 cm off the simulated way on one rail, 0.2 % where a patch lies ahead."""
 
 COASTING, BRAKE_LIMITED, ADHESION_LIMITED = "COASTING", "BRAKE_LIMITED", "ADHESION_LIMITED"
 """The regimes, named as the estimator's."""
@@ -120,6 +125,23 @@ def advance(
     return position_m, speed_mps
 
 
+def stopping_distances(scenario: Scenario, position_m: Array, speed_mps: Array) -> Array:
+    """Distances, m, shape (N,), from N places and speeds to a standstill under the scenario's full brake.
+
+    ds = v dv/a(s, v) by the midpoint rule at the places that the train passes, without process noise. The brake is
+    taken as built up, as a braking curve takes it.
+    """
+    step = speed_mps / STOPPING_STEPS
+    place = np.array(position_m, dtype=np.float64)
+    for k in range(STOPPING_STEPS):
+        speed = speed_mps - k * step
+        middle = place + step / 2 * speed / _slowing(scenario, place, speed)
+        speed = speed - step / 2
+        place = place + step * speed / _slowing(scenario, middle, speed)
+    result: Array = place - position_m
+    return result
+
+
 def _deceleration(scenario: Scenario, time_s: float, position_m: float, speed_mps: float) -> float:
     """Deceleration, m/s^2: none before the brake, where traction balances the resistance and holds the speed."""
     if time_s < scenario.brake.start_s:
@@ -129,7 +151,7 @@ def _deceleration(scenario: Scenario, time_s: float, position_m: float, speed_mp
     return float(scenario.train.deceleration(mu, brake, _resistance(scenario, position_m, speed_mps)))
 
 
-def _resistance(scenario: Scenario, position_m: float, speed_mps: float) -> Array:
+def _resistance(scenario: Scenario, position_m: float | Array, speed_mps: float | Array) -> Array:
     """Resistance of train and track per weight, N/N (5)."""
     running = scenario.train.specific_resistance(np.asarray(speed_mps))
     return running + scenario.track.specific_resistance(np.asarray(position_m))
@@ -146,3 +168,17 @@ def _truth(scenario: Scenario, t_ns: int, position_m: float, speed_mps: float) -
     applied = float(scenario.train.used_adhesion(mu, brake, _resistance(scenario, position_m, speed_mps)))
     regime = BRAKE_LIMITED if applied < mu else ADHESION_LIMITED
     return Truth(t_ns, position_m, speed_mps, mu, applied, pressure, regime)
+
+
+def _slowing(scenario: Scenario, position_m: Array, speed_mps: Array) -> Array:
+    """Deceleration under the full brake, m/s^2, shape (N,)."""
+    brake = scenario.train.specific_brake(scenario.brake.pressure_pa)
+    resistance = _resistance(scenario, position_m, speed_mps)
+    return scenario.train.deceleration(_adhesion(scenario.rail, position_m, speed_mps), brake, resistance)
+
+
+def _adhesion(rail: Rail, position_m: Array, speed_mps: Array) -> Array:
+    """Adhesion at N places and speeds, shape (N,)."""
+    starts = np.array([start for start, _ in rail.laws])
+    of_place = np.maximum(np.searchsorted(starts, position_m, side="right") - 1, 0)
+    return np.choose(of_place, [law(speed_mps) for _, law in rail.laws])

@@ -10,7 +10,6 @@ from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from types import MappingProxyType
 
 import numpy as np
 
@@ -163,7 +162,7 @@ _ALL = (
     _braking("long_braking", 300, 100, (0.0, replace(WET, scale=0.25)), end_s=400.0),
 )
 
-SCENARIOS: Mapping[str, Scenario] = MappingProxyType({scenario.name: scenario for scenario in _ALL})
+SCENARIOS: Mapping[str, Scenario] = {scenario.name: scenario for scenario in _ALL}
 """The scenarios by name."""
 
 

@@ -11,11 +11,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from adhesion_node.core.setting import check_settings, setting
+from adhesion_node.wire.codecs import FRAME, New
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, WHEEL_SPEED, Topic
 
 from .plant import ADHESION_LIMITED, Truth
 
@@ -69,6 +71,23 @@ class Reading(NamedTuple):
     """Angular speed of each axle group."""
 
 
+class SensorMessage(NamedTuple):
+    """One message: `values` in SI units, one for every axle group and else a single one."""
+
+    topic: Topic
+    t_ns: int
+    values: tuple[float, ...]
+    variance: float
+    frame: str = FRAME
+
+    def build(self, new: New) -> Any:
+        """Build the message, with all that a fault has made of it."""
+        return self.topic.build(new, self.t_ns, self.values, self.variance, self.frame)
+
+
+Tick = tuple[Truth, tuple[SensorMessage, ...]]
+
+
 def measure(truth: Truth, settings: SensorSettings, rng: np.random.Generator) -> Reading:
     """Measure one true sample, the wheels apart.
 
@@ -101,3 +120,20 @@ def wheel_speeds(truth: Truth, radius_m: float, std_radps: float, rng: np.random
         creep = SLIDING_LOW + (SLIDING_HIGH - SLIDING_LOW) * share
     measured = truth.speed_mps * (1.0 - creep) / radius_m + std_radps * sensor
     return tuple(measured.tolist())
+
+
+def messages_of(reading: Reading, settings: SensorSettings) -> tuple[SensorMessage, ...]:
+    """Return the messages of a reading in the order of publishing; the position completes the sample."""
+    shown = (
+        (BRAKE_PRESSURE, (reading.pressure_pa,), settings.pressure_std_pa),
+        (SPEED, _single(reading.speed_mps), settings.speed_std_mps),
+        (WHEEL_SPEED, reading.wheel_radps, settings.wheel_speed_std_radps),
+        (POSITION, _single(reading.position_m), settings.position_std_m),
+    )
+    return tuple(
+        SensorMessage(topic, reading.t_ns, values, std**2) for topic, values, std in shown if values is not None
+    )
+
+
+def _single(value: float | None) -> tuple[float, ...] | None:
+    return None if value is None else (value,)

@@ -31,9 +31,8 @@ from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import setup_of
 from sim_node.faults.plan import Plan, faulty_run
-from sim_node.train.messages import SensorMessage, Tick
 from sim_node.train.scenario import find
-from sim_node.train.sensors import SensorSettings
+from sim_node.train.sensors import SensorMessage, SensorSettings, Tick
 
 SENSORS = SensorSettings(speed_std_mps=0.3)
 MakeLine = Callable[..., Line]

@@ -12,9 +12,8 @@ import pytest
 
 from adhesion_node.study.robust.cases import FAULTS as CASES
 from adhesion_node.study.robust.cases import Case
-from sim_node.train.plant import advance
+from sim_node.train.plant import advance, stopping_distances
 from sim_node.train.scenario import SCENARIOS
-from sim_node.train.stopping import stopping_distances
 
 FAULTS = (
     *("no positions for 30 s", "30 % of the positions lost", "5 % outliers of 20 m", "Student t, 2 degrees of freedom"),

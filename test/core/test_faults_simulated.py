@@ -23,9 +23,8 @@ from adhesion_node.wire import topics
 from sim_node.faults.plan import FAULTS, Plan, faulty_run, period_of
 from sim_node.faults.streams import RATES_HZ
 from sim_node.nodes.simulator import Simulator
-from sim_node.train.messages import SensorMessage, Tick
 from sim_node.train.scenario import find
-from sim_node.train.sensors import SensorSettings
+from sim_node.train.sensors import SensorMessage, SensorSettings, Tick
 
 S = 10**9
 SETTINGS = SensorSettings(speed_std_mps=0.1, wheel_speed_std_radps=0.1)

@@ -24,7 +24,7 @@ from test_two_processes import PATIENCE_S, QUICK, Operator, Program
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
-from sim_node.train.messages import Tick
+from sim_node.train.sensors import Tick
 
 
 @pytest.fixture

@@ -123,19 +123,15 @@ HEAD = (
 )
 
 
-def _std_after(kmh: int) -> Column:
-    return Column(f"{kmh}", 5, ".2f", lambda row: row["std_percent"][str(kmh)])
-
-
-def _lost(head: str, share: str) -> Column:
-    return Column(head, 5, ".1f", lambda row: row["lost_kmh"][share])
+def _figure(group: str, name: str, head: str, form: str) -> Column:
+    return Column(head, 5, form, lambda row: row[group][name])
 
 
 COLUMNS = (
     Column("scenario", 12, "", "scenario"),
     Column("sigma m", 7, "g", "sigma_m"),
     Column("speed to km/h", 13, "g", "speed_std_kmh"),
-    *map(_std_after, LOST_KMH),
+    *(_figure("std_percent", f"{kmh}", f"{kmh}", ".2f") for kmh in LOST_KMH),
     Column("error", 5, ".2f", "mean_error_percent"),
-    *(_lost(*named) for named in (("mean", "mean"), ("half", "half"), ("95 %", "most"))),
+    *(_figure("lost_kmh", name, head, ".1f") for name, head in (("mean", "mean"), ("half", "half"), ("most", "95 %"))),
 )

@@ -108,26 +108,17 @@ def identify(config: CreepConfig, data: Data, noise: Array | None = None) -> Tra
     return Trace(thetas, recursion)
 
 
-def used_fraction(found: Array, truth: float) -> Array:
-    """Share of the samples, per run, after which the estimate stays within `BAND` of the truth to the last one.
+def fractions(found: Array, truth: float) -> tuple[Array, Array]:
+    """Shares of the samples, per run, after which the estimate is within `BAND` of the truth for good, and first.
 
-    >>> used_fraction(np.array([[9.0], [1.0], [9.0], [1.0], [1.01]]), 1.0).tolist()
-    [0.6]
+    >>> for_good, first = fractions(np.array([[9.0], [1.0], [9.0], [1.0], [1.01]]), 1.0)
+    >>> for_good.tolist(), first.tolist()
+    ([0.6], [0.2])
     """
     wrong = np.abs(found - truth) > BAND * truth
-    since = np.where(wrong.any(axis=0), wrong.shape[0] - np.argmax(wrong[::-1], axis=0), 0)
-    return np.asarray(since / wrong.shape[0])
-
-
-def first_fraction(found: Array, truth: float) -> Array:
-    """Share of the samples, per run, after which the estimate is within `BAND` of the truth for the first time.
-
-    >>> first_fraction(np.array([[9.0], [1.0], [9.0], [1.0], [1.01]]), 1.0).tolist()
-    [0.2]
-    """
-    wrong = np.abs(found - truth) > BAND * truth
+    for_good = np.where(wrong.any(axis=0), wrong.shape[0] - np.argmax(wrong[::-1], axis=0), 0)
     first = np.where(wrong.all(axis=0), wrong.shape[0], np.argmin(wrong, axis=0))
-    return np.asarray(first / wrong.shape[0])
+    return for_good / wrong.shape[0], first / wrong.shape[0]
 
 
 def peak_row(name: str, truth: float, found: Array, used: float) -> dict[str, Any]:

@@ -120,10 +120,10 @@ def row_of(name: str, experiment: he.Experiment, theta: Array) -> dict[str, Any]
         row = he.peak_row(name, he.DRY_PEAK, found[round(samples * share) - 1], share)
         return row | {"creep_used": he.ENOUGH, "samples": samples}
     before, after = found[samples // 2 : samples], found[samples:]
-    used = he.used_fraction(after, he.WET_PEAK)
+    used, first = he.fractions(after, he.WET_PEAK)
     return he.peak_row(name, he.WET_PEAK, after[-1], float(np.mean(used))) | {
         "used_fraction_5_to_95": np.quantile(used, [0.05, 0.95]).tolist(),
-        "first_fraction": float(np.mean(he.first_fraction(after, he.WET_PEAK))),
+        "first_fraction": float(np.mean(first)),
         "std_before_switch": float(np.mean(np.std(before, axis=0))),
         "samples": samples,
     }

@@ -6,8 +6,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 from sim_node.faults.plan import Plan, period_of
@@ -47,11 +45,9 @@ class Case(NamedTuple):
         return Case("without a fault", self.world.without_fault, self.estimator)
 
     @property
-    def head(self) -> Mapping[str, str]:
+    def head(self) -> dict[str, str]:
         """Names for the case's row."""
-        return MappingProxyType(
-            {"case": self.name, "scenario": self.world.scenario, "method": self.estimator.config.method}
-        )
+        return {"case": self.name, "scenario": self.world.scenario, "method": self.estimator.config.method}
 
     def trials(self, runs: int) -> Trials:
         """Its runs."""

@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ...core.physics.train import Array
@@ -25,7 +24,6 @@ def panels(path: Path, title: str, count: int, size: tuple[float, float] = (8.0,
     """Give the axes of a picture of `count` panels of a size, inches; it is written when the block is done."""
     width, height = size
     figure = Figure(figsize=(width, height * count + 0.5), layout="constrained")
-    FigureCanvasAgg(figure)
     figure.suptitle(title)
     axes = list(figure.subplots(count, squeeze=False)[:, 0])
     for axis in axes:

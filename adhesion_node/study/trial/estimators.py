@@ -160,12 +160,10 @@ class Way(NamedTuple):
     """In a task; side by side so many still stand in a processor's cache."""
 
 
-WAYS: Mapping[str, Way] = MappingProxyType(
-    {
-        "pipeline": Way(_one_by_one(_by_pipeline), 8.0, 10),
-        "core": Way(_one_by_one(_by_core), 6.0),
-        "ekf": Way(_one_by_one(_by_ekf), 1.0),
-        "lockstep": Way(_in_lockstep, 12.0),
-    }
-)
+WAYS: Mapping[str, Way] = {
+    "pipeline": Way(_one_by_one(_by_pipeline), 8.0, 10),
+    "core": Way(_one_by_one(_by_core), 6.0),
+    "ekf": Way(_one_by_one(_by_ekf), 1.0),
+    "lockstep": Way(_in_lockstep, 12.0),
+}
 """By name."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Hashable, Iterable, Sequence
+from collections.abc import Hashable, Iterable
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -119,17 +119,16 @@ def grouped(wanted: Iterable[tuple[Key, Trials]], where: Running) -> dict[Key, R
     parts: dict[Key, list[Arrays]] = {}
     for (key, _), found in zip(tasks, run_all([task for _, task in tasks], where), strict=True):
         parts.setdefault(key, []).append(found)
-    return {key: _together(some) for key, some in parts.items()}
+    return {
+        key: Results(*(np.concatenate([part[name] for part in some]) for name in Results._fields))
+        for key, some in parts.items()
+    }
 
 
 def each_trial(rows: Rows) -> list[Rows]:
     """Divide rows by their trials."""
     ends = np.flatnonzero((np.diff(rows["seed"]) != 0) | (np.diff(rows["start"]) != 0)) + 1
     return np.split(rows, ends) if rows.size else []
-
-
-def _together(parts: Sequence[Arrays]) -> Results:
-    return Results(*(np.concatenate([part[name] for part in parts]) for name in Results._fields))
 
 
 def _arrays(lane: Lane, result: LaneResult) -> Arrays:

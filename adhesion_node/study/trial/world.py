@@ -8,15 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from types import MappingProxyType
 from typing import NamedTuple
 
 from sim_node.faults.plan import FAULTS, NONE, Plan, faulty_run
-from sim_node.train.messages import SensorMessage, Tick
-from sim_node.train.plant import Truth
+from sim_node.train.plant import Truth, stopping_distances
 from sim_node.train.scenario import find
-from sim_node.train.sensors import SensorSettings
-from sim_node.train.stopping import stopping_distances
+from sim_node.train.sensors import SensorMessage, SensorSettings, Tick
 
 from ...core import Config, Measurement, Sample
 from ...core.estimator import paired
@@ -100,7 +97,7 @@ def simulate(world: World, seed: int) -> SimulatedRun:
             born.setdefault(message.t_ns, truth)
         sent.append(Sent(truth.t_ns * 1e-9, tuple(map(_received, messages))))
     samples = (sample for _, received in sent for sample in received if not isinstance(sample, Refusal))
-    return SimulatedRun(world, seed, tuple(sent), tuple(paired(Config(), samples)), MappingProxyType(born))
+    return SimulatedRun(world, seed, tuple(sent), tuple(paired(Config(), samples)), born)
 
 
 def _received(message: SensorMessage) -> Sample | Refusal:

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import MappingProxyType
 
 from sim_node.train.sensors import SensorSettings
 
@@ -26,14 +25,12 @@ NOMINAL_SIGMA_M = 0.5
 PAPER = Config(method="particle_em", window=50, step=10, particles=20, iterations=50)
 """The paper's settings at the nominal noise, those of every method in the tables."""
 
-METHODS: Mapping[str, Estimator] = MappingProxyType(
-    {
-        "rail_condition": Estimator(replace(PAPER, method="rail_condition"), "core"),
-        "particle_em": Estimator(PAPER, "lockstep"),
-        "ekf_tuned": Estimator(PAPER, "ekf", TUNED),
-        "ekf_naive": Estimator(PAPER, "ekf", NAIVE),
-    }
-)
+METHODS: Mapping[str, Estimator] = {
+    "rail_condition": Estimator(replace(PAPER, method="rail_condition"), "core"),
+    "particle_em": Estimator(PAPER, "lockstep"),
+    "ekf_tuned": Estimator(PAPER, "ekf", TUNED),
+    "ekf_naive": Estimator(PAPER, "ekf", NAIVE),
+}
 """By the name that stands in tables and JSON."""
 
 

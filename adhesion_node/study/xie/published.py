@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import NamedTuple
 
 from ...core.physics.adhesion import WET, AdhesionLaw
@@ -28,26 +27,24 @@ class Printed(NamedTuple):
 START_OF_MEAN = "mean"
 """Stands for a table's last line, the mean over the starts."""
 
-TABLES: Mapping[str, Mapping[float | str, Printed]] = MappingProxyType(
-    {
-        "tunnel_entry": {  # Table 2
-            0.0: Printed(0.0017, 2.0907, 0.0129, 13.7828),
-            0.03: Printed(0.0011, 1.3984, 0.0078, 9.9778),
-            0.05: Printed(0.0009, 1.2802, 0.0081, 10.7114),
-            0.09: Printed(0.0016, 2.1527, 0.0079, 10.1600),
-            0.12: Printed(0.0023, 2.4306, 0.0137, 15.5428),
-            START_OF_MEAN: Printed(0.0015, 1.8705, 0.0101, 12.0350),
-        },
-        "tunnel_exit": {  # Table 3
-            0.0: Printed(0.0011, 1.2338, 0.0117, 13.8956),
-            0.03: Printed(0.0012, 1.4101, 0.0120, 14.4391),
-            0.05: Printed(0.0017, 2.0780, 0.0095, 11.4757),
-            0.09: Printed(0.0021, 2.5633, 0.0096, 11.4356),
-            0.12: Printed(0.0015, 1.7995, 0.0121, 14.3814),
-            START_OF_MEAN: Printed(0.0015, 1.8169, 0.0110, 13.1255),
-        },
-    }
-)
+TABLES: Mapping[str, Mapping[float | str, Printed]] = {
+    "tunnel_entry": {  # Table 2
+        0.0: Printed(0.0017, 2.0907, 0.0129, 13.7828),
+        0.03: Printed(0.0011, 1.3984, 0.0078, 9.9778),
+        0.05: Printed(0.0009, 1.2802, 0.0081, 10.7114),
+        0.09: Printed(0.0016, 2.1527, 0.0079, 10.1600),
+        0.12: Printed(0.0023, 2.4306, 0.0137, 15.5428),
+        START_OF_MEAN: Printed(0.0015, 1.8705, 0.0101, 12.0350),
+    },
+    "tunnel_exit": {  # Table 3
+        0.0: Printed(0.0011, 1.2338, 0.0117, 13.8956),
+        0.03: Printed(0.0012, 1.4101, 0.0120, 14.4391),
+        0.05: Printed(0.0017, 2.0780, 0.0095, 11.4757),
+        0.09: Printed(0.0021, 2.5633, 0.0096, 11.4356),
+        0.12: Printed(0.0015, 1.7995, 0.0121, 14.3814),
+        START_OF_MEAN: Printed(0.0015, 1.8169, 0.0110, 13.1255),
+    },
+}
 """By scenario and start."""
 
 

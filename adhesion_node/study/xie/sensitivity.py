@@ -72,13 +72,10 @@ def _changed(method: str, runs: int, setting: str, value: Any) -> Trials:
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing and return a line per setting and value."""
     found = grouped(variations(options.runs), running(options))
-    table = [_row(*line, score(of_line)) for line, of_line in found.items()]
+    table = [dict(zip(("setting", "value", "method"), line, strict=True)) | score(some) for line, some in found.items()]
+    for row in table:
+        row["lower_bound_holds"] = row["lower_bound_holds_scored"]
     return table, "\n".join(_text(table))
-
-
-def _row(setting: str, value: float, method: str, of_line: dict[str, Any]) -> dict[str, Any]:
-    holds = of_line["lower_bound_holds_scored"]
-    return {"setting": setting, "value": value, "method": method, **of_line, "lower_bound_holds": holds}
 
 
 def _text(table: list[dict[str, Any]]) -> Iterator[str]:

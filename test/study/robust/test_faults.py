@@ -23,8 +23,7 @@ from adhesion_node.study.trial.world import World, ticks
 from adhesion_node.wire.codecs import Rejected, plain
 from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import FAULTS, Plan
-from sim_node.train.messages import SensorMessage
-from sim_node.train.sensors import SensorSettings
+from sim_node.train.sensors import SensorMessage, SensorSettings
 
 ALL_SENSORS = SensorSettings(speed_std_mps=0.3, wheel_speed_std_radps=0.1)
 STEP = Case("a fault from 10 to 12 s", World("tunnel_entry", plan=Plan("dropout", 10.0, 2.0), lasts_s=2.0))
