@@ -1,5 +1,4 @@
-// Copyright 2026 the adhesion_node authors
-// SPDX-License-Identifier: Apache-2.0
+// Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 // Reads a recording with @mcap/core, by its index and from end to end, and compares with its metadata.yaml:
 // the files, and the messages of every topic. Usage: node read_with_mcap_core.mjs BAG, beside an installed

@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Start the colcon-built estimator as `ros2 run` would, wait until it listens, stop it with SIGINT.
 
 Usage: run_installed.py INSTALL, with INSTALL/setup.bash sourced.
 """
-
-from __future__ import annotations
 
 import os
 import signal

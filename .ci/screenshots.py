@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Take the pictures of the pages, doc/pictures/live.png and report.png, in a real browser.
 
 Usage: PYTHONPATH=.:test python .ci/screenshots.py, with the extras `ros`, `live` and `test`, and with chromium. Takes
 about a minute: the live page is that of `demo --live`, 45 s after its start.
 """
-
-from __future__ import annotations
 
 import signal
 import socket

@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The nodes as programs: signals are taken over first, then the node's module, with numpy and ROS, is imported.
 
 So a Ctrl-C ends a program that is still importing as cleanly as one that spins.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from importlib import import_module

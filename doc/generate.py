@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Writes the generated parts of the documentation: tables of parameters, topics and faults, and of what was measured.
 
@@ -10,8 +9,6 @@
 A part stands between `<!-- generated: NAME -->` and `<!-- end -->`. Parameters, topics and faults come from the code;
 what was measured comes from doc/evidence/*.json, the JSON of the commands in doc/evidence/made_by.json.
 """
-
-from __future__ import annotations
 
 import argparse
 import re

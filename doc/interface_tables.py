@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Tables of what the package offers to ROS, out of its declarations: parameters by node, topics, faults."""
-
-from __future__ import annotations
 
 import ast
 from collections.abc import Iterable, Iterator, Sequence

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The settings of the simulators by name."""
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType

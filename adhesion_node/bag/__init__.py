@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Recordings: rosbag2 directories of MCAP files, written so that an interrupted one stays readable."""
-
-from __future__ import annotations
 
 from .reader import BagReader
 from .recordings import Record

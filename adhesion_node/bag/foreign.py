@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Recordings in rosbag2's other forms (sqlite3, compressed files or messages), read through rosbags."""
-
-from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence

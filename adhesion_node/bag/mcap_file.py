@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Reads one MCAP file whether or not its recording was finished.
 
@@ -7,8 +6,6 @@ The index at the end of a file is missing when the recorder died, so it is not u
 finds the blocks (chunks, or single messages outside of chunks), the topics and the first place that is damaged.
 Messages are then read block by block, one block at a time in memory.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator

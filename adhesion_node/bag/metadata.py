@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """metadata.yaml of rosbag2: written in version 9, as ROS 2 Jazzy does, and what is read of any version."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from io import StringIO

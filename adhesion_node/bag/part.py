@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """One MCAP file while it is written: cut into chunks, with room set aside on the disk for all that has to follow.
 
 A chunk is complete on the disk or not there at all, so what a killed process leaves is a row of complete chunks. The
 room is set aside before a message is taken: the disk may fill up at any time, the file can still be ended properly.
 """
-
-from __future__ import annotations
 
 import json
 import os

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Reads a recording: a rosbag2 directory or a single file, finished or not, in the order of log time."""
-
-from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A recording of one or more files as one stream of records in the order of (log time, arrival)."""
-
-from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Which topics of a recording stand for which of ours: remapping, and clear words when they do not fit."""
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 

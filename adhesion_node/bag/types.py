@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Message classes, CDR and message definitions of ROS 2 Jazzy, without an installed ROS."""
-
-from __future__ import annotations
 
 import re
 from functools import cache

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Writes a recording: a rosbag2 directory with one or several MCAP files and metadata.yaml beside them."""
-
-from __future__ import annotations
 
 import errno
 import math

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`bench`: speed, ours beside its peers in one run."""
-
-from __future__ import annotations
 
 import argparse
 import os

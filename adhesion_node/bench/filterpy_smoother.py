@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The window through `filterpy` (R. Labbe): its Kalman filter and RTS smoother, step by step."""
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

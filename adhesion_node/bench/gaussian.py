@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Gaussian update of one window: ours as one banded system beside an RTS loop of `filterpy`.
 
 Both look for a constant adhesion of which nothing is known before. Ours ends with the law of the last state, which
 the next window wants; filterpy's RTS pass is timed alone, inside 50 EM iterations and inside as many as EM takes.
 """
-
-from __future__ import annotations
 
 import math
 from functools import partial

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Particle E and M step of one window: ours, with exact pairwise smoothing, beside the package `particles`.
 
@@ -7,8 +6,6 @@ All use the same model, window, number of particles and M-step; ours is prepared
 The peers draw trajectories where ours has weights; that all of them smooth to the same speeds, within their
 Monte-Carlo error, is part of the table.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The window as a model of the package `particles` (N. Chopin), and its two smoothers by backward sampling."""
-
-from __future__ import annotations
 
 from typing import Any
 

@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What the benchmarks run on: a window of braking for the smoothers, and a long journey for the estimator.
 
 Drawn from the estimator's own model, which all contenders share.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`step` on the way that live node and replay share: latency in steady braking, headroom at 100 Hz, memory."""
-
-from __future__ import annotations
 
 import time
 from collections.abc import Iterable

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Timing side by side: after a warm-up the contenders take turns, so that whatever else the machine does hits all."""
-
-from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence

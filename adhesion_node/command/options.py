@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What the command line tools share: --help, --json, completion, exit codes, errors in one line, progress."""
-
-from __future__ import annotations
 
 import argparse
 import json

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """SIGINT and SIGTERM as a request to stop. Standard library alone, so that it is there before anything heavy is."""
-
-from __future__ import annotations
 
 import signal
 from collections.abc import Iterator

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Configuration of the estimator: one frozen dataclass whose fields carry their own description, unit and range."""
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass

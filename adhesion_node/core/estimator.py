@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The one way in, live and offline: `init`, `step` for every sample, `finish` at the end of the data.
 
@@ -7,8 +6,6 @@ A sample passes the gate for time, which pairs it into a measurement; that is ju
 present braking; every L accepted measurements give an `Estimate`. Randomness comes from the seed and the window's
 number alone, so the same samples give the same bits whoever feeds them.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from statistics import median

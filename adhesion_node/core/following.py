@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What one measurement in its turn does: it is judged, the train is followed with it, the window grows or ends."""
-
-from __future__ import annotations
 
 import math
 

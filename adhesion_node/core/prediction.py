@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What a consumer brakes by: an estimate with its two braking curves."""
-
-from __future__ import annotations
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Settings: what is declared once feeds checks, ROS parameters, parameter files, command lines and documentation.
 
 A dataclass declares its settings as fields made by `setting`; `settings_of` lists them.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`live`: a page in the browser that shows the run while the nodes run, at 10 Hz."""
-
-from __future__ import annotations
 
 import argparse
 import sys

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The node behind the live page: subscribes to what the other nodes say and keeps a `View` of it.
 
@@ -7,8 +6,6 @@
 
     position, brake_pressure, speed, adhesion/*, atp/status, /diagnostics, truth/mu  ->  a page in the browser
 """
-
-from __future__ import annotations
 
 import time
 from collections.abc import Callable

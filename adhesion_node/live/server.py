@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The web server of the live page, in a thread of its own: the page itself and one stream of events for each viewer."""
-
-from __future__ import annotations
 
 import asyncio
 import threading

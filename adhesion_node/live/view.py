@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What the live page shows at present, kept from the messages as they come: plain values, no ROS and no clock.
 
 The parts are replaced as a whole and never changed in place, so that another thread may read them at any time.
 """
-
-from __future__ import annotations
 
 import math
 from collections import deque

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The ATP monitor: supervises a target with the braking curve and says what has to be done.
 
@@ -10,8 +9,6 @@
 It judges at each state. Two watchdogs judge when no state comes, because silence is no message: one on the ROS clock,
 and one on the machine's own for the case that the ROS clock stands still.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence

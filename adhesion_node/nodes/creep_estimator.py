@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The creep estimator: wheel speeds, train speed and traction force in, the peak of the creep curve out.
 
@@ -10,8 +9,6 @@
 
 Nothing is published on creep/* while the data cannot tell the peak; /diagnostics says why.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any

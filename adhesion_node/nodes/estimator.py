@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The estimator: position and brake pressure in, adhesion with its bound and the braking curves out.
 
@@ -8,8 +7,6 @@
     position, brake_pressure, speed, wheel_speed  ->  adhesion/*, /diagnostics
     ~/reset, ~/set_enabled                            services
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any

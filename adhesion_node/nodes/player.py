@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Publishes the sensor topics of a recording with /clock; `replay` is the program around it."""
-
-from __future__ import annotations
 
 import math
 import time

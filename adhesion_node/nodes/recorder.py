@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Records every topic of the package into a rosbag2 directory that stays readable if the recorder dies."""
-
-from __future__ import annotations
 
 import argparse
 import math

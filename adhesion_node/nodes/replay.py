@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Replays a recording: to topics with /clock, or with --offline straight through the estimator."""
-
-from __future__ import annotations
 
 import argparse
 import sys

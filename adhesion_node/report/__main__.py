@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`report BAG`: what a recording shows, as one HTML page that needs no network, and as PNG and PDF pictures.
 
 A recording that holds the results of the estimator is shown as recorded; of one that holds sensor messages alone the
 results are estimated first, with --set and --params. Several recordings stand side by side.
 """
-
-from __future__ import annotations
 
 import argparse
 import sys

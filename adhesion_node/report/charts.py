@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The charts of a run over time, the same in its picture and on its page: lines and ranges."""
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A run as plain numbers for the charts of a page: series over time and the braking curves of every moment."""
-
-from __future__ import annotations
 
 import math
 from typing import Any, NamedTuple

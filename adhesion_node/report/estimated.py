@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The run of a recording that holds sensor messages alone: what the estimator makes of them, offline."""
-
-from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any

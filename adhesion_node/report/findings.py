@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What a run shows, in numbers: how the adhesion was identified and what braking distance that saves."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any, NamedTuple

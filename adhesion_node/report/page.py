@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The report as one HTML page: findings, charts with a slider, drops, diagnostics, parameters and versions."""
-
-from __future__ import annotations
 
 import platform
 from collections.abc import Callable, Iterable, Mapping, Sequence

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """One picture of a recorded run: adhesion with its bound, speed, forces, braking distances and braking curves."""
-
-from __future__ import annotations
 
 from pathlib import Path
 from typing import Any

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A recorded run as series over time: what its pictures, tables and pages are made from."""
-
-from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from itertools import groupby

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A small table of a recorded run: what was identified at a few speeds, and the braking distances that follow."""
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`replay --offline --estimator creep`: a recording straight through the creep identification, without ROS."""
-
-from __future__ import annotations
 
 import argparse
 import math

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What every pipeline does: step an estimator of the core, count what is dropped, digest what comes out."""
-
-from __future__ import annotations
 
 import hashlib
 from abc import ABC, abstractmethod

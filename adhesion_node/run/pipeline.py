@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The way of a sample to an estimate of the adhesion with its braking curves, the same live and offline."""
-
-from __future__ import annotations
 
 import struct
 from functools import partial

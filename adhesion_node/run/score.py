@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """How good the estimates of a run are against the simulator's truth."""
-
-from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study NAME`: reproduces the figures of the papers."""
-
-from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Rows of a CSV log as measurements in SI units, and a reason with a remedy for each row that is none."""
-
-from __future__ import annotations
 
 import csv
 import re

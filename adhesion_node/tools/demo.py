@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`demo`: simulator, estimator, ATP monitor and recorder in one process, then the result.
 
 Leaves a recording and a picture and prints what was identified. It runs as fast as it can, or with --live at real time
 and with a page in the browser.
 """
-
-from __future__ import annotations
 
 import argparse
 import sys

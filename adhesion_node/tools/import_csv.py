@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Turns a CSV log into a recording: one row becomes a position and, where given, a brake pressure and a speed."""
-
-from __future__ import annotations
 
 import argparse
 import sys

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The whole line in one process: simulator, estimator, ATP monitor and recorder, with a simulated clock.
 
@@ -7,8 +6,6 @@ The clock waits until all nodes have taken what they were sent, and no node watc
 depends neither on the machine's speed nor on the order in which the executor turns to the nodes: equal runs leave equal
 recordings.
 """
-
-from __future__ import annotations
 
 import time
 from collections import Counter

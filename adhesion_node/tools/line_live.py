@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The line at real time with a page in the browser, until Ctrl-C."""
-
-from __future__ import annotations
 
 import time
 from collections.abc import Callable

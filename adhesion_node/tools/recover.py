@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Rewrites an interrupted or damaged recording as a complete one that every reader opens."""
-
-from __future__ import annotations
 
 import argparse
 import sys

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Self-contained HTML pages: style, scripts and data stand in the page, nothing is fetched from elsewhere."""
-
-from __future__ import annotations
 
 import json
 from importlib.resources import files

@@ -1,5 +1,4 @@
-// Copyright 2026 the adhesion_node authors
-// SPDX-License-Identifier: Apache-2.0
+// Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
 // Line charts in SVG, the same for the report and the live page. Colours and dashes are classes of style.css, so that

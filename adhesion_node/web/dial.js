@@ -1,5 +1,4 @@
-// Copyright 2026 the adhesion_node authors
-// SPDX-License-Identifier: Apache-2.0
+// Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
 // The speed dial in the manner of a driver-machine interface: bands up to the permitted speed, to the service brake's

@@ -1,5 +1,4 @@
-// Copyright 2026 the adhesion_node authors
-// SPDX-License-Identifier: Apache-2.0
+// Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
 // The live page: a stream of events brings what has changed, and only what hangs on it is drawn anew.

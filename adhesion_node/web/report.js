@@ -1,5 +1,4 @@
-// Copyright 2026 the adhesion_node authors
-// SPDX-License-Identifier: Apache-2.0
+// Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
 // The report: a column of charts for every run, and one slider that moves the present through all of them.

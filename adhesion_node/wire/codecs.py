@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What the codecs of all topics share: stamps, headers, the line's frame and air, and why a message is refused.
 
 A message is read from any object with its fields: rclpy's, what rosbags reads from a file, a plain one. It is made by
 a `New`: of rclpy's classes (nodes/ros/types.py), of those of rosbags (bag/types.py), or as a `plain` object.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable

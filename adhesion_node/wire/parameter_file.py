@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """ROS parameter files: whom their sections are for, and what they give an offline estimator.
 
@@ -7,8 +6,6 @@ A section is for the nodes that its name matches: `*` stands for one part of a f
 number of them, and a name without namespace for the node in the root. Of several sections for a node the later one
 wins, parameter by parameter, as in ROS.
 """
-
-from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

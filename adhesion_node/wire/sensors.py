@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The codecs of the sensors: messages to samples, and numbers to the fields of messages.
 
 The writers are alike: stamp, the sensor's numbers in the unit of the message, their variance (0 = unknown), frame.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any

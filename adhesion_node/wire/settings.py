@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The nodes' settings by name: what ROS parameters, parameter files, command lines and pages have in common."""
-
-from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence

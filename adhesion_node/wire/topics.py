@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The table of topics: the one place that says a topic's name, type, role, quality of service, frame and codec.
 
 Pure data, no ROS. Names are relative, so that namespaces separate trains.
 """
-
-from __future__ import annotations
 
 from enum import Enum
 from typing import Any, NamedTuple

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The faults by name, as data: what each one does to the run, to the sensors or to their messages, and how much.
 
@@ -7,8 +6,6 @@
 
 The true run keeps its seed: with and without a fault of the sensors the train does the same.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace

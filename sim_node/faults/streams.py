@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Faults of the sensors as functions from a stream of ticks to a stream of ticks.
 
 Every function has the signature of `Change`: it takes the ticks, the `Dose` and a generator of random numbers, and
 yields the ticks with their messages changed. The truth stays what it is.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator

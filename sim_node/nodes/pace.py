@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What both simulators share: a node that publishes the samples of a run as simulated time asks for.
 
 It paces itself by the monotonic clock: with use_sim_time the node's own clock would stand still until this node
 moves it.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The simulator: publishes a scenario's sensors, its truth and /clock.
 
@@ -10,8 +9,6 @@
 
 The parameter `fault` lets something go wrong; `faults` lists what.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The slip simulator: publishes a pulling locomotive's creep sensors, the surface's truth and /clock.
 
@@ -9,8 +8,6 @@
 
 It paces itself as the simulator does.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The slip plant: a locomotive whose drive pulls until the wheels creep to the peak, eases off, and pulls again.
 
@@ -12,8 +11,6 @@ p1, p2 that are to be identified: an error in those must not cancel.
 The drive raises the torque slowly, so that the contact is in balance all the way up, and lets go quickly when an axle
 creeps to `CREEP_LIMIT`, as a slip protection does. So the creep runs from 0 to the peak again and again.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator

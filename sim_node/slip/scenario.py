@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Where a locomotive pulls: rail surfaces with their creep curves, the locomotive, and the scenarios as data."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The true train: a point mass integrated in steps of at most 10 ms, with process noise once per sample.
 
@@ -8,8 +7,6 @@ How far it really runs until it stands, what a braking curve is held against, is
 It shares the forces (`core.train`, `core.track`) with the estimator but not the motion model: this one integrates
 by the midpoint rule, so that an error in the estimator's steps shows instead of cancelling.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterator

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """One simulated run: the true train and what its sensors show, from one seed."""
-
-from __future__ import annotations
 
 from collections.abc import Iterator
 

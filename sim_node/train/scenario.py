@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Scenarios as data: how fast the train runs, where the rail changes, when it brakes, and when the run ends."""
-
-from __future__ import annotations
 
 import math
 from bisect import bisect_right

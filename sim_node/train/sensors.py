@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The sensors: position with Gaussian or heavy-tailed noise, outliers and dropouts; brake pressure; odometer.
 
 The wheels of every axle group roll with micro-creep or slide under slip protection: w r = v (1 - c), with the radius r
 and the creep c of braking, positive here.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass

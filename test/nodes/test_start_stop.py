@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A node that gets a signal at any moment, also while it still imports, ends with 0 and silently, its bag complete."""
 

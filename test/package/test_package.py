@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The package's papers agree with each other and with the tree: manifest, setup, changelog, README, scripts."""
 
@@ -180,7 +179,7 @@ def test_only_bench_imports_its_peers() -> None:
     assert {path.parent.name for path in importing} == {"bench"}
 
 
-HEAD = "# Copyright 2026 the adhesion_node authors\n# SPDX-License-Identifier: Apache-2.0\n"
+HEAD = "# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0\n"
 
 
 def test_every_python_file_states_copyright_and_license() -> None:

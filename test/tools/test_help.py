@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """--help and completion of every program, as a newcomer and a shell ask for them."""
 

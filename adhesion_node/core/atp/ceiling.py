@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """How far above an allowed speed the train is warned and braked: the ceiling limits of SUBSET-026-3, 3.13.9.2."""
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Settings of the supervision: target, delays and margins, named and defined as in SUBSET-026-3, section 3.13."""
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 

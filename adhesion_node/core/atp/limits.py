@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Supervision limits before a target, from the braking curve, in the manner of ETCS: SUBSET-026-3, section 3.13.9.
 
@@ -23,8 +22,6 @@ Simplified: one target; a line speed that is the same everywhere; the gradient a
 curve was made with; A_est and V_delta0 are parameters, not measured; no release speed, no guidance curve, no service
 brake feedback; build-up times are not reduced while the brake is already building up (A.3.12 of issue 4.0.0).
 """
-
-from __future__ import annotations
 
 from dataclasses import replace
 from typing import NamedTuple

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Supervision of a target: the present speed against the limits of `etcs`, and what has to be done.
 
@@ -9,8 +8,6 @@ missing, refused, old or not covered by the curve counts as the worst case: no d
 Simplified: an intervention, the emergency brake's too, ends where the permitted speed is kept again (as with
 Q_NVEMRRLS = 1), and from the indication there is a way back to normal.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, IntEnum

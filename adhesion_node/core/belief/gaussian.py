@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Beliefs of (s, v) and how they change while nothing is assumed of the adhesion."""
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple

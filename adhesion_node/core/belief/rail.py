@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What is known of the rail: an adhesion, its standard deviation and a lower bound, learnt and forgotten.
 
 While nothing can be seen, the knowledge ages exponentially with time and distance towards the configured
 low-adhesion law; its standard deviation grows towards that of ignorance.
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Which part of the motion can be seen, and so what is learnt of the adhesion."""
-
-from __future__ import annotations
 
 from enum import Enum
 

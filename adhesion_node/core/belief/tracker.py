@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Position and speed without the adhesion: a Kalman filter whose speed is a random walk (`gaussian.coast`).
 
 It follows the train while it coasts, tells outliers, finds the speed again after a start or a gap, and gives the
 first window of every braking its prior.
 """
-
-from __future__ import annotations
 
 import math
 

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Settings of the creep identification, and what becomes of peaks."""
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum

@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Adhesion over creep: the Kiencke curve, its peak and the linear form of it, He et al. 2017, (1)-(7).
 
 Every function works element by element; the parameters theta = (p1, p2) stand in the last axis.
 """
-
-from __future__ import annotations
 
 import numpy as np
 

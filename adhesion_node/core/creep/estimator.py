@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Identification of the creep curve, sample by sample, live and offline: `init`, `advance`, `finish`, He et al. 2017.
 
 Every accepted sample updates the sums (12) with the forgetting factor (13); every `every` of them give an estimate
 of the peak with its spread, or the reason why the data cannot tell it.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Recursive least squares of the linear form with forgetting, He et al. 2017, (8)-(13).
 
@@ -7,8 +6,6 @@ With y = (Z, U1, U2) the sum over the data of w y y^T holds all of (10) and (12)
 column below Z is f without the paper's factor -2. Minimising (11), J = 1/2 x^T 2H x - 2 f^T x, is solving H x = f.
 All arrays may have leading axes, one entry per run.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """One run's recursive identification, or that of many runs at once: steps 2 to 7 of He et al. 2017."""
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The traction unit: how what its sensors measure becomes creep and adhesion, He et al. 2017, (1)-(3)."""
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import NamedTuple

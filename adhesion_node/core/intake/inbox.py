@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The one gate for time: puts the samples of all sensors in order, pairs them, tells when time has jumped.
 
@@ -9,8 +8,6 @@ nothing. A sensor in order clears only what it has set aside itself, and no time
 wrong clock of another sensor stops nothing either. Only stamps decide, never a clock: a live node and an offline replay
 pair alike.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from types import MappingProxyType

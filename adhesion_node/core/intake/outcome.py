@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What becomes of a sample, with the words in which an operator is told."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import Enum

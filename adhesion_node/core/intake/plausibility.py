@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What is well formed and must not be believed all the same: a position sensor that is stuck, a speed in km/h."""
 

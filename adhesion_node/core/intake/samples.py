@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What goes into the estimators: one sample per message of a sensor, and what they make together."""
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple

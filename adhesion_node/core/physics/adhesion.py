@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Adhesion as a function of speed: the published laws for dry and wet rail, Xie et al. 2019, section 3.1."""
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass

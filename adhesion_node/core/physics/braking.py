@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Braking curve: distance, time and deceleration from a speed down to a target speed.
 
 A train that decelerates by a(v) covers ds = v dv / a(v) in dt = dv / a(v), so the curve is two integrals over
 speed: exact quadrature on a speed grid, no time stepping.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The state-space model x = (s, v): step (2)(3), Jacobian and noise, Xie et al. 2019.
 
@@ -10,8 +9,6 @@
 with v' in the first line before its noise. Positions and speeds are arrays of any one shape; the step's length T
 and brake B/(M g) broadcast against it.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass
 

@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Additional resistance along the track: grades, curves and tunnels, Xie et al. 2019, (7)-(10).
 
 All resistances are per weight (N/N), so that they do not depend on the train's mass.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import astuple, dataclass, field

@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The train as a point mass: brake force and running resistance, Xie et al. 2019, (1)-(6).
 
 Everything is SI. The published running-resistance coefficients take km/h; the conversion stays inside
 `Train.basic_resistance`.
 """
-
-from __future__ import annotations
 
 import math
 from dataclasses import dataclass

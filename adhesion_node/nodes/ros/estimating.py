@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """An estimator as a node: every message goes through its pipeline, as in an offline replay.
 
 Stamps drive the work. The one timer watches for silence: it ends waits and speaks in /diagnostics, no more.
 """
-
-from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence

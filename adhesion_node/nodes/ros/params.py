@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Settings as ROS parameters: typed, with ranges, checked as a whole before the node does anything."""
-
-from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence

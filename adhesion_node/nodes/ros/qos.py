@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The profiles for the table's words on quality of service, and the two functions that open a topic by its entry."""
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from copy import copy

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What DDS notices of the other side, in words: qualities that do not fit, missed deadlines, publishers that die."""
-
-from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any

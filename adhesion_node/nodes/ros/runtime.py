@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The one main of every node: start, spin until a signal or the node's own end, close, exit code.
 
 rclpy's own signal handlers end in a traceback or a wrong exit code when SIGTERM or a second signal meets a
 spinning node. Here the handlers only note the first signal; the loop sees the note between two callbacks.
 """
-
-from __future__ import annotations
 
 import argparse
 import inspect

@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Notices that a topic has fallen silent. For /diagnostics alone: no result depends on it.
 
 Silence is counted in ticks of a monotonic timer, so that a process that was held up does not blame its sensors. With
 use_sim_time it is measured by /clock, however fast that runs, and a /clock that stands still is told by the ticks.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable
 

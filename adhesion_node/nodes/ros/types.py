@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The message classes of rclpy, by the name of their type."""
-
-from __future__ import annotations
 
 from functools import cache
 from importlib import import_module

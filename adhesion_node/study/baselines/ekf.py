@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The baseline: an extended Kalman filter of (s, v, mu) with the adhesion a random walk.
 
@@ -9,8 +8,6 @@ While no brake is applied the speed is a random walk and nothing is learnt of th
 held between 0 and what the brake can use: beyond that the motion does not depend on it, and a filter that started
 there would never move.
 """
-
-from __future__ import annotations
 
 from dataclasses import dataclass, field
 

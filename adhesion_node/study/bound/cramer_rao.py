@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Posterior Cramér-Rao bound: how well any estimator can know mu from noisy positions of a braking train.
 
@@ -14,8 +13,6 @@ Tichavský, Muravchik and Nehorai (IEEE Trans. Signal Processing 46, 1998) with 
 moves within a step. The expectation is the mean over the given trajectories. Those of one braking differ little; of
 trajectories that differ much, as on both sides of the kink, the bound still holds but nobody reaches it.
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple

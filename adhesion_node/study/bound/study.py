@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study bound`: the posterior Cramér-Rao bound of mu over a braking: what no estimator can beat.
 
 Rail condition unknown, speed law known, 10 Hz, nominal process noise. The speed before braking is what 20 s of
 cruising leave known of it or, for comparison, a given standard deviation.
 """
-
-from __future__ import annotations
 
 import argparse
 import math

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What He et al. 2017 leave out: noise on the creep, how sure the peak is, when it must be withheld, the iteration."""
-
-from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Maximum likelihood with noise on the creep as well as on the adhesion (errors in variables).
 
@@ -10,8 +9,6 @@ do not help. Here every true creep l_i is unknown too:
 
 For given p1, p2 each l_i is found alone, so that only two parameters are left for the outer search.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

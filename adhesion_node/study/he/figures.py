@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The counterparts of the figures of He et al. 2017.
 
@@ -7,8 +6,6 @@ Figs. 1-3: adhesion over creep as measured, Burckhardt's model, Kiencke's curve 
 coefficients: Burckhardt's are those he gives for roads; Kiencke's curve has the same initial slope and the p1, p2 of
 least squares. Figs. 5-11: p1, p2 and the peak, on one surface and over a switch.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The experiments of He et al. 2017, many seeds at once through the recursion that also runs live.
 
@@ -8,8 +7,6 @@ both surfaces have their peak at a creep of 0.1, mu_max 0.35 (dry) and 0.20 (wet
 of (7), the error of the linear form, with 0.01 as its standard deviation: the measured adhesion then has the error
 v/(1 + p1 l + p2 l^2). A rise of the creep from 0 to 0.1 has `RISE` samples.
 """
-
-from __future__ import annotations
 
 from typing import Any, NamedTuple
 

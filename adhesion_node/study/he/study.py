@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study creep`: the experiments of He et al. 2017 on the creep curve, and what the paper leaves out.
 
@@ -7,8 +6,6 @@ Experiment 1: one dry rise of the creep, no forgetting; the peak as predicted fr
 3: dry, then wet, with the forgetting factor fixed at 0.99 and varying (13); `used_fraction` is the share of the new
 surface's samples after which the estimated peak stays within 5 % of the truth to the end, the mean over the runs.
 """
-
-from __future__ import annotations
 
 import argparse
 from dataclasses import replace

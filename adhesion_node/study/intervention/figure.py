@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The supervision limits over the distance, as ETCS draws them, by the lower bound and by the fixed worst case."""
-
-from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path

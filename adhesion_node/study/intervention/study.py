@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study intervention`: where a train is braked by the identified adhesion, by its lower bound and by fixed values.
 
@@ -7,8 +6,6 @@ Replays the reference recordings offline and holds the braking curves of a few s
 monitor: distances before the target at which the emergency brake intervenes (EBI), the service brake (SBI), the driver
 is warned, must brake (permitted) and is told to prepare (indication).
 """
-
-from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator

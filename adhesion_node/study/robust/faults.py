@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The second table of `study robust`: faults of sensors, messages, clock and train, each beside the run without it.
 
 Figures count from the beginning of the fault on; B's errors are those at the same times. Differences to B are in
 standard deviations, the larger of both, while adhesion limits.
 """
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The first table of `study robust`: rails, sensors and trains other than believed, each beside tunnel_entry."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import chain

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study robust`: the default method where rail, sensors or train are not what it believes, and under faults.
 
@@ -11,8 +10,6 @@ and the rise. The second table, from the beginning of each fault on: *B* is the 
 largest difference after a full window; *rail*: changes of the rail told in all runs, of which none is true; *again*:
 longest time from the end of the fault to a full window.
 """
-
-from __future__ import annotations
 
 import argparse
 from typing import Any

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Where tasks are computed: by processes of this machine, or by an existing Dask cluster; both are executors."""
-
-from __future__ import annotations
 
 import errno
 import logging

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What a trial tries: an estimator's settings, and the ways in which it runs through simulated runs."""
-
-from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence

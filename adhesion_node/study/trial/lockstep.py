@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Many estimators side by side: the core's own `step`, with the windows that fall due together evaluated as one batch.
 
 `step` is pure. Where it comes to a window it is stopped, the windows of all runs are evaluated at once, and the
 step is taken again with the verdict at hand; so every rule of the estimator holds here without being written twice.
 """
-
-from __future__ import annotations
 
 import time
 from collections import defaultdict

@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Runs the tasks that the cache lacks, with a progress bar; the numbers do not depend on where they are computed.
 
 A task is a pure function of its fields and of the code, which name its file in the cache. So a study that was killed
 goes on with the tasks that are missing, and a change of the code, of a setting or of numpy finds no stale numbers.
 """
-
-from __future__ import annotations
 
 import argparse
 import hashlib

@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study distances`: braking distances and times of Xie et al. 2019 beside the published ones, without noise.
 
 With `--runs` also those by the adhesion that the paper's method and the default one identify in the runs of
 `study tables`, whose cache both share.
 """
-
-from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Counterparts of the figures of Xie et al. 2019.
 
 Figs. 2, 3, 10-13, 20 and 21: the rail, the forces, the brakings without noise. Figs. 4-9 and 14-19: the adhesion, its
 error and its relative error over speed, from every start.
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path

@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """The trials behind the tables: scenarios, starts, and the estimators that are compared."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace

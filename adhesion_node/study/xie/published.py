@@ -1,9 +1,6 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What Xie et al. 2019 print: Tables 2 and 3, braking distances and times, and what they save."""
-
-from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import NamedTuple

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study sensitivity`: what the paper leaves out: the error against position noise, window, step, particles and seeds.
 
@@ -7,8 +6,6 @@ One setting at a time leaves the nominal ones (0.5 m, S = 50, L = 10, M = 20); s
 seeds of `study tables`. With another `seed_shift` the same measurements meet other random numbers of the estimator.
 The tuned EKF stands beside where only the noise changes.
 """
-
-from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator

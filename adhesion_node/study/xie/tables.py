@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study tables`: Tables 2 and 3 of Xie et al. 2019 by Monte-Carlo runs, beside a tuned and a naive EKF.
 
@@ -10,8 +9,6 @@ the speed at which the error, averaged over the runs, first falls below 5 %; `co
 `study bound`. The estimators know the track. `seconds` is the computing time of the scenario's runs from all starts
 in one process, `ms_per_window` that of a window among the others of its batch.
 """
-
-from __future__ import annotations
 
 import argparse
 import hashlib

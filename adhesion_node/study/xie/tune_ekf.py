@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """`study tune-ekf`: the search behind the tuned EKF of the tables: a grid over its two standard deviations.
 
 Every pair runs through both scenarios from all starts, on the simulator seeds 5000, 5001, ... that no table uses;
 the pair with the least mean relative error wins. The filter does not know the track.
 """
-
-from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator

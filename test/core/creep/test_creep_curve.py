@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Creep, adhesion, Kiencke's curve and its linear form: numbers worked by hand, derivatives, what noise adds."""
 

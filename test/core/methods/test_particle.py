@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Particle filter and smoother, (24)-(27), against the Kalman/RTS oracle, plain loops and a grid posterior.
 

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Expectation maximisation of the adhesion in R windows of K steps, Xie et al. 2019, (18)-(34).
 
@@ -11,8 +10,6 @@ the model is linear in mu, so Q(mu, mu_k) depends on mu through
 with u_t the smoothed adhesion used in step t, c_t its weight and limit_t what the brake could use at most. This
 is a parabola between two limits, so its maximum is found exactly where the paper iterates a gradient (33).
 """
-
-from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol

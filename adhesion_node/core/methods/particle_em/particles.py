@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Bootstrap particle filter of R windows of K steps with N particles each, Xie et al. 2019, (13)-(16).
 
 Times run 0..K: time 0 is the prior, times 1..K carry the measurements. Weights are kept as logarithms; loops run
 over time only. Every run draws from its own generator, so its numbers are the same whichever runs stand beside it.
 """
-
-from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Any, NamedTuple

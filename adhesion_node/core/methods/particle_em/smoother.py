@@ -1,12 +1,9 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Marginal particle smoother of R windows of K steps with N particles each, Xie et al. 2019, (27).
 
 The backward kernels are formed for as many steps at a time as stay in the processor's cache.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

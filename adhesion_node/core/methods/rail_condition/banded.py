@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A window's normal equations: block-tridiagonal in its states, bordered by one parameter that all steps share.
 
@@ -9,8 +8,6 @@
 A couples the two components of neighbouring states only, so one banded Cholesky factor gives everything: the
 Gauss-Newton step, covariances, the determinant.
 """
-
-from __future__ import annotations
 
 from typing import NamedTuple
 

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A change within a window, of the rail or of the positions' origin: when, how likely, and what is known after it.
 
@@ -7,8 +6,6 @@ Every instant is tried with a jump as one more unknown of the window's normal eq
 (1976) have it; the instants are then averaged by their probability instead of betting on the likeliest one, because
 half a second of doubt is 0.2 m/s of speed.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Callable

@@ -1,13 +1,10 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What the rail's adhesion may do while the train slows down: follow a speed law, or stay as it is.
 
 Either way a factor kappa scales it. Each hypothesis has its own Gaussian belief of (s, v, kappa) and a weight, which
 the measurements shift by their evidence.
 """
-
-from __future__ import annotations
 
 import math
 from collections.abc import Sequence

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """What a window's findings mean: what limits the motion, what is known of the rail, and how much at least."""
 

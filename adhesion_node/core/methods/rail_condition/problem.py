@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """A window as a least-squares problem in its trajectory and in kappa, where the adhesion is mu(v) = kappa law(v)."""
 

@@ -1,5 +1,4 @@
-# Copyright 2026 the adhesion_node authors
-# SPDX-License-Identifier: Apache-2.0
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 """Gaussian smoother of a window and its EM for the rail condition kappa.
 
@@ -9,8 +8,6 @@ step ends where EM would converge to. Both informations fall out of the bordered
 solve, and it repeats only because the motion is a little nonlinear, because the brake's limit bends it, and because
 heavy-tailed measurements are weighted anew (EM weights of Student's t).
 """
-
-from __future__ import annotations
 
 import math
 from typing import NamedTuple
