@@ -177,9 +177,19 @@ def finite(what: str, value: Any) -> float:
     return number
 
 
-def plausible(what: str, value: Any, limit: float, reason: Reason) -> float:
-    """Return a finite number of at most `limit` in size; raises Rejected."""
+def plausible(what: str, value: Any, reason: Reason, most: float, least: float | None = None) -> float:
+    """Return a finite number from `least`, else -`most`, to `most`; raises Rejected."""
     number = finite(what, value)
-    if abs(number) > limit:
+    if not (-most if least is None else least) <= number <= most:
         raise Rejected(reason, f"{what} = {number:g}")
     return number
+
+
+def place_of(message: Any) -> float:
+    """Return the place on the track, m, of a message with a `pose`; raises Rejected."""
+    return plausible("position x", message.pose.pose.position.x, Reason.IMPLAUSIBLE_POSITION, MAX_POSITION_M)
+
+
+def speed_of(message: Any) -> float:
+    """Return the speed along the track, m/s, of a message with a `twist`; raises Rejected."""
+    return plausible("speed x", message.twist.twist.linear.x, Reason.IMPLAUSIBLE_SPEED, MAX_SPEED_MPS)

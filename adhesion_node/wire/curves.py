@@ -14,7 +14,7 @@ from ..core.physics.train import Array
 from .codecs import NS, TRAIN, Codec, Fields, Line, New, Reason, Rejected, header, stamp_ns
 
 if TYPE_CHECKING:  # see results.py
-    from ..core.prediction import Prediction
+    from ..core.estimate import Estimate
 
 
 class PlacedCurve(NamedTuple):
@@ -65,18 +65,7 @@ def write_curve(new: New, t_ns: int, position_m: float, curve: BrakingCurve) -> 
     return {"header": header(new, t_ns), "joint_names": [TRAIN], "points": points}
 
 
-def write_safe_curve(new: New, prediction: Prediction) -> Fields | None:
-    """Write the curve on mu_lower; None where there is none."""
-    return _written(new, prediction, prediction.safe)
-
-
-def write_nominal_curve(new: New, prediction: Prediction) -> Fields | None:
-    """Write the curve on mu; None where there is none."""
-    return _written(new, prediction, prediction.nominal)
-
-
-def _written(new: New, prediction: Prediction, curve: BrakingCurve | None) -> Fields | None:
-    estimate = prediction.estimate
+def _predicted(new: New, estimate: Estimate, curve: BrakingCurve | None) -> Fields | None:
     return None if curve is None else write_curve(new, estimate.t_ns, estimate.position_m, curve)
 
 
@@ -98,4 +87,5 @@ def _check_course(curve: BrakingCurve) -> None:
         raise Rejected(Reason.BAD_CURVE, "braking curve: a negative speed or no deceleration")
 
 
-SAFE, NOMINAL = Codec(read_curve, write_safe_curve), Codec(read_curve, write_nominal_curve)
+SAFE = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.safe))
+NOMINAL = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.nominal))

@@ -11,29 +11,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.atp.supervision import TrainState
-from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
 from ..core.physics.train import GRAVITY
-from .codecs import (
-    TRAIN,
-    Codec,
-    Fields,
-    Line,
-    New,
-    Reason,
-    covariance,
-    finite,
-    header,
-    moment,
-    nanoseconds,
-    plausible,
-    pose,
-    stamp_ns,
-    twist,
-    vector,
-)
+from . import codecs
+from .codecs import TRAIN, Codec, Fields, Line, New, finite, header, stamp_ns
 
 if TYPE_CHECKING:  # the simulator uses these codecs, too, and must not know the estimators
-    from ..core.creep.estimator import CreepEstimate
     from ..core.prediction import Prediction
 
 
@@ -66,31 +48,6 @@ def read_number(message: Any, _line: Line) -> float:
     return finite("data", message.data)
 
 
-def write_number(_new: New, value: float) -> Fields:
-    """Write a Float64."""
-    return {"data": value}
-
-
-def write_mu(_new: New, prediction: Prediction) -> Fields | None:
-    """Write mu; None while nothing is known of it."""
-    return None if prediction.estimate.withheld else {"data": prediction.estimate.mu}
-
-
-def write_mu_lower(_new: New, prediction: Prediction) -> Fields | None:
-    """Write the lower bound of mu; None while nothing is known of it."""
-    return None if prediction.estimate.withheld else {"data": prediction.estimate.mu_lower}
-
-
-def write_creep_mu_max(_new: New, estimate: CreepEstimate) -> Fields | None:
-    """Write the peak of the adhesion over the creep; None while the data cannot tell it."""
-    return {"data": estimate.mu_max} if estimate.known else None
-
-
-def write_creep_lambda_m(_new: New, estimate: CreepEstimate) -> Fields | None:
-    """Write the creep at the peak; None while the data cannot tell it."""
-    return {"data": estimate.lambda_m} if estimate.known else None
-
-
 def read_deceleration(message: Any, _line: Line) -> Deceleration:
     """Read an acceleration along the track from an AccelWithCovarianceStamped; raises Rejected."""
     accel = message.accel
@@ -103,19 +60,17 @@ def write_deceleration(new: New, prediction: Prediction) -> Fields | None:
     if prediction.estimate.withheld:
         return None
     estimate = prediction.estimate
-    along = new("geometry_msgs/msg/Accel", linear=vector(new, -estimate.mu * GRAVITY), angular=vector(new, 0.0))
-    spread = covariance((GRAVITY * estimate.mu_std) ** 2)
+    along = new(
+        "geometry_msgs/msg/Accel", linear=codecs.vector(new, -estimate.mu * GRAVITY), angular=codecs.vector(new, 0.0)
+    )
+    spread = codecs.covariance((GRAVITY * estimate.mu_std) ** 2)
     accel = new("geometry_msgs/msg/AccelWithCovariance", accel=along, covariance=spread)
     return {"header": header(new, estimate.t_ns), "accel": accel}
 
 
 def read_state(message: Any, _line: Line) -> TrainState:
     """Read the train's state, m and m/s, from an Odometry; raises Rejected."""
-    return TrainState(
-        stamp_ns(message.header),
-        plausible("position x", message.pose.pose.position.x, MAX_POSITION_M, Reason.IMPLAUSIBLE_POSITION),
-        plausible("speed x", message.twist.twist.linear.x, MAX_SPEED_MPS, Reason.IMPLAUSIBLE_SPEED),
-    )
+    return TrainState(stamp_ns(message.header), codecs.place_of(message), codecs.speed_of(message))
 
 
 def write_state(
@@ -125,8 +80,8 @@ def write_state(
     return {
         "header": header(new, t_ns),
         "child_frame_id": TRAIN,
-        "pose": pose(new, position_m, position_var),
-        "twist": twist(new, speed_mps, speed_var),
+        "pose": codecs.pose(new, position_m, position_var),
+        "twist": codecs.twist(new, speed_mps, speed_var),
     }
 
 
@@ -157,20 +112,14 @@ def write_status(new: New, t_ns: int, status: Status) -> Fields:
     return {"header": header(new, t_ns), "status": [new("diagnostic_msgs/msg/DiagnosticStatus", **fields)]}
 
 
-def read_clock(message: Any, _line: Line) -> int:
-    """Read the time, ns, from a Clock."""
-    return nanoseconds(message.clock)
-
-
-def write_clock(new: New, t_ns: int) -> Fields:
-    """Write a Clock."""
-    return {"clock": moment(new, t_ns)}
-
-
-NUMBER = Codec(read_number, write_number)
-MU, MU_LOWER = Codec(read_number, write_mu), Codec(read_number, write_mu_lower)
-CREEP_MU_MAX, CREEP_LAMBDA_M = Codec(read_number, write_creep_mu_max), Codec(read_number, write_creep_lambda_m)
+NUMBER = Codec(read_number, lambda _, value: {"data": value})
+MU = Codec(read_number, lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu})
+MU_LOWER = Codec(read_number, lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu_lower})
+CREEP_MU_MAX = Codec(read_number, lambda _, found: {"data": found.mu_max} if found.known else None)
+CREEP_LAMBDA_M = Codec(read_number, lambda _, found: {"data": found.lambda_m} if found.known else None)
 DECELERATION = Codec(read_deceleration, write_deceleration)
 STATE, ESTIMATED_STATE = Codec(read_state, write_state), Codec(read_state, write_estimated_state)
 STATUS = Codec(read_statuses, write_status)
-CLOCK = Codec(read_clock, write_clock)
+CLOCK = Codec(
+    lambda message, _: codecs.nanoseconds(message.clock), lambda new, t_ns: {"clock": codecs.moment(new, t_ns)}
+)

@@ -30,16 +30,8 @@ SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group
 
 FRAME_ID, AMBIENT = settings_of(Line)
 
-SENSOR_TIMEOUT = Setting(
-    "sensor_timeout_s",
-    0.5,
-    "Silence of the sensor after which /diagnostics says STALE",
-    "s",
-    0.05,
-    3600.0,
-    (),
-    "intake",
-)
+_SILENCE = "Silence of the sensor after which /diagnostics says STALE"
+SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,19 +48,13 @@ class Watchdogs:
         check_settings(self, "")
 
 
-SETTINGS = (
-    SEED,
-    FRAME_ID,
-    AMBIENT,
-    SENSOR_TIMEOUT,
-    *settings_of(Config),
-    *settings_of(Train, "train.", "train"),
-    TRACK,
-)
+_OF_TRAIN = settings_of(Train, "train.", "train")
+SETTINGS = (SEED, FRAME_ID, AMBIENT, SENSOR_TIMEOUT, *settings_of(Config), *_OF_TRAIN, TRACK)
 """All settings of the estimator."""
 
 CREEP_SETTINGS = (
-    *(FRAME_ID, SENSOR_TIMEOUT),
+    FRAME_ID,
+    SENSOR_TIMEOUT,
     *settings_of(Vehicle, group="vehicle"),
     *settings_of(CreepConfig, group="identification"),
 )
