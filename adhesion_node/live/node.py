@@ -17,7 +17,6 @@ from rclpy.node import Node
 from ..nodes.ros import qos
 from ..wire import topics
 from ..wire.codecs import Rejected
-from ..wire.curves import PlacedCurve
 from ..wire.results import Statuses
 from ..wire.topics import Frame, Role
 from .view import View
@@ -38,7 +37,11 @@ class Live(Node):
         self.view = View()
         for topic, take in self._inputs().items():
             qos.subscribe(self, topic, self._receiver(topic, take))
-        self.server = _server(host, port, lambda: self.view.parts(time.monotonic()))
+        try:
+            from .server import Server
+        except ModuleNotFoundError as error:
+            raise ValueError(f"{error.name} is missing: pip install '.[live]'") from error
+        self.server = Server(host, port, lambda: self.view.parts(time.monotonic()), PERIOD_S)
         self.get_logger().info(f"open {self.server.url}")
 
     def close(self) -> None:
@@ -56,8 +59,8 @@ class Live(Node):
             topics.MU: partial(view.adhesion, "mu"),
             topics.MU_LOWER: partial(view.adhesion, "mu_lower"),
             topics.STATE: view.train,
-            topics.BRAKING_CURVE: self._curve("safe"),
-            topics.BRAKING_CURVE_NOMINAL: self._curve("nominal"),
+            topics.BRAKING_CURVE: lambda placed: view.curve("safe", placed.position_m, placed.curve),
+            topics.BRAKING_CURVE_NOMINAL: lambda placed: view.curve("nominal", placed.position_m, placed.curve),
             topics.DIAGNOSTICS: self._on_diagnostics,
             topics.ATP_STATUS: self._on_status,
         }
@@ -76,9 +79,6 @@ class Live(Node):
 
         return receive
 
-    def _curve(self, name: str) -> Callable[[PlacedCurve], None]:
-        return lambda placed: self.view.curve(name, placed.position_m, placed.curve)
-
     def _on_diagnostics(self, read: Statuses) -> None:
         for status in read.entries:
             if "regime" in status.values:  # /diagnostics is shared with everybody
@@ -87,11 +87,3 @@ class Live(Node):
     def _on_status(self, read: Statuses) -> None:
         for status in read.entries:
             self.view.supervised(status.values, status.message)
-
-
-def _server(host: str, port: int, parts: Callable[[], dict[str, Any]]) -> Any:
-    try:
-        from .server import Server
-    except ModuleNotFoundError as error:
-        raise ValueError(f"{error.name} is missing: pip install '.[live]'") from error
-    return Server(host, port, parts, PERIOD_S)

@@ -110,13 +110,16 @@ class View:
     def supervised(self, values: Mapping[str, str], message: str) -> None:
         """The status of the ATP monitor; its limits are None where it knows none."""
         numbers = {key: number for key, text in values.items() if (number := _number(text)) is not None}
-        limits = {name: _kmh(numbers.get(f"{name}_mps")) for name in LIMITS}
+        kmh = {
+            key.removesuffix("_mps"): round(number / KMH, 2) for key, number in numbers.items() if key.endswith("_mps")
+        }
+        limits = {name: kmh.get(name) for name in LIMITS}
         target_m, left_m = numbers.get("target_position_m"), numbers.get("distance_to_target_m")
         self._parts["supervision"] = {
             "level": values.get("level", ""),
             "message": message,
             "target_m": target_m,
-            "target_kmh": _kmh(numbers.get("target_speed_mps")),
+            "target_kmh": kmh.get("target_speed"),
             "left_m": left_m,
             "margin_m": numbers.get("margin_m"),
             **limits,
@@ -130,10 +133,8 @@ class View:
 
     def _clear(self) -> None:
         """Forget the last run; the adhesions stay, as those of an estimate come before its state."""
-        self._parts = {
-            **dict.fromkeys(("place_m", "train", "adhesion", "estimator", "supervision")),
-            **{"curves": {}, "history": (), "passed": ()},
-        }
+        unknown = dict.fromkeys(("place_m", "train", "adhesion", "estimator", "supervision"))
+        self._parts = {**unknown, "curves": {}, "history": (), "passed": ()}
 
     def _append(self, name: str, key: str, spacing: float, row: dict[str, Any]) -> None:
         history = self._parts[name]
@@ -142,18 +143,14 @@ class View:
 
     def _health(self, topic: Topic, now_s: float) -> dict[str, Any]:
         arrivals, refusal = tuple(self._arrivals[topic]), self._refusals.get(topic, "")
+        said = {"name": EXPECTED[topic], "topic": topic.name}
         if not arrivals:
-            return {"name": EXPECTED[topic], "topic": topic.name, "state": "never", "hz": 0.0, "age": None}
+            return {**said, "state": "never", "hz": 0.0, "age": None}
         age = now_s - arrivals[-1]
         state = "refused" if refusal else "late" if age > LATE_S else "good"
         # A message of 3 s ago has only left the window when the next one comes.
         recent = sum(arrival > now_s - RATE_OVER_S for arrival in arrivals)
-        said = {"state": state, "hz": round(recent / RATE_OVER_S, 1), "age": round(age, 1), "why": refusal}
-        return {"name": EXPECTED[topic], "topic": topic.name, **said}
-
-
-def _kmh(speed_mps: float | None) -> float | None:
-    return None if speed_mps is None else round(speed_mps / KMH, 2)
+        return {**said, "state": state, "hz": round(recent / RATE_OVER_S, 1), "age": round(age, 1), "why": refusal}
 
 
 def _number(text: str) -> float | None:

@@ -21,13 +21,24 @@ SPEED_UNITS = {"mps": Decimal(1), "kmh": 1 / Decimal("3.6")}
 REQUIRED = ("time", "position")
 OPTIONAL = ("variance", "brake_pressure", "speed")
 
+LIMITS = {
+    "position": (-MAX_POSITION_M, MAX_POSITION_M, "m: is the --position-unit another?"),
+    "variance": (MIN_VARIANCE_M2, MAX_VARIANCE_M2, "m^2: leave it empty where unknown"),
+    "brake_pressure": (
+        MIN_ABSOLUTE_PA,
+        MAX_ABSOLUTE_PA,
+        "Pa absolute: is the --pressure-unit, --pressure-kind or --ambient-pressure another?",
+    ),
+    "speed": (-MAX_SPEED_MPS, MAX_SPEED_MPS, "m/s: is the --speed-unit another?"),
+}
+"""Least and greatest value in SI, and its unit with the remedy, by column."""
+
 END_OF_STAMPS_NS = 2**31 * 10**9
 """A ROS stamp holds whole seconds in 31 bits: until 2038."""
 
 MAX_EXPONENT = 40
 """Decimal powers beyond this would only overflow on the way to being refused."""
 
-_ZERO, _ONE = Decimal(0), Decimal(1)
 _ISO = re.compile(r"(?P<moment>[^.,]+?)([.,](?P<fraction>\d+))?(?P<zone>Z|[+-]\d\d:?\d\d)?")
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
@@ -140,35 +151,22 @@ def _row(text: str, columns: Mapping[str, int], width: int, form: Format) -> Row
     for column in REQUIRED:
         if not cell[column]:
             raise _Bad("empty", column, "", "every row needs a time and a position")
-    offset = Decimal(form.ambient_pressure_pa) if form.pressure_is_gauge else Decimal(0)
-    row = Row(
-        t_ns=_time_ns(cell["time"], form.time_unit),
-        position_m=float(_decimal("position", cell["position"]) * POSITION_UNITS[form.position_unit]),
-        variance_m2=_optional(cell, "variance"),
-        absolute_pa=_optional(cell, "brake_pressure", PRESSURE_UNITS[form.pressure_unit], offset),
-        speed_mps=_optional(cell, "speed", SPEED_UNITS[form.speed_unit]),
-    )
-    _check_ranges(row, cell)
-    return row
-
-
-def _check_ranges(row: Row, cell: Mapping[str, str]) -> None:
-    kind = "is the --pressure-unit, --pressure-kind or --ambient-pressure another?"
-    limits = (
-        ("position", row.position_m, -MAX_POSITION_M, MAX_POSITION_M, "m: is the --position-unit another?"),
-        ("variance", row.variance_m2, MIN_VARIANCE_M2, MAX_VARIANCE_M2, "m^2: leave it empty where unknown"),
-        ("brake_pressure", row.absolute_pa, MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA, f"Pa absolute: {kind}"),
-        ("speed", row.speed_mps, -MAX_SPEED_MPS, MAX_SPEED_MPS, "m/s: is the --speed-unit another?"),
-    )
-    for column, value, least, most, remedy in limits:
-        if value is not None and not least <= value <= most:
+    t_ns = _time_ns(cell["time"], form.time_unit)
+    units = {
+        "position": POSITION_UNITS[form.position_unit],
+        "brake_pressure": PRESSURE_UNITS[form.pressure_unit],
+        "speed": SPEED_UNITS[form.speed_unit],
+    }
+    given = (column for column in LIMITS if cell.get(column))
+    numbers = {column: _decimal(column, cell[column]) * units.get(column, 1) for column in given}
+    if form.pressure_is_gauge and "brake_pressure" in numbers:
+        numbers["brake_pressure"] += Decimal(form.ambient_pressure_pa)
+    values = {column: float(number) for column, number in numbers.items()}
+    for column, value in values.items():
+        least, most, remedy = LIMITS[column]
+        if not least <= value <= most:
             raise _Bad("out_of_range", column, cell[column], f"{value:g} is not from {least:g} to {most:g} {remedy}")
-
-
-def _optional(cell: Mapping[str, str], column: str, unit: Decimal = _ONE, offset: Decimal = _ZERO) -> float | None:
-    """Return a cell in SI units, or None when it is empty or there is no such column."""
-    text = cell.get(column)
-    return float(_decimal(column, text) * unit + offset) if text else None
+    return Row(t_ns, values["position"], *map(values.get, OPTIONAL))
 
 
 def _decimal(column: str, text: str) -> Decimal:
@@ -205,9 +203,8 @@ def _iso_seconds(text: str) -> Decimal:
             raise ValueError
         moment = datetime.fromisoformat(parts["moment"] + (parts["zone"] or "Z"))
     except ValueError:
-        raise _Bad(
-            "not_a_time", "time", text, "write 2024-05-31T10:20:30.125Z, or choose another --time-unit"
-        ) from None
+        remedy = "write 2024-05-31T10:20:30.125Z, or choose another --time-unit"
+        raise _Bad("not_a_time", "time", text, remedy) from None
     return (moment - _EPOCH) // timedelta(seconds=1) + Decimal(f"0.{parts['fraction'] or 0}")
 
 

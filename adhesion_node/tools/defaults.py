@@ -5,6 +5,8 @@
 python -m adhesion_node.tools.defaults
 """
 
+import json
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
@@ -53,12 +55,7 @@ def _spelled(value: Value) -> str:
     >>> [_spelled(value) for value in (True, 1, 1e-6, 0.5, "snow")]
     ['true', '1', '1.0e-06', '0.5', '"snow"']
     """
-    if isinstance(value, str):
-        return f'"{value}"'
-    if isinstance(value, bool):
-        return str(value).lower()
-    mantissa, e, exponent = repr(value).partition("e")
-    return f"{mantissa}{'.0' if e and '.' not in mantissa else ''}{e}{exponent}"
+    return re.sub(r"^(-?\d+)e", r"\1.0e", json.dumps(value))
 
 
 if __name__ == "__main__":

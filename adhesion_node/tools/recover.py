@@ -14,7 +14,11 @@ from ..command.options import DONE, help_texts, json_option, progress, report, r
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run `recover BAG --output DIR`."""
-    return run_tool(_parser(), _work, args)
+    example = "recover broken_run --output whole_run"
+    parser = argparse.ArgumentParser("recover", parents=[json_option()], **help_texts(__doc__, example))
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory or an .mcap file")
+    parser.add_argument("--output", metavar="DIR", required=True, help="the new recording, a new directory")
+    return run_tool(parser, _work, args)
 
 
 def recover(source: Path, output: Path) -> dict[str, Any]:
@@ -34,12 +38,8 @@ def recover(source: Path, output: Path) -> dict[str, Any]:
         except BaseException:
             writer.discard()
             raise
-        return {
-            "complete": reader.complete,
-            "damage": list(reader.damage),
-            "messages": writer.counts,
-            "lost": reader.lost,
-        }
+        said = {"complete": reader.complete, "damage": list(reader.damage)}
+        return {**said, "messages": writer.counts, "lost": reader.lost}
 
 
 def _work(options: argparse.Namespace) -> int:
@@ -50,12 +50,3 @@ def _work(options: argparse.Namespace) -> int:
     lines += [f"{count} {name}" for name, count in summary["messages"].items()]
     report(options.json, summary, "\n".join(lines))
     return DONE
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "recover", parents=[json_option()], **help_texts(__doc__, "recover broken_run --output whole_run")
-    )
-    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory or an .mcap file")
-    parser.add_argument("--output", metavar="DIR", required=True, help="the new recording, a new directory")
-    return parser
