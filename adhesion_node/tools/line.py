@@ -50,16 +50,16 @@ def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag
 
     However it ends, by a full disk (OSError) or Ctrl-C too, the recording is complete up to there.
     """
-    common: dict[str, Any] = {"context": executor.context}
+    context = executor.context
     # First: a bad seed ends here, before anything is written.
-    simulator = Simulator(paced=False, parameter_overrides=_parameters(scenario=scenario, seed=seed), **common)
-    simulated = {"use_sim_time": True}
-    recorder = Recorder(bag, by_log_time=True, parameter_overrides=_parameters(**simulated), **common)
-    identifying = _parameters(**simulated, seed=seed, sensor_timeout_s=NEVER_S)
-    estimator = Estimator(parameter_overrides=identifying, **common)
+    simulator = Simulator(paced=False, parameter_overrides=_parameters(scenario=scenario, seed=seed), context=context)
+    simulated = partial(_parameters, use_sim_time=True)
+    recorder = Recorder(bag, by_log_time=True, parameter_overrides=simulated(), context=context)
+    identifying = simulated(seed=seed, sensor_timeout_s=NEVER_S)
+    estimator = Estimator(parameter_overrides=identifying, context=context)
     target = {"target_position_m": TARGET_M if target_kmh else STOP_M, "target_speed_kmh": target_kmh}
-    supervising = _parameters(**simulated, **target, clock_timeout_s=NEVER_S)
-    monitor = AtpMonitor(parameter_overrides=supervising, **common)
+    supervising = simulated(**target, clock_timeout_s=NEVER_S)
+    monitor = AtpMonitor(parameter_overrides=supervising, context=context)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)
     at_rest = partial(_at_rest, simulator, estimator, monitor, recorder)
@@ -102,13 +102,11 @@ def spin_until(executor: SingleThreadedExecutor, done: Callable[[], bool]) -> No
 
 def _at_rest(simulator: Simulator, estimator: Estimator, monitor: AtpMonitor, recorder: Recorder) -> bool:
     """Whether every node has taken what the others sent, and its time is that of the newest sample."""
-    sensed = Counter({POSITION: simulator.samples, CLOCK: simulator.samples})
+    sent = Counter({POSITION: simulator.samples, CLOCK: simulator.samples}) + estimator.published + monitor.published
     return (
         estimator.heard[POSITION] == simulator.samples
         and monitor.heard[STATE] == estimator.published[STATE]
-        and all(
-            recorder.heard[topic] == sent for topic, sent in (sensed + estimator.published + monitor.published).items()
-        )
+        and all(recorder.heard[topic] == count for topic, count in sent.items())
         and all(node.get_clock().now().nanoseconds == simulator.now_ns for node in (estimator, monitor, recorder))
         and not any(timer.is_ready() for timer in monitor.timers)
     )
