@@ -33,10 +33,8 @@ def _particle(options: Options) -> Section:
 
 
 def _gaussian(options: Options) -> Section:
-    return {
-        "settings": {"steps": GAUSSIAN_STEPS},
-        "rows": gaussian.compare(GAUSSIAN_STEPS, options.rounds, options.seed),
-    }
+    rows = gaussian.compare(GAUSSIAN_STEPS, options.rounds, options.seed)
+    return {"settings": {"steps": GAUSSIAN_STEPS}, "rows": rows}
 
 
 def _step(options: Options) -> Section:
@@ -61,20 +59,21 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run the benchmarks and print their tables."""
     texts = help_texts(PURPOSE, "bench", "bench particle gaussian --rounds 20", "bench step memory --json -")
     parser = argparse.ArgumentParser("bench", parents=[json_option()], **texts)
-    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
-    parser.add_argument("--rounds", type=int, default=50, help="calls of each contender (default %(default)s)")
-    parser.add_argument("--journeys", type=int, default=5, help="brakings for the latency (default %(default)s)")
-    parser.add_argument(
-        "--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)"
-    )
-    parser.add_argument("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
+    add = parser.add_argument
+    add("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
+    add("--rounds", type=int, default=50, help="calls of each contender (default %(default)s)")
+    add("--journeys", type=int, default=5, help="brakings for the latency (default %(default)s)")
+    add("--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)")
+    add("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
     return run_tool(parser, _run, args)
 
 
 def _run(options: Options) -> int:
     _check(options)
     names = options.names or list(BENCHMARKS)
-    _require([peer for name in names for peer in BENCHMARKS[name][1]])
+    missing = sorted({peer for name in names for peer in BENCHMARKS[name][1] if find_spec(peer) is None})
+    if missing:
+        raise ValueError(f"{', '.join(missing)} not installed: pip install 'adhesion_node[bench]'")
     # All on one thread: the arrays are too small for more, which would only make the times depend on the neighbours.
     limited = import_module("threadpoolctl").threadpool_limits(1) if find_spec("threadpoolctl") else nullcontext()
     with limited:
@@ -96,12 +95,6 @@ def _check(options: Options) -> None:
         raise ValueError(f"seed = {options.seed}: give an integer of at least 0")
 
 
-def _require(peers: Sequence[str]) -> None:
-    missing = sorted({peer for peer in peers if find_spec(peer) is None})
-    if missing:
-        raise ValueError(f"{', '.join(missing)} not installed: pip install 'adhesion_node[bench]'")
-
-
 def versions() -> dict[str, str]:
     """Versions of what is timed and of what it runs on."""
     installed = {name: version(name) for name in ("numpy", "scipy", *PEERS) if find_spec(name)}
@@ -119,14 +112,11 @@ def _lines(result: Mapping[str, Any]) -> Iterator[str]:
 
 def _table(rows: Sequence[Mapping[str, Any]]) -> Iterator[str]:
     """Columns as wide as their widest cell."""
-    cells = [list(rows[0]), *([_cell(value) for value in row.values()] for row in rows)]
+    told = ([f"{value:.4g}" if isinstance(value, float) else str(value) for value in row.values()] for row in rows)
+    cells = [list(rows[0]), *told]
     widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
     for line in cells:
         yield "  ".join(cell.rjust(width) for cell, width in zip(line, widths, strict=True))
-
-
-def _cell(value: Any) -> str:
-    return f"{value:.4g}" if isinstance(value, float) else str(value)
 
 
 if __name__ == "__main__":

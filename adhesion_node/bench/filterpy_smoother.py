@@ -27,7 +27,10 @@ class Laws(NamedTuple):
 
 def rts_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Laws:
     """Smooth the deviations from the noise-free run, which are linear: `rts_smoother` knows no input."""
-    path = _noise_free(motion, window, prior.mean, mu)
+    path = np.empty((window.steps + 1, 2))
+    path[0] = prior.mean
+    for k in range(window.steps):
+        path[k + 1] = motion.advance(path[k, 0], path[k, 1], window.dt_s[k], window.brake[k], mu)
     steps = _jacobians(motion, window, path, mu)
     noise = [np.diag(variances) for variances in np.stack(motion.noise(window.dt_s), axis=1)]
     kalman = KalmanFilter(dim_x=2, dim_z=1)
@@ -55,14 +58,6 @@ def em(scene: Scene, start: float, iterations: int, tolerance: float) -> Update:
         mu, before = maximised(scene.motion, windows, laws.mean.T[:, :, None], np.ones((len(laws.mean), 1)), mu), mu
         moved, done = abs(mu - before), done + 1
     return Update(mu, laws.mean[:, 1], done)
-
-
-def _noise_free(motion: Motion, window: Window, start: Array, mu: float) -> Array:
-    path = np.empty((window.steps + 1, 2))
-    path[0] = start
-    for k in range(window.steps):
-        path[k + 1] = motion.advance(path[k, 0], path[k, 1], window.dt_s[k], window.brake[k], mu)
-    return path
 
 
 def _jacobians(motion: Motion, window: Window, path: Array, mu: float) -> Array:

@@ -18,12 +18,8 @@ from ..core.physics.adhesion import SpeedLaw
 from .scene import Scene, Update, braking_window
 from .timing import SLOW, Contender, Timed, beside, interleave
 
-OURS, PASS, FIFTY, CONVERGED = (
-    "ours, converged",
-    "filterpy, one RTS pass",
-    "filterpy, 50 EM iterations",
-    "filterpy, EM converged",
-)
+OURS, PASS = "ours, converged", "filterpy, one RTS pass"
+FIFTY, CONVERGED = "filterpy, 50 EM iterations", "filterpy, EM converged"
 
 START_MU = 0.05
 TOLERANCE = 1e-7

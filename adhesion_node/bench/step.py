@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -27,31 +27,23 @@ FILLED_SHARE = 0.2
 """Part of a long run after which everything that is to be allocated has been."""
 
 
-class Took(NamedTuple):
-    """Seconds that a sample took, by the clock and of the processor."""
-
-    wall: float
-    cpu: float
-
-
 def latency(rate_hz: float, rounds: int, seed: int) -> dict[str, Any]:
     """What a sample takes in steady braking, and how many of them a second of CPU would bear."""
     journeys = (journey(rate_hz, np.random.default_rng([seed, turn])) for turn in range(rounds))
-    took = [sample for samples in journeys for sample in _in_steady_braking(samples)]
-    cpu = [sample.cpu for sample in took]
+    wall, cpu = zip(*(took for samples in journeys for took in _in_steady_braking(samples)), strict=True)
     per_second = 1.0 / float(np.mean(cpu))
     return {
         "rate_hz": rate_hz,
-        **figures([sample.wall for sample in took]),
+        **figures(wall),
         "cpu_p99_ms": figures(cpu)["p99_ms"],
         "samples_per_cpu_second": per_second,
         "headroom": per_second / rate_hz,
     }
 
 
-def _in_steady_braking(samples: Iterable[tuple[PressureSample, PositionSample]]) -> list[Took]:
-    """What each sample of the first braking takes, from `STEADY_S` on to its end."""
-    pipeline, steady_ns, took = Pipeline(CONFIG, seed=1), None, list[Took]()
+def _in_steady_braking(samples: Iterable[tuple[PressureSample, PositionSample]]) -> list[tuple[float, float]]:
+    """Seconds by the clock and of the processor for each sample of the first braking, from `STEADY_S` on to its end."""
+    pipeline, steady_ns, took = Pipeline(CONFIG, seed=1), None, list[tuple[float, float]]()
     for pressure, position in samples:
         braked = pressure.pressure_pa > 0.0
         if braked and steady_ns is None:
@@ -63,7 +55,7 @@ def _in_steady_braking(samples: Iterable[tuple[PressureSample, PositionSample]])
         pipeline.push(position)
         cpu, wall = time.process_time() - cpu, time.perf_counter() - wall
         if steady_ns is not None and pressure.t_ns >= steady_ns:
-            took.append(Took(wall, cpu))
+            took.append((wall, cpu))
     return took
 
 

@@ -102,7 +102,7 @@ class Replay(Node):
             )
         else:
             return
-        self._advance()
+        self._next = next(self._steps, None)
         self._origin = (now, self._next[0] if self._next else 0)
 
     def _position(self) -> Publisher:
@@ -124,7 +124,9 @@ class Replay(Node):
     def _publish_due(self) -> None:
         for _ in range(BURST if self._rate else 1):
             if self._next is None:
-                self._finish()
+                if not all(self._await_acknowledgement(output) for output in self._outputs.values()):
+                    self.failure = "the last messages were not acknowledged: did a subscriber hang?"
+                self.finished = True
                 return
             log_ns, records = self._next
             if log_ns > self._due_ns():
@@ -132,7 +134,7 @@ class Replay(Node):
             self._clock_out.publish(topics.CLOCK.build(new, log_ns))
             for record in records:
                 self._publish(record)
-            self._advance()
+            self._next = next(self._steps, None)
 
     def _publish(self, record: Record) -> None:
         """Publish one record; a full queue first waits until the reliable subscribers have taken all of it.
@@ -144,9 +146,6 @@ class Replay(Node):
             self._await_acknowledgement(output)
         output.publish(record.cdr)
         self.published[record.topic] += 1
-
-    def _advance(self) -> None:
-        self._next = next(self._steps, None)
 
     def _due_ns(self) -> float:
         """Return the log time reached by now."""
@@ -163,8 +162,3 @@ class Replay(Node):
             throttle_duration_sec=60.0,
         )
         return False
-
-    def _finish(self) -> None:
-        if not all(self._await_acknowledgement(output) for output in self._outputs.values()):
-            self.failure = "the last messages were not acknowledged: did a subscriber hang?"
-        self.finished = True

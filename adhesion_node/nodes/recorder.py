@@ -206,18 +206,12 @@ def _at_least(least: float, name: str, value: float) -> float:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "recorder", usage="%(prog)s --output DIR [--ros-args ...]", **help_texts(__doc__, *EXAMPLES)
-    )
+    usage = "%(prog)s --output DIR [--ros-args ...]"
+    parser = argparse.ArgumentParser("recorder", usage=usage, **help_texts(__doc__, *EXAMPLES))
     add = parser.add_argument
     add("--output", metavar="DIR", required=True, help="the recording, a new directory")
     add("--max-size-mb", metavar="MB", type=float, default=math.inf, help="go on in a new file before this size")
     add("--max-duration-s", metavar="S", type=float, default=math.inf, help="go on in a new file after this log time")
-    add(
-        "--min-free-mb",
-        metavar="MB",
-        type=float,
-        default=MIN_FREE_MB,
-        help=f"end before less is free on the disk (default: {MIN_FREE_MB:g})",
-    )
+    room = f"end before less is free on the disk (default: {MIN_FREE_MB:g})"
+    add("--min-free-mb", metavar="MB", type=float, default=MIN_FREE_MB, help=room)
     return parser

@@ -80,33 +80,20 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
-        "replay",
-        parents=[json_option()],
-        usage="%(prog)s BAG [options] [--ros-args ...]",
-        **help_texts(__doc__, *EXAMPLES),
-    )
+    usage = "%(prog)s BAG [options] [--ros-args ...]"
+    parser = argparse.ArgumentParser("replay", parents=[json_option()], usage=usage, **help_texts(__doc__, *EXAMPLES))
     add = parser.add_argument
     add("bag", metavar="BAG", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
     remap_option(add)
-    add(
-        "--topics", metavar="TOPIC", nargs="+", help="replay these (after --remap) instead of the sensors and the truth"
-    )
+    chosen = "replay these (after --remap) instead of the sensors and the truth"
+    add("--topics", metavar="TOPIC", nargs="+", help=chosen)
     live = parser.add_argument_group("to topics").add_argument
     live("--rate", type=float, default=1.0, help="speed; 0 = as fast as reliable subscribers take it (default: 1)")
-    live(
-        "--wait-for-subscribers",
-        metavar="N",
-        type=int,
-        default=1,
-        help="of position, for 10 s at most; 0 = none (default: 1)",
-    )
+    awaited = "of position, for 10 s at most; 0 = none (default: 1)"
+    live("--wait-for-subscribers", metavar="N", type=int, default=1, help=awaited)
     straight = parser.add_argument_group("offline").add_argument
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
-    straight(
-        "--estimator",
-        choices=(ADHESION, CREEP),
-        help="the adhesion under the brake, or the creep curve (default: by whether there is a position)",
-    )
+    either = "the adhesion under the brake, or the creep curve (default: by whether there is a position)"
+    straight("--estimator", choices=(ADHESION, CREEP), help=either)
     setting_options(straight)
     return parser

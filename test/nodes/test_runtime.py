@@ -20,6 +20,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from std_msgs.msg import Float64
 
+from adhesion_node.command.options import BAD_INPUT, DONE, FAILED
 from adhesion_node.command.signals import stop_on_signals
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.wire.parameter_file import sections, unheeded
@@ -207,7 +208,7 @@ def test_an_integer_for_a_float_is_accepted(start: Start) -> None:
 )
 def test_bad_ros_arguments_are_one_line_and_code_2(start: Start, args: tuple[str, ...], message: str) -> None:
     code, errors = end(start("--ros-args", *args))
-    assert code == runtime.BAD_INPUT
+    assert code == BAD_INPUT
     (complaint,) = [line for line in errors if not line.startswith("[ERROR]")]  # rcl logs some of them itself
     assert message in complaint
 
@@ -236,7 +237,7 @@ def test_nested_namespaces_are_sections_too(tmp_path: Path) -> None:
 
 def test_arguments_without_ros_args_are_refused(start: Start) -> None:
     code, complaints = end(start("-p", "gain:=0"))
-    assert code == runtime.BAD_INPUT
+    assert code == BAD_INPUT
     assert "unrecognized arguments: -p gain:=0" in complaints[-1]
     assert "--ros-args -p NAME:=VALUE" in complaints[0]
 
@@ -250,7 +251,7 @@ def test_help_shows_the_parameters(start: Start) -> None:
 
 
 def test_a_full_disk_is_one_line_and_code_1(start: Start) -> None:
-    assert end(start(TASK="fill the disk")) == (runtime.FAILED, ["[Errno 28] No space left on device"])
+    assert end(start(TASK="fill the disk")) == (FAILED, ["[Errno 28] No space left on device"])
 
 
 def test_own_and_ros_arguments_are_told_apart() -> None:
@@ -276,7 +277,7 @@ def test_a_fault_of_our_own_is_not_hidden() -> None:
 
     with pytest.raises(ZeroDivisionError):
         runtime.run(make_node, [])
-    assert runtime.run(_Finished, []) == runtime.DONE, "the context of the failed run is still there"
+    assert runtime.run(_Finished, []) == DONE, "the context of the failed run is still there"
 
 
 class _Finished(Node):

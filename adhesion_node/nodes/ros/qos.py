@@ -32,12 +32,8 @@ RESULT = QoSProfile(depth=100, reliability=ReliabilityPolicy.RELIABLE)
 LATCHED = QoSProfile(depth=1, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 """The last message waits for subscribers that come later."""
 
-EXPIRING = QoSProfile(
-    depth=1,
-    reliability=ReliabilityPolicy.RELIABLE,
-    durability=DurabilityPolicy.TRANSIENT_LOCAL,
-    lifespan=Duration(seconds=5.0),
-)
+EXPIRING = copy(LATCHED)
+EXPIRING.lifespan = Duration(seconds=5.0)
 """The same, but no longer than this: who comes later than that must not get an old braking curve."""
 
 
@@ -95,9 +91,8 @@ def subscribe(
             message_class(topic.type),
             topic.name,
             callback,
-            copy(
-                profile or PROFILES[topic.quality].subscription
-            ),  # rclpy writes the overrides of this topic into the profile it is given
+            # rclpy writes the overrides of this topic into the profile it is given.
+            copy(profile or PROFILES[topic.quality].subscription),
             qos_overriding_options=OVERRIDES,
             raw=raw,
             event_callbacks=tell and of_subscription(node.resolve_topic_name(topic.name), tell),

@@ -24,12 +24,9 @@ from rclpy.utilities import ok, try_shutdown
 
 from adhesion_node.command.signals import StopRequest, stop_on_signals
 
-from ...command.options import help_texts
+from ...command.options import BAD_INPUT, DONE, FAILED, help_texts
 from ...core.setting import Setting, by_group
 from ...wire.parameter_file import unheeded
-
-DONE, FAILED, BAD_INPUT = 0, 1, 2
-"""Exit codes of every program."""
 
 POLL_S = 0.1
 """Longest time until a signal is seen: no signal interrupts rclpy's wait."""
