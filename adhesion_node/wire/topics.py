@@ -79,14 +79,17 @@ def _sensor(name: str, type_name: str, codec: Codec, meaning: str) -> Topic:
     return Topic(name, type_name, Role.SENSOR, Quality.SENSOR, Frame.LINE, codec, meaning)
 
 
+def _result(name: str, type_name: str, codec: Codec, meaning: str, quality: Quality = Quality.RESULT) -> Topic:
+    return Topic(name, type_name, Role.ADHESION, quality, Frame.TRACK, codec, meaning)
+
+
 def _number(name: str, role: Role, codec: Codec, meaning: str) -> Topic:
     quality = Quality.SENSOR if role is Role.TRUTH else Quality.RESULT
     return Topic(name, "std_msgs/msg/Float64", role, quality, Frame.ANY, codec, meaning)
 
 
 def _curve(name: str, codec: Codec, meaning: str) -> Topic:
-    trajectory = "trajectory_msgs/msg/JointTrajectory"
-    return Topic(name, trajectory, Role.ADHESION, Quality.EXPIRING, Frame.TRACK, codec, meaning)
+    return _result(name, "trajectory_msgs/msg/JointTrajectory", codec, meaning, Quality.EXPIRING)
 
 
 def _status(name: str, meaning: str) -> Topic:
@@ -143,23 +146,14 @@ MU_LOWER = _number(
     results.MU_LOWER,
     "its lower bound at the one-sided `confidence`, one per window",
 )
-DECELERATION = Topic(
+DECELERATION = _result(
     "adhesion/deceleration",
     "geometry_msgs/msg/AccelWithCovarianceStamped",
-    Role.ADHESION,
-    Quality.RESULT,
-    Frame.TRACK,
     results.DECELERATION,
     "−μ̂ g, m/s², and its variance, stamped: the form for machines",
 )
-STATE = Topic(
-    "adhesion/state",
-    "nav_msgs/msg/Odometry",
-    Role.ADHESION,
-    Quality.RESULT,
-    Frame.TRACK,
-    results.ESTIMATED_STATE,
-    "position and speed with their variances",
+STATE = _result(
+    "adhesion/state", "nav_msgs/msg/Odometry", results.ESTIMATED_STATE, "position and speed with their variances"
 )
 BRAKING_CURVE = _curve(
     "adhesion/braking_curve", curves.SAFE, "full braking to standstill on `mu_lower`: 64 points, joint `train`"

@@ -87,11 +87,10 @@ class Intake:
             found.append(Finding(Severity.STALE, self._silent(self._silence.for_s)))
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
-        clocks = self._clocks()
+        clock, name = self._node.get_clock(), topics.CLOCK.name
+        clocks = self._node.count_publishers(name) if isinstance(clock, ROSClock) and clock.ros_time_is_active else 0
         if clocks > 1:
-            found.append(
-                Finding(Severity.WARN, f"{clocks} publishers of {topics.CLOCK.name}: time jumps, stop all but one")
-            )
+            found.append(Finding(Severity.WARN, f"{clocks} publishers of {name}: time jumps, stop all but one"))
         return found
 
     def _silent(self, for_s: float) -> str:
@@ -104,11 +103,6 @@ class Intake:
     def _on_silence(self) -> None:
         self._listener.settle(self._silence.for_s or 0.0)
         self._listener.report()
-
-    def _clocks(self) -> int:
-        clock = self._node.get_clock()
-        simulated = isinstance(clock, ROSClock) and clock.ros_time_is_active
-        return self._node.count_publishers(topics.CLOCK.name) if simulated else 0
 
     def _receiver(self, topic: Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
