@@ -11,7 +11,7 @@ from adhesion_node.core import Outcome
 from adhesion_node.core.setting import Setting, by_group
 from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.codecs import Reason
-from adhesion_node.wire.topics import TOPICS, Quality, Topic
+from adhesion_node.wire.topics import TOPICS, Quality
 from sim_node.faults.plan import FAULTS, NONE
 
 SOURCES = Path(adhesion_node.__file__).resolve().parent.parent
@@ -23,7 +23,10 @@ def parts() -> dict[str, str]:
     """Return the tables by the name of their part."""
     return {
         **{f"parameters of {node}": "\n\n".join(_groups(specs)) for node, specs in all_settings().items()},
-        "topics": table(("topic", "type", "QoS", "meaning"), map(_topic, TOPICS)),
+        "topics": table(
+            ("topic", "type", "QoS", "meaning"),
+            ((f"`{t.name}`", t.type.replace("/msg/", "/"), QUALITIES[t.quality], t.meaning) for t in TOPICS),
+        ),
         "refusals": table(("refused message", "what helps"), ((f"`{r.name}`", _cell(r.value)) for r in Reason)),
         "outcomes": table(("sample", "what becomes of it"), ((f"`{o.name}`", _cell(o.value)) for o in Outcome)),
         "house": table(("folder", "what is in it"), _house()),
@@ -58,10 +61,6 @@ def _range(spec: Setting) -> str:
     if isinstance(spec.default, bool):
         return "true, false"
     return "text" if isinstance(spec.default, str) else f"{spec.low:g} to {spec.high:g}"
-
-
-def _topic(topic: Topic) -> tuple[str, ...]:
-    return f"`{topic.name}`", topic.type.replace("/msg/", "/"), QUALITIES[topic.quality], topic.meaning
 
 
 def _cell(text: str) -> str:

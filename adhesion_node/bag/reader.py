@@ -25,14 +25,15 @@ class BagReader:
 
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
-        self._metadata = read_metadata(self.path)
-        self._recording = _open(self.path, self._metadata)
+        metadata = read_metadata(self.path)
+        self._recording = _open(self.path, metadata)
         try:
             self.infos, self.counts = self._survey()
-            self.lost = self._losses()
         except BaseException:
             self.close()
             raise
+        missing = {name: count - self.counts.get(name, 0) for name, count in metadata.messages.items()}
+        self.lost = {name: count for name, count in missing.items() if count > 0}
         self.topics: dict[str, str] = {name: info.type for name, info in self.infos.items()}
         losses = [f"{name}: {count} messages are lost" for name, count in self.lost.items()]
         self.damage = (*self._recording.damage, *losses)
@@ -76,11 +77,6 @@ class BagReader:
             first = self._recording.damage[0]
             raise ValueError(f"bag = {self.path}: holds no readable message ({first}): name another recording")
         return infos, dict(counts)
-
-    def _losses(self) -> dict[str, int]:
-        """Return how many messages less there are than the metadata says, by topic."""
-        missing = {name: count - self.counts.get(name, 0) for name, count in self._metadata.messages.items()}
-        return {name: count for name, count in missing.items() if count > 0}
 
 
 def _open(path: Path, metadata: Metadata) -> Recording:

@@ -39,9 +39,12 @@ def select(
     selection: dict[str, str] = {}
     for name in chosen:
         source = next((source for source, target in renamed.items() if same_name(target, name)), None)
+        own = name.lstrip("/")
         if source is not None:
-            selection[source] = _own_name(name)
-            _require_type(name, source, recorded)
+            selection[source] = own if own in _OURS else name
+            if (kind := recorded[source]) != (needed := _OURS.get(own, kind)):
+                what = _what_there_is(name, recorded)
+                raise ValueError(f"topic {source}: type = {kind}: {name} needs {needed}. {what}")
         elif names is not None or (same_name(name, topics.POSITION.name) and not creep):
             raise ValueError(f"topic {name}: not in the recording. {_what_there_is(name, recorded)}")
     return selection
@@ -65,19 +68,6 @@ def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]]) -> d
         renamed[match] = target
     taken = {target.lstrip("/") for target in renamed.values()}
     return renamed | {name: name for name in recorded if name not in renamed and name.lstrip("/") not in taken}
-
-
-def _own_name(name: str) -> str:
-    """Return one of our names as it is spelt in `topics`, relative; another name unchanged."""
-    return name.lstrip("/") if name.lstrip("/") in _OURS else name
-
-
-def _require_type(name: str, source: str, recorded: Mapping[str, str]) -> None:
-    expected = _OURS.get(name.lstrip("/"))
-    if expected is not None and recorded[source] != expected:
-        raise ValueError(
-            f"topic {source}: type = {recorded[source]}: {name} needs {expected}. {_what_there_is(name, recorded)}"
-        )
 
 
 def _what_there_is(name: str, recorded: Mapping[str, str]) -> str:

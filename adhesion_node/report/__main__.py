@@ -48,11 +48,13 @@ def _work(options: argparse.Namespace) -> int:
     page = output / "report.html"
     page.write_text(html, encoding="utf-8")
     result: dict[str, Any] = {"page": str(page), "runs": []}
+    texts = []
     for subject in subjects:
         pictures = list(_pictures(subject, output, options.target))
         found = findings(subject.run, setup.config, options.target)
         result["runs"].append({"name": subject.name, "source": subject.source, "pictures": pictures, **found})
-    report(options.json, result, "\n\n".join([*(_text(subject, options.target) for subject in subjects), str(page)]))
+        texts.append(f"{subject.name}, {subject.source}\n{table(subject.run, options.target, subject.config.train)}")
+    report(options.json, result, "\n\n".join([*texts, str(page)]))
     return DONE
 
 
@@ -80,10 +82,6 @@ def _pictures(subject: Subject, output: Path, target_kmh: float) -> Iterator[str
         path = output / f"{subject.name}{ending}"
         draw(subject.run, path, subject.name, target_kmh, subject.config.train)
         yield str(path)
-
-
-def _text(subject: Subject, target_kmh: float) -> str:
-    return f"{subject.name}, {subject.source}\n{table(subject.run, target_kmh, subject.config.train)}"
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -44,21 +44,16 @@ def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) 
         regime=column(lambda estimate: estimate.regime.name),
         safe=tuple(_curve(made.estimate, made.safe) for made in predictions if made.safe is not None),
         nominal=tuple(_curve(made.estimate, made.nominal) for made in predictions if made.nominal is not None),
-        counts=_counts(pipeline),
+        counts={  # under the keys that they have in the diagnostics
+            "measurements": str(pipeline.measurements),
+            "accepted": str(pipeline.accepted),
+            "windows": str(pipeline.windows),
+            **{f"dropped.{reason}": str(count) for reason, count in pipeline.dropped.items()},
+            "confidence": f"{pipeline.config.confidence:g}",
+            "digest": pipeline.digest,
+        },
     )
 
 
 def _curve(estimate: Estimate, curve: BrakingCurve) -> Curve:
     return Curve(estimate.t_ns, estimate.position_m + curve.distance_m, curve.speed_mps)
-
-
-def _counts(pipeline: Pipeline) -> dict[str, str]:
-    """The counts under the keys that they have in the diagnostics."""
-    return {
-        "measurements": str(pipeline.measurements),
-        "accepted": str(pipeline.accepted),
-        "windows": str(pipeline.windows),
-        **{f"dropped.{reason}": str(count) for reason, count in pipeline.dropped.items()},
-        "confidence": f"{pipeline.config.confidence:g}",
-        "digest": pipeline.digest,
-    }

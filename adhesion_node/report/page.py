@@ -14,7 +14,7 @@ from .curves import Subject, chart_data
 from .findings import findings, listed
 from .run import FIXED_MU, Run
 from .series import Series
-from .table import cells, rows
+from .table import rows
 
 MOST_CHANGES = 40
 """Lines of a list of changes; the rest is counted."""
@@ -92,7 +92,7 @@ def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject],
 
 def _distances(subject: Subject, target_kmh: float) -> str:
     header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "by bound m", f"fixed {FIXED_MU} m"]
-    body = [cells(row, "–") for row in rows(subject.run, target_kmh, subject.config.train)]
+    body = list(rows(subject.run, target_kmh, subject.config.train, "–"))
     return _table(header, body, "number") if body else "<p>The train did not slow down.</p>"
 
 

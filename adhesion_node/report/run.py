@@ -110,8 +110,10 @@ class Run(NamedTuple):
 
 def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
     """Read the series. Raises ValueError when the recording holds no estimates."""
+    # mu stands in its stamped form, the deceleration -mu g, where that was recorded.
+    stamped = read_series(reader, topics.DECELERATION, lambda read: -read.acceleration_mps2 / GRAVITY)
     run = read_inputs(reader, {}, line)._replace(
-        mu=_read_mu(reader),
+        mu=stamped if stamped.t_ns.size else read_unstamped(reader, topics.MU, (topics.STATE,)),
         mu_lower=read_unstamped(reader, topics.MU_LOWER, (topics.STATE, topics.DECELERATION)),
         position=read_series(reader, topics.STATE, attrgetter("position_m")),
         speed=read_series(reader, topics.STATE, attrgetter("speed_mps")),
@@ -166,20 +168,10 @@ def distance_to_target(
     estimates = zip(*(a.tolist() for a in (run.speed.t_ns, *np.broadcast_arrays(run.speed.values, mu))), strict=True)
     return np.array(
         [
-            recorded[t_ns] if t_ns in recorded else _held(train, speed, max(value, 0.0), target_mps)
-            for t_ns, speed, value in estimates
+            recorded[t_ns] if t_ns in recorded else braking.curve(train, v, max(held, 0.0), target_mps).distance_m[-1]
+            for t_ns, v, held in estimates
         ]
     )
-
-
-def _held(train: Train, speed_mps: float, mu: float, target_mps: float) -> float:
-    return float(braking.curve(train, speed_mps, mu, target_mps).distance_m[-1])
-
-
-def _read_mu(reader: BagReader) -> Series:
-    """Read mu from its stamped form, the deceleration -mu g, where it was recorded, else from the number alone."""
-    stamped = read_series(reader, topics.DECELERATION, lambda read: -read.acceleration_mps2 / GRAVITY)
-    return stamped if stamped.t_ns.size else read_unstamped(reader, topics.MU, (topics.STATE,))
 
 
 def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:

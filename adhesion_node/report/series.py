@@ -99,20 +99,17 @@ def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
 
 def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read what the statuses that have `key` say while they are not OK; "" while they are."""
-    return read_series(
-        reader,
-        topic,
-        lambda read: "; ".join(status.message for status in _with_key(read, key) if status.level != 0),
-    )
+
+    def said(read: Statuses) -> str:
+        return "; ".join(status.message for status in _with_key(read, key) if status.level != 0)
+
+    return read_series(reader, topic, said)
 
 
 def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str]:
     """Read the last values, by their keys, of the status that has `key`; {} where there is none."""
-    last: dict[str, str] = {}
-    for sample in read_topic(reader, topic):
-        for status in _with_key(sample.read, key):
-            last = dict(status.values)
-    return last
+    found = [status.values for sample in read_topic(reader, topic) for status in _with_key(sample.read, key)]
+    return dict(found[-1]) if found else {}
 
 
 def _with_key(read: Statuses, key: str) -> list[Status]:

@@ -3,7 +3,6 @@
 """A small table of a recorded run: what was identified at a few speeds, and the braking distances that follow."""
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,25 +20,14 @@ HEADER = (
 
 FORMS = ("{:.0f}", "{:.4f}", "{:.4f}", "{:.4f}", "{:.0f}", "{:.0f}", "{:.0f}", "{:.0f}")
 WIDTHS = (9, 7, 11, 10, 8, 11, 10, 10)
-"""How the columns are written."""
+"""How the columns are written: speed, the true, the identified and the least adhesion, the distances by each, fixed."""
 
 
-class Row(NamedTuple):
-    """An estimate, and the braking distances, m, from its speed; the truth is None where the recording lacks it."""
+def rows(run: Run, target_kmh: float, train: Train = CRH3, absent: str = "") -> Iterator[list[str]]:
+    """Yield rows as texts, from 10 km/h below the highest speed before down to 10 km/h above the target.
 
-    speed_kmh: float
-    true_mu: float | None
-    mu: float
-    mu_lower: float
-    true_m: float | None
-    identified_m: float
-    at_least_m: float
-    """By the safe curve: the longest."""
-    fixed_m: float
-
-
-def rows(run: Run, target_kmh: float, train: Train = CRH3) -> Iterator[Row]:
-    """Yield rows from 10 km/h below the highest speed before down to 10 km/h above the target."""
+    `absent` stands for the truth where the recording lacks it.
+    """
     speeds, target_mps = run.speed.values, target_kmh * KMH
     shown = np.flatnonzero((speeds < np.maximum.accumulate(speeds) - 10.0 * KMH) & (speeds > target_mps + 10.0 * KMH))
     if shown.size > ROWS:
@@ -49,17 +37,13 @@ def rows(run: Run, target_kmh: float, train: Train = CRH3) -> Iterator[Row]:
     for i in shown:
         true_mu, true_m = _truth(run, int(run.speed.t_ns[i]), target_mps)
         lengths = (float(column[i]) for column in (planned.identified, planned.longest, planned.fixed))
-        yield Row(float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *lengths)
-
-
-def cells(row: Row, absent: str = "") -> list[str]:
-    """Return a row as texts."""
-    return [absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True)]
+        row = (float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *lengths)
+        yield [absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True)]
 
 
 def table(run: Run, target_kmh: float, train: Train = CRH3) -> str:
     """The table as text; columns of the truth stay empty where the recording holds none."""
-    lines = (map(str.rjust, cells(row), WIDTHS) for row in rows(run, target_kmh, train))
+    lines = (map(str.rjust, row, WIDTHS) for row in rows(run, target_kmh, train))
     return "\n".join([HEADER.format(target=target_kmh, fixed=FIXED_MU), *map("".join, lines)])
 
 
