@@ -61,9 +61,7 @@ def setting_options(add: Callable[..., Any]) -> None:
 
 
 def run_tool(
-    parser: argparse.ArgumentParser,
-    work: Callable[[argparse.Namespace], int],
-    args: Sequence[str] | None = None,
+    parser: argparse.ArgumentParser, work: Callable[[argparse.Namespace], int], args: Sequence[str] | None = None
 ) -> int:
     """Parse the command line, do the work and return the exit code.
 

@@ -69,10 +69,7 @@ class Truth(NamedTuple):
 
 
 def simulate(
-    scenario: Scenario,
-    period_s: float,
-    rng: np.random.Generator,
-    noise: PlantNoise = NOMINAL_NOISE,
+    scenario: Scenario, period_s: float, rng: np.random.Generator, noise: PlantNoise = NOMINAL_NOISE
 ) -> Iterator[Truth]:
     """Yield the true state every `period_s` from time 0 to the end of the scenario.
 

@@ -89,11 +89,7 @@ def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     refused = inbox.anchors.refusal(t_ns)
     if refused is not None:
         return Pushed(inbox, events=(Event(refused, _named(anchor)),))
-    inbox = inbox._replace(
-        now_ns=_newest(inbox.now_ns, anchor),
-        anchors=inbox.anchors.added(anchor),
-        late=(0, 0),
-    )
+    inbox = inbox._replace(now_ns=_newest(inbox.now_ns, anchor), anchors=inbox.anchors.added(anchor), late=(0, 0))
     return Pushed(*release(gate, inbox, inbox.anchors.excess))
 
 

@@ -31,11 +31,7 @@ class BrakingCurve:
 
 
 def curve(
-    train: Train,
-    speed_mps: float,
-    mu: float | AdhesionLaw,
-    target_mps: float = 0.0,
-    grade: float = 0.0,
+    train: Train, speed_mps: float, mu: float | AdhesionLaw, target_mps: float = 0.0, grade: float = 0.0
 ) -> BrakingCurve:
     """Braking curve of a full brake limited by adhesion `mu`, a number or a function of speed in m/s.
 

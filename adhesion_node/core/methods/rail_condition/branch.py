@@ -49,12 +49,7 @@ def log_likelihood(branches: Sequence[Branch]) -> float:
 
 
 def smoothed_branch(
-    config: Config,
-    window: Window,
-    before: Hypothesis,
-    near: Array | None,
-    start_mu: float | None,
-    lowest_mu: float,
+    config: Config, window: Window, before: Hypothesis, near: Array | None, start_mu: float | None, lowest_mu: float
 ) -> Branch:
     """Smooth the window under a hypothesis, from `start_mu` on, or from its own mean where that is None.
 

@@ -54,9 +54,7 @@ def detect(config: Config, branches: Sequence[Branch], leading: Branch, stepped_
     lasts_s = float(np.sum(window.dt_s))
     # the hypotheses as they weighed before: each explains a part of the step as best it can
     return Detected(
-        tuple(_stepped(config, each, lasts_s) for each in branches),
-        of_rail=False,
-        certain=step.log_odds > needed,
+        tuple(_stepped(config, each, lasts_s) for each in branches), of_rail=False, certain=step.log_odds > needed
     )
 
 
