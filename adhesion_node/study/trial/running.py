@@ -9,11 +9,13 @@ goes on with the tasks that are missing, and a change of the code, of a setting 
 import argparse
 import hashlib
 import os
+import signal
 import socket
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
+from contextlib import contextmanager
 from functools import cache as once
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -34,6 +36,9 @@ SOURCES = ("adhesion_node/**/*.py", "sim_node/**/*.py")
 
 PROGRESS_S = 5.0
 """Time between two signs of life."""
+
+LISTEN_S = 0.5
+"""Longest time until a Ctrl-C is minded."""
 
 
 class Task(Protocol):
@@ -96,18 +101,32 @@ def run_all(wanted: Sequence[Task], where: Running) -> Iterator[Arrays]:
 def _compute_all(missing: Sequence[Task], where: Running) -> None:
     """Compute tasks into the cache, and draw the bar on standard error, by weights; short work stays silent."""
     workers = min(where.workers, len(missing))
-    with engines.cluster(where.scheduler) if where.scheduler else engines.processes(workers) as executor:
+    engine = engines.cluster(where.scheduler) if where.scheduler else engines.processes(workers)
+    with _interrupts() as interrupts, engine as executor:
         futures = {executor.submit(_compute, task, file_name(task)): task for task in missing}
         started, finished, total = time.monotonic(), 0.0, sum(task.weight for task in missing)
         due = started + PROGRESS_S
         while futures:
-            for future in wait(futures, max(due - time.monotonic(), 0.0), FIRST_COMPLETED).done:
+            for future in wait(futures, min(max(due - time.monotonic(), 0.0), LISTEN_S), FIRST_COMPLETED).done:
                 task = futures.pop(future)
                 save(task, future.result(), where.cache)
                 finished += task.weight
+            if interrupts:
+                raise KeyboardInterrupt
             if time.monotonic() >= due:
                 due = time.monotonic() + PROGRESS_S
                 _draw_bar(finished / total, time.monotonic() - started)
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[int]]:
+    """Note Ctrl-C instead of raising it anywhere: within a lock of the executor it would be lost, or hold the lock."""
+    noted: list[int] = []
+    earlier = signal.signal(signal.SIGINT, lambda number, _: noted.append(number))
+    try:
+        yield noted
+    finally:
+        signal.signal(signal.SIGINT, earlier)
 
 
 def _draw_bar(share: float, spent_s: float) -> None:
