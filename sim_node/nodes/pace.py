@@ -7,6 +7,7 @@ moves it.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -26,7 +27,7 @@ MAX_BURST = 10
 SHORTEST_TIMER_S = 1e-3
 
 
-class RunNode(Node):
+class RunNode(Node, ABC):
     """Publishes the samples of a simulated run in time until it ends; logs its beginning, what changes, and its end."""
 
     def __init__(self, name: str, specs: Sequence[Setting], **kwargs: Any) -> None:
@@ -79,13 +80,13 @@ class RunNode(Node):
         self.samples += 1
         return True
 
+    @abstractmethod
     def news(self, truth: Any) -> tuple[Any, str]:
         """Return what is logged when it changes, and the words for it."""
-        raise NotImplementedError
 
+    @abstractmethod
     def publish(self, truth: Any, measured: Any) -> None:
         """Publish a sample at `now_ns`."""
-        raise NotImplementedError
 
     def send(self, topic: Topic, *values: Any) -> None:
         """Publish what the topic's codec takes."""

@@ -4,7 +4,7 @@
 
 How far it really runs until it stands, what a braking curve is held against, is integrated over speed instead.
 
-It shares the forces (`core.train`, `core.track`) with the estimator but not the motion model: this one integrates
+It shares the forces (`core.physics.train` and `track`) with the estimator but not the motion model: this one integrates
 by the midpoint rule, so that an error in the estimator's steps shows instead of cancelling.
 """
 

@@ -98,7 +98,7 @@ def withholding(seed: int) -> list[dict[str, float]]:
 
 
 def _published(last: Recursion) -> Array:
-    """Which runs tell the peak by the criteria of `core.creep_recursion.judge`; on one surface none is changing."""
+    """Which runs tell the peak by the criteria of `core.creep.recursion.judge`; on one surface none is changing."""
     values = he.peaks(last.theta)
     positive = (last.theta > 0.0).all(axis=-1)
     enough = last.sums.weight >= he.ONE.min_samples
