@@ -10,16 +10,28 @@ from .config import Config
 from .estimate import Estimate
 from .estimator import advance, finish, init, step
 from .intake.outcome import Event, Outcome
-from .intake.samples import ForceSample, Measurement, PositionSample, PressureSample, Sample, SpeedSample, WheelSample
+from .intake.samples import (
+    DemandSample,
+    ForceSample,
+    ImuSample,
+    Measurement,
+    PositionSample,
+    PressureSample,
+    Sample,
+    SpeedSample,
+    WheelSample,
+)
 from .physics import braking
 from .prediction import Prediction, predict
 from .state import State
 
 __all__ = [
     "Config",
+    "DemandSample",
     "Estimate",
     "Event",
     "ForceSample",
+    "ImuSample",
     "Measurement",
     "Outcome",
     "PositionSample",

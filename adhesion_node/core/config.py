@@ -133,9 +133,20 @@ class Config:
     slowest_mps: float = _motion(
         3.0, "Speed below which there are no windows: a train about to stand says nothing of the rail", "m/s", 0.1, 50.0
     )
-    speed_std_mps: float = _wheels(0.3, "Standard deviation of a measured speed", "m/s", 1e-4, 100.0)
-    speed_while_braking: bool = _wheels(
-        False, "Use a measured speed under the brake too (a radar; an axle slides and would mislead)"
+    speed_source: str = _wheels(
+        "axle",
+        "What measures the speed: doppler (of GNSS) and radar are used under the brake too, an axle would slide",
+        choices=("axle", "doppler", "radar"),
+    )
+    speed_std_mps: float = _wheels(
+        0.3, "Standard deviation of a measured speed whose message tells no variance", "m/s", 1e-4, 100.0
+    )
+    imu_std_mps2: float = _wheels(
+        0.05,
+        "Standard deviation of a measured acceleration whose message tells no variance",
+        "m/s^2",
+        1e-4,
+        100.0,
     )
     creep_samples: int = _wheels(10, "Newest measurements whose creep tells sliding wheels", low=1, high=1000)
     sliding_creep: float = _wheels(
@@ -143,6 +154,11 @@ class Config:
     )
     brake_threshold_pa: float = _brake(
         10e3, "Brake-cylinder pressure (gauge) from which the brake counts as applied", "Pa", 0.0, 1e6
+    )
+    pressure_kind: str = _brake(
+        "cylinder",
+        "What brake_pressure tells: the pressure of one cylinder, the mean of all, or what is demanded of them",
+        choices=("cylinder", "mean", "demanded"),
     )
     assumed_pressure_pa: float = _brake(
         410e3, "Brake-cylinder pressure (gauge) taken where none is measured", "Pa", 0.0, 2e6
@@ -180,6 +196,16 @@ class Config:
     )
     max_gap_s: float = _intake(2.0, "Longest gap between measurements that a window may bridge", "s", 1e-3, 60.0)
     reset_s: float = _intake(60.0, "Jump of the stamps, either way, that starts the estimation anew", "s", 1.0, 1e6)
+    tick_s: float = _intake(
+        0.5,
+        "Without a position for so long, by the stamps, the other sensors are used without one; 0: never",
+        "s",
+        0.0,
+        60.0,
+    )
+    tick_for_s: float = _intake(
+        60.0, "For how long they are so used behind the last position and speed", "s", 0.0, 3600.0
+    )
     gate_sigma: float = _intake(
         6.0, "Innovation in standard deviations from which a position is an outlier", low=3.0, high=1e6
     )

@@ -8,7 +8,6 @@ number alone, so the same samples give the same bits whoever feeds them.
 """
 
 from collections.abc import Iterable, Iterator
-from statistics import median
 
 from .config import Config
 from .estimate import Estimate
@@ -16,7 +15,16 @@ from .following import follow, last_window
 from .intake import inbox as gate
 from .intake.outcome import Event, Outcome
 from .intake.pairing import Gate, Inbox, Matched, Source
-from .intake.samples import Measurement, PositionSample, PressureSample, Sample, SpeedSample, WheelSample
+from .intake.samples import (
+    DemandSample,
+    ImuSample,
+    Measurement,
+    PositionSample,
+    PressureSample,
+    Sample,
+    SpeedSample,
+    WheelSample,
+)
 from .methods import METHODS
 from .state import State
 
@@ -35,8 +43,8 @@ def gate_of(config: Config) -> Gate:
         anchor=PositionSample,
         sources=(
             Source(PressureSample, wait, age),
-            Source(SpeedSample, wait, wait, once=True),
-            Source(WheelSample, wait, wait),
+            Source(DemandSample, wait, age),
+            *(Source(kind, wait, wait, each=True) for kind in (PressureSample, SpeedSample, WheelSample, ImuSample)),
         ),
         max_lag_ns=round(config.max_lag_s * 1e9),
         far_ns=round(config.max_gap_s * 1e9),
@@ -82,8 +90,10 @@ def paired(config: Config, samples: Iterable[Sample]) -> Iterator[Measurement]:
     for sample in samples:
         pushed = gate.push(by, inbox, sample)
         inbox = pushed.inbox
-        yield from map(_measurement, pushed.ended + pushed.matched)
-    yield from map(_measurement, gate.drain(by, inbox).matched)
+        for matched in pushed.ended + pushed.matched:
+            yield _measurement(config, matched)
+    for matched in gate.drain(by, inbox).matched:
+        yield _measurement(config, matched)
 
 
 def _passed(config: Config, state: State, pushed: gate.Pushed) -> tuple[State, tuple[Estimate, ...]]:
@@ -101,21 +111,26 @@ def _passed(config: Config, state: State, pushed: gate.Pushed) -> tuple[State, t
 def _take_all(config: Config, state: State, matched: Iterable[Matched]) -> tuple[State, tuple[Estimate, ...]]:
     estimates = []
     for each in matched:
-        state, estimate = follow(config, state, _measurement(each))
+        state, estimate = follow(config, state, _measurement(config, each))
         estimates += [] if estimate is None else [estimate]
     return state, tuple(estimates)
 
 
-def _measurement(matched: Matched) -> Measurement:
+def _measurement(config: Config, matched: Matched) -> Measurement:
     if isinstance(matched.anchor, Measurement):
         return matched.anchor
     t_ns, position_m, variance_m2 = matched.anchor
-    pressure, speed, wheels = matched.values
+    pressure, demand, pressures, speeds, wheels, imu = matched.values
+    fresh = bool(speeds) and t_ns - speeds[-1].t_ns <= round(config.pressure_wait_s * 1e9)
     return Measurement(
         t_ns,
         position_m,
         variance_m2,
         brake_pressure_pa=pressure and pressure.pressure_pa,
-        speed_mps=speed and speed.speed_mps,
-        wheel_radps=wheels and median(wheels.speeds_radps),
+        speed_mps=speeds[-1].speed_mps if fresh else None,
+        demand_pa=demand and demand.pressure_pa,
+        pressures=pressures,
+        speeds=speeds,
+        wheels=wheels,
+        imu=imu,
     )

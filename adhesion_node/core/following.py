@@ -3,6 +3,7 @@
 """What one measurement in its turn does: it is judged, the train is followed with it, the window grows or ends."""
 
 import math
+from statistics import median
 
 from .belief import tracker
 from .belief.gaussian import Gaussian, coast
@@ -11,7 +12,7 @@ from .config import Config
 from .estimate import Estimate, blind_estimate, estimate_of, judge
 from .intake.outcome import Event, Outcome, counted
 from .intake.plausibility import is_kmh
-from .intake.samples import Measurement
+from .intake.samples import MAX_VARIANCE_M2, Measurement
 from .methods.protocol import Verdict
 from .state import State
 
@@ -19,18 +20,24 @@ from .state import State
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
     seen = state.seen
-    repeated = state.repeated.after(measurement, seen)
-    if repeated.is_stuck(measurement):
-        return _unseen(config, state, measurement)
-    state = state._replace(repeated=repeated, unseen=0)
+    repeated = state.repeated
+    if measurement.has_position:
+        repeated = repeated.after(measurement, seen)
+        if repeated.is_stuck(measurement):
+            return _unseen(config, state, measurement)
+        state = state._replace(repeated=repeated, unseen=0)
     if measurement.speed_mps is not None and seen is not None and is_kmh(measurement.speed_mps, seen.speed_mps):
         detail = f"speed x = {measurement.speed_mps:g} at {seen.speed_mps:.3g} m/s"
-        state, measurement = state.told(Event(Outcome.SPEED_IN_KMH, detail)), measurement._replace(speed_mps=None)
+        speeds = tuple(each for each in measurement.speeds if not is_kmh(each.speed_mps, seen.speed_mps))
+        state = state.told(Event(Outcome.SPEED_IN_KMH, detail))
+        measurement = measurement._replace(speed_mps=None, speeds=speeds)
     if state.newest is None or state.belief is None:
-        return _accept(config, state, measurement, tracker.meet(measurement, config.unknown_speed_mps), 0.0)
+        return _accept(config, state, measurement, _met(config, measurement), 0.0)
     dt_s = (measurement.t_ns - state.newest.t_ns) * 1e-9
     braked = config.brake(state.newest.brake_pressure_pa) > 0.0
     belief = coast(state.belief, dt_s, config.speed_noise_rate(braked))
+    if measurement.has_position and belief.covariance[0, 0] >= MAX_VARIANCE_M2:
+        state, belief = state._replace(window=None), tracker.place(belief, measurement)
     innovation = tracker.innovation(belief, measurement)
     if innovation > config.gate_sigma:
         detail = f"position x = {measurement.position_m:.12g}, innovation {innovation:.3g} standard deviations"
@@ -38,9 +45,17 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
             return state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail)), None
         state = state.forgotten()._replace(seen=seen, repeated=repeated)
         state = state.told(Event(Outcome.RESET, detail))
-        return _accept(config, state, measurement, tracker.meet(measurement, config.unknown_speed_mps), 0.0)
+        return _accept(config, state, measurement, _met(config, measurement), 0.0)
     belief = tracker.correct(belief, measurement, _speed_variance(config, measurement))
     return _accept(config, state, measurement, belief, dt_s)
+
+
+def _met(config: Config, measurement: Measurement) -> Gaussian:
+    """Belief of a train just met; by its speed alone where there is no position."""
+    belief = tracker.meet(measurement, config.unknown_speed_mps)
+    if measurement.has_position:
+        return belief
+    return tracker.correct(belief, measurement, _speed_variance(config, measurement))
 
 
 def _unseen(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
@@ -59,11 +74,11 @@ def _accept(
     sample = WindowSample(
         measurement.t_ns,
         brake,
-        measurement.position_m,
+        measurement.position_m if measurement.has_position else 0.0,
         measurement.variance_m2,
         measurement.speed_mps or 0.0,
         _speed_variance(config, measurement),
-        math.nan if measurement.wheel_radps is None else measurement.wheel_radps * config.train.wheel_radius_m,
+        _wheel_mps(config, measurement),
     )
     window = state.window if dt_s <= config.max_gap_s else None
     if window is not None:
@@ -78,11 +93,14 @@ def _accept(
     )
     if brake == 0.0 or belief.mean[1] < config.slowest_mps:
         return _release(config, state)
-    if window is None and tracker.is_settled(
-        belief, measurement.variance_m2 * dt_s, config.speed_noise_rate(True), config.settled_ratio
-    ):
+    settled = (
+        tracker.is_settled(belief, measurement.variance_m2 * dt_s, config.speed_noise_rate(True), config.settled_ratio)
+        if measurement.has_position
+        else math.isfinite(sample.speed_variance)
+    )
+    if window is None and settled:
         state = state._replace(window=state.method.open(belief, sample))
-    if state.since_estimate < config.step:
+    if state.since_estimate < config.step and measurement.has_position:
         return state, None
     state, _, estimate = _estimate(config, state)
     return state, estimate
@@ -90,7 +108,7 @@ def _accept(
 
 def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
     """Coast, or end a braking with its last, short window."""
-    if state.window is None and state.since_estimate < config.step:
+    if state.window is None and state.since_estimate < config.step and state.newest and state.newest.has_position:
         return state, None
     state, verdict, estimate = _estimate(config, state)
     return state._replace(window=None, belief=verdict.belief), estimate
@@ -110,8 +128,18 @@ def _speed_variance(config: Config, measurement: Measurement) -> float:
     """Variance of the measured speed; infinite where there is none or a braked axle may slide."""
     if measurement.speed_mps is None:
         return math.inf
-    rolling = config.speed_while_braking or config.brake(measurement.brake_pressure_pa) == 0.0
-    return config.speed_std_mps**2 if rolling else math.inf
+    if config.speed_source == "axle" and config.brake(measurement.brake_pressure_pa) > 0.0:
+        return math.inf
+    variance = measurement.speeds[-1].variance if measurement.speeds else None
+    return config.speed_std_mps**2 if variance is None else variance
+
+
+def _wheel_mps(config: Config, measurement: Measurement) -> float:
+    """Speed of the median axle's rim; NaN where no axle was measured of late."""
+    newest = measurement.wheels[-1] if measurement.wheels else None
+    if newest is None or measurement.t_ns - newest.t_ns > round(config.pressure_wait_s * 1e9):
+        return math.nan
+    return median(newest.known_radps) * config.train.wheel_radius_m
 
 
 def last_window(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:

@@ -7,7 +7,7 @@ a `New`: of rclpy's classes (nodes/ros/types.py), of those of rosbags (bag/types
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from types import SimpleNamespace
@@ -15,7 +15,13 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MAX_VARIANCE_M2, MIN_VARIANCE_M2
+from ..core.intake.samples import (
+    MAX_ACCELERATION_MPS2,
+    MAX_POSITION_M,
+    MAX_SPEED_MPS,
+    MAX_VARIANCE_M2,
+    MIN_VARIANCE_M2,
+)
 from ..core.physics.train import Array
 from ..core.setting import check_settings, setting
 
@@ -105,6 +111,10 @@ class Reason(Enum):
         "to that; multiply kPa by 1000 and bar by 100000"
     )
     IMPLAUSIBLE_SPEED = f"speed is in m/s, not km/h, within +-{MAX_SPEED_MPS:g}"
+    NO_ACCELERATION = "linear_acceleration_covariance[0] = -1 says that none is measured: give it, or publish no imu"
+    IMPLAUSIBLE_ACCELERATION = (
+        f"linear_acceleration.x is in m/s^2 along the track, not in g, within +-{MAX_ACCELERATION_MPS2:g}"
+    )
     NO_AXLE = "give one velocity, rad/s, for every driven axle in name"
     IMPLAUSIBLE_WHEEL_SPEED = f"velocity is in rad/s, not rpm, within +-{MAX_WHEEL_RADPS:g}"
     IMPLAUSIBLE_FORCE = f"force.x is in N, within +-{MAX_FORCE_N:g}"
@@ -149,6 +159,11 @@ def vector(new: New, x: float, kind: str = "Vector3") -> Any:
     return new(f"geometry_msgs/msg/{kind}", x=x, y=0.0, z=0.0)
 
 
+def upright(new: New) -> Any:
+    """Build the Quaternion of no rotation."""
+    return new("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
+
+
 def covariance(first: float) -> Array:
     """Return a covariance of which only the variance along the track is known; shape (36,)."""
     filled = np.zeros(36)
@@ -158,8 +173,7 @@ def covariance(first: float) -> Array:
 
 def pose(new: New, x: float, variance: float) -> Any:
     """Build a PoseWithCovariance of a place on the track, m and m^2."""
-    level = new("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
-    place = new("geometry_msgs/msg/Pose", position=vector(new, x, "Point"), orientation=level)
+    place = new("geometry_msgs/msg/Pose", position=vector(new, x, "Point"), orientation=upright(new))
     return new("geometry_msgs/msg/PoseWithCovariance", pose=place, covariance=covariance(variance))
 
 
@@ -183,6 +197,12 @@ def plausible(what: str, value: Any, reason: Reason, most: float, least: float |
     if not (-most if least is None else least) <= number <= most:
         raise Rejected(reason, f"{what} = {number:g}")
     return number
+
+
+def variance_of(covariance: Sequence[float]) -> float | None:
+    """Return the first variance of a covariance; None where that is unknown: 0, negative or not a possible one."""
+    variance = float(covariance[0])
+    return variance if MIN_VARIANCE_M2 <= variance <= MAX_VARIANCE_M2 else None
 
 
 def place_of(message: Any) -> float:

@@ -5,8 +5,11 @@
 The writers are alike: stamp, the sensor's numbers in the unit of the message, their variance (0 = unknown), frame.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
+
+import numpy as np
 
 from ..core.intake import samples
 from . import codecs
@@ -21,27 +24,47 @@ def read_position(message: Any, _line: Line) -> samples.PositionSample:
 
 
 def read_brake_pressure(message: Any, line: Line) -> samples.PressureSample:
-    """Read a brake-cylinder pressure, gauge Pa, from a FluidPressure (absolute Pa); raises Rejected.
+    """Read a brake-cylinder pressure, gauge Pa, from a FluidPressure (absolute Pa); raises Rejected."""
+    return samples.PressureSample(stamp_ns(message.header), _gauge_pa(message, line))
 
-    A released brake whose noise falls below the air's pressure reads 0: a cylinder only pushes.
-    """
+
+def read_brake_demand(message: Any, line: Line) -> samples.DemandSample:
+    """Read the brake-cylinder pressure that is demanded, gauge Pa, from a FluidPressure, as `read_brake_pressure`."""
+    return samples.DemandSample(stamp_ns(message.header), _gauge_pa(message, line))
+
+
+def _gauge_pa(message: Any, line: Line) -> float:
+    """A released brake whose noise falls below the air's pressure reads 0: a cylinder only pushes."""
     limits = codecs.MAX_ABSOLUTE_PA, codecs.MIN_ABSOLUTE_PA
     absolute = plausible("fluid_pressure", message.fluid_pressure, Reason.IMPLAUSIBLE_PRESSURE, *limits)
-    return samples.PressureSample(stamp_ns(message.header), max(absolute - line.ambient_pressure_pa, 0.0))
+    return max(absolute - line.ambient_pressure_pa, 0.0)
 
 
 def read_speed(message: Any, _line: Line) -> samples.SpeedSample:
-    """Read an odometer speed, m/s, from a TwistWithCovarianceStamped; raises Rejected."""
-    return samples.SpeedSample(stamp_ns(message.header), codecs.speed_of(message))
+    """Read a speed, m/s, and its variance from a TwistWithCovarianceStamped; raises Rejected."""
+    variance = codecs.variance_of(message.twist.covariance)
+    return samples.SpeedSample(stamp_ns(message.header), codecs.speed_of(message), variance)
+
+
+def read_imu(message: Any, _line: Line) -> samples.ImuSample:
+    """Read the acceleration along the track, m/s^2, and its variance from an Imu; raises Rejected."""
+    spread, most = message.linear_acceleration_covariance, samples.MAX_ACCELERATION_MPS2
+    if spread[0] == -1.0:  # the message's own convention
+        raise Rejected(Reason.NO_ACCELERATION, f"imu linear_acceleration_covariance[0] = {spread[0]:g}")
+    along = plausible("imu linear_acceleration x", message.linear_acceleration.x, Reason.IMPLAUSIBLE_ACCELERATION, most)
+    return samples.ImuSample(stamp_ns(message.header), along, codecs.variance_of(spread))
 
 
 def read_wheel_speed(message: Any, _line: Line) -> samples.WheelSample:
-    """Read the speeds of the axles, rad/s, from a JointState; raises Rejected."""
+    """Read the speeds of the axles, rad/s, NaN where one has none, from a JointState; raises Rejected."""
     names, velocities = list(message.name), list(message.velocity)
     if not names or len(names) != len(velocities):
         raise Rejected(Reason.NO_AXLE, f"wheel speed names = {names}, velocities = {len(velocities)}")
+    known = any(not math.isnan(velocity) for velocity in velocities)
     speeds = (
-        plausible(f"wheel speed of {name}", velocity, Reason.IMPLAUSIBLE_WHEEL_SPEED, codecs.MAX_WHEEL_RADPS)
+        math.nan
+        if known and math.isnan(velocity)
+        else plausible(f"wheel speed of {name}", velocity, Reason.IMPLAUSIBLE_WHEEL_SPEED, codecs.MAX_WHEEL_RADPS)
         for name, velocity in zip(names, velocities, strict=True)
     )
     return samples.WheelSample(stamp_ns(message.header), tuple(speeds))
@@ -68,16 +91,33 @@ def _wheels(_new: New, speeds_radps: Sequence[float], _variance: float) -> Field
     return {"name": names, "position": (), "velocity": speeds_radps, "effort": ()}
 
 
+def _imu(new: New, along_mps2: Sequence[float], variance: float) -> Fields:
+    """Neither orientation nor rates are measured."""
+    spread, none = np.zeros(9), np.zeros(9)
+    spread[0], none[0] = variance, -1.0
+    return {
+        "orientation": codecs.upright(new),
+        "orientation_covariance": none,
+        "angular_velocity": codecs.vector(new, 0.0),
+        "angular_velocity_covariance": none,
+        "linear_acceleration": codecs.vector(new, along_mps2[0]),
+        "linear_acceleration_covariance": spread,
+    }
+
+
+def _pressure(_new: New, absolute_pa: Sequence[float], variance: float) -> Fields:
+    return {"fluid_pressure": absolute_pa[0], "variance": variance}
+
+
 def _force(new: New, force_n: Sequence[float], _variance: float) -> Fields:
     wrench = {"force": codecs.vector(new, force_n[0]), "torque": codecs.vector(new, 0.0)}
     return {"wrench": new("geometry_msgs/msg/Wrench", **wrench)}
 
 
 POSITION = Codec(read_position, _writer(lambda new, x, variance: {"pose": codecs.pose(new, x[0], variance)}))
-BRAKE_PRESSURE = Codec(
-    read_brake_pressure,
-    _writer(lambda _, absolute_pa, variance: {"fluid_pressure": absolute_pa[0], "variance": variance}),
-)
+BRAKE_PRESSURE = Codec(read_brake_pressure, _writer(_pressure))
+BRAKE_DEMAND = Codec(read_brake_demand, _writer(_pressure))
 SPEED = Codec(read_speed, _writer(lambda new, speed, variance: {"twist": codecs.twist(new, speed[0], variance)}))
+IMU = Codec(read_imu, _writer(_imu))
 WHEEL_SPEED = Codec(read_wheel_speed, _writer(_wheels))
 TRACTION_FORCE = Codec(read_traction_force, _writer(_force))

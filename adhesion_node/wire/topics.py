@@ -104,20 +104,36 @@ POSITION = _sensor(
     "**in**: measured position along the track, pose.position.x m, covariance[0] m²",
 )
 BRAKE_PRESSURE = _sensor(
-    "brake_pressure", "sensor_msgs/msg/FluidPressure", sensors.BRAKE_PRESSURE, "**in**: brake cylinder, **absolute** Pa"
+    "brake_pressure",
+    "sensor_msgs/msg/FluidPressure",
+    sensors.BRAKE_PRESSURE,
+    "**in**: brake cylinder, **absolute** Pa; of one, the mean or what is demanded (`pressure_kind`)",
+)
+BRAKE_DEMAND = _sensor(
+    "brake_demand",
+    "sensor_msgs/msg/FluidPressure",
+    sensors.BRAKE_DEMAND,
+    "**in**, optional: cylinder pressure that the handle or valve demands, **absolute** Pa",
 )
 SPEED = _sensor(
     "speed",
     "geometry_msgs/msg/TwistWithCovarianceStamped",
     sensors.SPEED,
-    "**in**, optional: m/s; used while coasting, as a braked axle slides (`speed_while_braking`)",
+    "**in**, optional: m/s, covariance[0] (m/s)², 0 = unknown; of an axle used while coasting only, as a braked one "
+    "slides (`speed_source`)",
+)
+IMU = _sensor(
+    "imu",
+    "sensor_msgs/msg/Imu",
+    sensors.IMU,
+    "**in**, optional: linear_acceleration.x m/s², forward along the track, its covariance[0], 0 = unknown",
 )
 WHEEL_SPEED = _sensor(
     "wheel_speed",
     "sensor_msgs/msg/JointState",
     sensors.WHEEL_SPEED,
-    "**in**, optional: rad/s, one velocity per axle. Sliding wheels show that adhesion limits, rolling ones that "
-    "the brake does. **In** of `creep_estimator`: the driven axles",
+    "**in**, optional: rad/s, one velocity per axle, NaN where it has none. Sliding wheels show that adhesion limits, "
+    "rolling ones that the brake does. **In** of `creep_estimator`: the driven axles",
 )
 TRACTION_FORCE = _sensor(
     "traction_force",
@@ -200,6 +216,6 @@ RESULTS, CREEP_RESULTS = topics_of(Role.ADHESION), topics_of(Role.CREEP)
 RECORDED = tuple(topic for topic in TOPICS if topic.role is not Role.CLOCK)
 """What the recorder subscribes to; /clock is left out because every message carries its log time."""
 
-ADHESION_INPUTS = (BRAKE_PRESSURE, SPEED, WHEEL_SPEED, POSITION)
+ADHESION_INPUTS = (BRAKE_PRESSURE, BRAKE_DEMAND, SPEED, IMU, WHEEL_SPEED, POSITION)
 CREEP_INPUTS = (SPEED, TRACTION_FORCE, WHEEL_SPEED)
 """What the estimators take in. The last one is that without which there is no estimate."""

@@ -53,7 +53,7 @@ def test_every_setting_describes_itself_and_refuses_what_is_beyond_its_range() -
         ({"confidence": 1.0}, r"confidence = 1\.0: give a value from 0\.5 to 0\.9999"),
         ({"start_mu": math.nan}, "start_mu = nan"),
         ({"low_adhesion": "mud"}, "low_adhesion = 'mud': choose one of dry, snow, wet"),
-        ({"speed_while_braking": 1}, "speed_while_braking = 1: give a value of type bool"),
+        ({"identify_noise": 1}, "identify_noise = 1: give a value of type bool"),
     ],
 )
 def test_refuses_by_name_value_and_remedy(changes: dict[str, Any], message: str) -> None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -67,14 +68,13 @@ def test_an_old_state_is_still_usable() -> None:
         {"variance_m2": 0.0},
         {"variance_m2": -0.25},
         {"variance_m2": math.nan},
-        {"variance_m2": math.inf},
         {"variance_m2": 1e-310},
         {"brake_pressure_pa": math.nan},
         {"speed_mps": math.inf},
         {"speed_mps": 1e3},
     ],
 )
-def test_invalid_is_counted_and_changes_nothing(changes: dict[str, float]) -> None:
+def test_invalid_is_counted_and_changes_nothing(changes: dict[str, Any]) -> None:
     measurements = ride(STOP)
     bad = [m._replace(t_ns=m.t_ns + 1, **changes) for m in measurements[40:120:10]]
     _, expected = drive(QUICK, measurements)
@@ -265,7 +265,7 @@ def test_a_speed_helps_while_coasting_and_is_ignored_under_the_brake() -> None:
     assert seen[3].speed_std_mps < 0.6 * without[3].speed_std_mps
     assert abs(seen[3].speed_mps - 80.0) < 0.15
     assert slid == seen
-    radar = replace(config, speed_while_braking=True)
+    radar = replace(config, speed_source="radar")
     true = [m._replace(speed_mps=80.0 - 0.822 * max(m.t_ns / 1e9 - 5.0, 0.0)) for m in plain]
     assert drive(radar, true)[1][-1].speed_std_mps < 0.6 * seen[-1].speed_std_mps
 
@@ -331,7 +331,7 @@ def test_rough_streams_give_finite_numbers_or_counted_drops(seed: int) -> None:
         window=int(rng.integers(6, 25)),
         max_lag_s=float(rng.choice([0.0, 0.3])),
         max_outliers=10,
-        speed_while_braking=bool(rng.integers(2)),
+        speed_source=("axle", "doppler")[rng.integers(2)],
     )
     state, estimates = drive(config, stream, seed)
     assert all(map(_finite, estimates))

@@ -54,7 +54,7 @@ CONFIGS = st.builds(
     max_outliers=st.sampled_from([1, 10]),
     pressure_wait_s=st.sampled_from([0.0, 0.2, 60.0]),
     start_mu=st.sampled_from([0.0, 0.05, 0.12, 1.0]),
-    speed_while_braking=st.booleans(),
+    speed_source=st.sampled_from(["axle", "radar"]),
 )
 
 

@@ -63,8 +63,8 @@ def test_sensor_messages_are_read(view: Callable[[Any, str], Any]) -> None:
     pressure = topics.BRAKE_PRESSURE.read(view(make_pressure(), "sensor_msgs/msg/FluidPressure"))
     assert pressure == (12_000_000_034, 410_000.0)
     speed = topics.SPEED.read(view(make_speed(), "geometry_msgs/msg/TwistWithCovarianceStamped"))
-    assert speed == (12_000_000_034, 83.3)
-    assert {type(value) for value in (*position, *pressure, *speed)} == {int, float}
+    assert speed == (12_000_000_034, 83.3, None)
+    assert {type(value) for value in (*position, *pressure, *speed[:2])} == {int, float}
 
 
 def test_a_released_brake_never_pulls() -> None:

@@ -65,7 +65,15 @@ def other(value: Value) -> Value:
         return value + 1 if value == 1 else value - 1
     if isinstance(value, float):
         return value * 0.999 if value else 1e-3
-    others = {"snow": "wet", "wet": "snow", "rail_condition": "particle_em", "track": "map", "": "tunnel 0 1000"}
+    others = {
+        "axle": "radar",
+        "cylinder": "mean",
+        "snow": "wet",
+        "wet": "snow",
+        "rail_condition": "particle_em",
+        "track": "map",
+        "": "tunnel 0 1000",
+    }
     return others[value]
 
 

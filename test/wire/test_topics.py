@@ -14,16 +14,18 @@ from test_convert import as_rosbags
 
 from adhesion_node.bag import encode, serialize
 from adhesion_node.bag import types as bag_types
-from adhesion_node.core import Estimate, Regime
+from adhesion_node.core import Estimate, ImuSample, Regime, SpeedSample
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.nodes.ros import types
-from adhesion_node.wire.codecs import Line, plain
+from adhesion_node.wire.codecs import ATMOSPHERE_PA, Line, Rejected, plain
 from adhesion_node.wire.results import Status
 from adhesion_node.wire.topics import (
+    BRAKE_DEMAND,
     BRAKE_PRESSURE,
     CLOCK,
+    IMU,
     POSITION,
     SPEED,
     TOPICS,
@@ -46,7 +48,9 @@ PEAK = SimpleNamespace(known=True, mu_max=0.35, lambda_m=0.1)
 SENSED = {
     POSITION: ((1234.5,), 0.25),
     BRAKE_PRESSURE: ((511_325.0,), 0.0),
+    BRAKE_DEMAND: ((411_325.0,), 0.0),
     SPEED: ((83.3,), 0.01),
+    IMU: ((-1.2,), 0.0025),
     WHEEL_SPEED: ((180.0, -0.5), 0.0),
     TRACTION_FORCE: ((-3e5,), 0.0),
 }
@@ -87,7 +91,7 @@ def test_one_codec_serves_rclpy_rosbags_and_plain_objects(topic: Topic) -> None:
 def test_what_is_read_of_a_sensor_is_what_was_built(topic: Topic) -> None:
     values, variance = SENSED[topic]
     sample = topic.read(topic.build(plain, T_NS, values, variance))
-    gauge = (410_000.0,) if topic is BRAKE_PRESSURE else values
+    gauge = (values[0] - ATMOSPHERE_PA,) if topic in (BRAKE_PRESSURE, BRAKE_DEMAND) else values
     assert tuple(sample) in ((T_NS, *gauge), (T_NS, gauge), (T_NS, *gauge, variance))
 
 
@@ -97,6 +101,34 @@ def test_a_name_stands_once() -> None:
 
 def pressure(absolute_pa: float) -> Any:
     return brake_pressure(T_NS, absolute_pa, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("told", "variance"), [(0.04, 0.04), (0.0, None), (-1.0, None), (math.nan, None), (1e300, None)]
+)
+def test_a_speed_has_the_variance_of_its_message_and_zero_is_unknown(told: float, variance: float | None) -> None:
+    assert SPEED.read(SPEED.build(plain, T_NS, (70.0,), told)) == SpeedSample(T_NS, 70.0, variance)
+
+
+def test_an_imu_that_measures_no_acceleration_is_refused() -> None:
+    assert IMU.read(IMU.build(plain, T_NS, (-0.9,), 0.0)) == ImuSample(T_NS, -0.9, None)
+    assert IMU.read(IMU.build(plain, T_NS, (-0.9,), 0.01)) == ImuSample(T_NS, -0.9, 0.01)
+    with pytest.raises(Rejected, match=r"covariance\[0\] = -1: .* says that none is measured"):
+        IMU.read(IMU.build(plain, T_NS, (-0.9,), -1.0))
+    with pytest.raises(Rejected, match=r"acceleration x = nan"):
+        IMU.read(IMU.build(plain, T_NS, (math.nan,), 0.01))
+
+
+def test_an_axle_without_a_speed_leaves_the_others() -> None:
+    """A bogie that has dropped out: the message was refused as a whole."""
+    sample = WHEEL_SPEED.read(WHEEL_SPEED.build(plain, T_NS, (math.nan, 20.0, math.nan, 21.0)))
+    assert sample.is_valid()
+    assert sample.known_radps == (20.0, 21.0)
+    assert len(sample.speeds_radps) == 4
+    with pytest.raises(Rejected, match=r"wheel speed of axle_1 = nan: give a finite number"):
+        WHEEL_SPEED.read(WHEEL_SPEED.build(plain, T_NS, (math.nan, math.nan)))
+    with pytest.raises(Rejected, match=r"wheel speed of axle_2 = inf"):
+        WHEEL_SPEED.read(WHEEL_SPEED.build(plain, T_NS, (math.nan, math.inf)))
 
 
 def test_high_up_the_air_is_thin_and_a_full_brake_is_full() -> None:

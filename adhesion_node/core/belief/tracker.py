@@ -10,25 +10,38 @@ import math
 
 import numpy as np
 
-from ..intake.samples import Measurement
+from ..intake.samples import MAX_VARIANCE_M2, Measurement
 from .gaussian import Gaussian, observe
 
 
 def meet(measurement: Measurement, unknown_speed_mps: float) -> Gaussian:
-    """Belief of a train of which one position is known, and of the speed only how large it may be."""
-    mean = np.array([measurement.position_m, unknown_speed_mps])
-    return Gaussian(mean, np.diag([measurement.variance_m2, unknown_speed_mps**2]))
+    """Belief of a train of which one position is known, and of the speed only how large it may be.
+
+    Without a position it is anywhere within 10 km of 0.
+    """
+    position, variance = measurement[1:3] if measurement.has_position else (0.0, MAX_VARIANCE_M2)
+    return Gaussian(np.array([position, unknown_speed_mps]), np.diag([variance, unknown_speed_mps**2]))
+
+
+def place(belief: Gaussian, measurement: Measurement) -> Gaussian:
+    """Give a train its first position; its speed is known."""
+    mean = np.array([measurement.position_m, belief.mean[1]])
+    return Gaussian(mean, np.diag([measurement.variance_m2, belief.covariance[1, 1]]))
 
 
 def innovation(predicted: Gaussian, measurement: Measurement) -> float:
-    """Deviation of the measured position from the prediction in standard deviations."""
+    """Deviation of the measured position, if there is one, from the prediction in standard deviations."""
+    if not measurement.has_position:
+        return 0.0
     variance = predicted.covariance[0, 0] + measurement.variance_m2
     return abs(measurement.position_m - float(predicted.mean[0])) / math.sqrt(variance)
 
 
 def correct(predicted: Gaussian, measurement: Measurement, speed_variance: float) -> Gaussian:
-    """Take in the measured position, and the measured speed unless `speed_variance` is infinite."""
-    belief = observe(predicted, 0, measurement.position_m, measurement.variance_m2)
+    """Take in the measured position, if there is one, and the measured speed unless `speed_variance` is infinite."""
+    belief = predicted
+    if measurement.has_position:
+        belief = observe(belief, 0, measurement.position_m, measurement.variance_m2)
     if measurement.speed_mps is not None and math.isfinite(speed_variance):
         belief = observe(belief, 1, measurement.speed_mps, speed_variance)
     return belief

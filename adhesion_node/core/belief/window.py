@@ -25,7 +25,7 @@ class WindowSample(NamedTuple):
     speed_mps: float
     speed_variance: float
     wheel_mps: float = math.nan
-    """Speed of the wheels' rims; NaN where none was measured."""
+    """Speed of the median wheel's rim; NaN where none was measured."""
 
 
 @dataclass(frozen=True)

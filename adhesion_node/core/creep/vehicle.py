@@ -2,6 +2,7 @@
 
 """The traction unit: how what its sensors measure becomes creep and adhesion, He et al. 2017, (1)-(3)."""
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,21 +44,21 @@ class Vehicle:
     def __post_init__(self) -> None:
         check_settings(self, "vehicle.")
 
-    def creep_variance(self, mean_creep: float, speed_mps: float) -> float:
-        """Variance of the mean creep by the noise of speed and wheel speeds, from the derivatives of (2)."""
-        wheels = (self.wheel_radius_m * self.wheel_std_radps) ** 2 / self.axles
+    def creep_variance(self, mean_creep: float, speed_mps: float, axles: int) -> float:
+        """Variance of the mean creep of axles by the noise of speed and wheel speeds, from the derivatives of (2)."""
+        wheels = (self.wheel_radius_m * self.wheel_std_radps) ** 2 / axles
         return (((1.0 + mean_creep) * self.speed_std_mps) ** 2 + wheels) / speed_mps**2
 
     def sample(
         self, t_ns: int, wheels_radps: tuple[float, ...], speed_mps: float, force_n: float
     ) -> CreepSample | Event:
-        """Form creep (2), the mean over the axles, and adhesion (3), or say why that cannot be."""
+        """Form creep (2), the mean over the axles known (NaN: is not), and adhesion (3), or say why that cannot be."""
         if len(wheels_radps) != self.axles:
             return Event(Outcome.AXLES, f"axles = {len(wheels_radps)}")
         if speed_mps < self.min_speed_mps:
             return Event(Outcome.SLOW, f"speed x = {speed_mps:g}")
-        creeps = [creep(wheel, speed_mps, self.wheel_radius_m) for wheel in wheels_radps]
-        mean = sum(creeps) / self.axles
+        creeps = [creep(wheel, speed_mps, self.wheel_radius_m) for wheel in wheels_radps if not math.isnan(wheel)]
+        mean = sum(creeps) / len(creeps)
         if max(creeps) - min(creeps) > UNEQUAL_SHARE * abs(mean) + UNEQUAL_CREEP:
             return Event(Outcome.UNEQUAL, f"creeps = {min(creeps):.3g} to {max(creeps):.3g}")
         load_kg = self.axles * self.axle_load_kg
@@ -65,7 +66,7 @@ class Vehicle:
             t_ns,
             mean,
             used_adhesion(force_n, load_kg),
-            self.creep_variance(mean, speed_mps),
+            self.creep_variance(mean, speed_mps, len(creeps)),
             used_adhesion(self.force_std_n, load_kg) ** 2,
         )
 

@@ -22,6 +22,9 @@ NOTHING = Stream()
 PRESENT_NS = 3 * S
 """A sensor that has not been heard for so long is not waited for: three messages of the slowest, of 1 Hz."""
 
+MOST_EACH = 400
+"""Samples of a sensor that an anchor gets at most: 2 s of 200 Hz."""
+
 
 class Source(NamedTuple):
     """A sensor beside the anchor, and how its samples are paired."""
@@ -31,8 +34,9 @@ class Source(NamedTuple):
     """How long an anchor waits for it, by the stamps."""
     age_ns: int
     """Age up to which its newest sample counts."""
-    once: bool = False
-    """Whether a sample is one observation, which must not count twice; else the last value holds."""
+    each: bool = False
+    """Whether an anchor gets every sample since the one before, each once, and such as came late and are no older
+    than it by more than the age; else the last value holds."""
 
 
 class Gate(NamedTuple):
@@ -56,10 +60,11 @@ class Gate(NamedTuple):
 
 
 class Matched(NamedTuple):
-    """An anchor and the samples of its time, in the order of `Gate.sources`; None where one measured nothing."""
+    """An anchor and the samples of its time, in the order of `Gate.sources`."""
 
     anchor: Any
     values: tuple[Any, ...]
+    """A sample, None where one measured nothing; of a source whose samples come `each`, a tuple of them."""
 
 
 class Inbox(NamedTuple):
@@ -98,13 +103,15 @@ def release(gate: Gate, inbox: Inbox, count: int) -> tuple[Inbox, tuple[Matched,
         at_turn = inbox._replace(begun_ns=anchor.t_ns) if begins else inbox
         if len(matched) >= count and _waits(gate, at_turn, anchor):
             break
-        inbox = at_turn._replace(released_ns=anchor.t_ns)
         sources = () if isinstance(anchor, Measurement) else gate.sources
-        values = tuple(_value(inbox, source, anchor.t_ns) for source in sources)
-        for source, value in zip(sources, values, strict=True):
-            if source.once and value is not None:
-                spent = inbox.others[source.kind]._replace(spent_ns=value.t_ns)
-                inbox = inbox.with_stream(source.kind, spent)
+        values = tuple((_each if source.each else _value)(at_turn, source, anchor.t_ns) for source in sources)
+        spent = {
+            source.kind: at_turn.others[source.kind]._replace(spent_ns=value[-1].t_ns)
+            for source, value in zip(sources, values, strict=True)
+            if source.each and value
+        }
+        others = MappingProxyType({**at_turn.others, **spent}) if spent else at_turn.others
+        inbox = at_turn._replace(released_ns=anchor.t_ns, others=others)
         matched.append(Matched(anchor, values))
     left = inbox.anchors._replace(samples=inbox.anchors.samples[len(matched) :])
     return inbox._replace(anchors=left) if matched else inbox, tuple(matched)
@@ -133,8 +140,19 @@ def _is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
     return begins or inbox.stream(source.kind).has_between(t_ns - PRESENT_NS, t_ns - source.wait_ns)
 
 
+def _known_ns(inbox: Inbox, source: Source, t_ns: int) -> int:
+    """Up to when the samples of a sensor are used at a time: what was not waited for must have been there before."""
+    return t_ns if _is_present(inbox, source, t_ns) else t_ns - source.wait_ns
+
+
 def _value(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
     """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
-    known_ns = t_ns if _is_present(inbox, source, t_ns) else t_ns - source.wait_ns
-    latest = inbox.stream(source.kind).latest(known_ns)
+    latest = inbox.stream(source.kind).latest(_known_ns(inbox, source, t_ns))
     return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest
+
+
+def _each(inbox: Inbox, source: Source, t_ns: int) -> tuple[Any, ...]:
+    """The samples of a sensor up to a time that are not used up, the newest ones where they are too many."""
+    before_ns = t_ns if inbox.released_ns is None else min(inbox.released_ns, t_ns)
+    unspent = inbox.stream(source.kind).unspent(before_ns - source.age_ns, _known_ns(inbox, source, t_ns))
+    return unspent[-MOST_EACH:]

@@ -2,12 +2,19 @@
 
 """What goes into the estimators: one sample per message of a sensor, and what they make together."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Callable
+from itertools import chain
 from typing import NamedTuple
 
 MAX_POSITION_M = 1e7
 MAX_SPEED_MPS = 200.0
 MAX_PRESSURE_PA = 1e7
+MAX_ACCELERATION_MPS2 = 200.0
+"""Of the shocks that a bogie feels too."""
+
 MIN_VARIANCE_M2, MAX_VARIANCE_M2 = 1e-12, 1e8
 """From (1 um)^2 to (10 km)^2: beyond them arithmetic suffers and no sensor exists."""
 
@@ -41,21 +48,53 @@ class SpeedSample(NamedTuple):
 
     t_ns: int
     speed_mps: float
+    variance: float | None = None
+    """(m/s)^2; None: unknown."""
 
     def is_valid(self) -> bool:
         """Whether it is finite and physically possible."""
-        return abs(self.speed_mps) <= MAX_SPEED_MPS
+        return abs(self.speed_mps) <= MAX_SPEED_MPS and _is_variance(self.variance)
+
+
+class ImuSample(NamedTuple):
+    """A measured acceleration along the track, forward positive: what an accelerometer feels, so without the grade."""
+
+    t_ns: int
+    acceleration_mps2: float
+    variance: float | None = None
+    """(m/s^2)^2; None: unknown."""
+
+    def is_valid(self) -> bool:
+        """Whether it is finite and physically possible."""
+        return abs(self.acceleration_mps2) <= MAX_ACCELERATION_MPS2 and _is_variance(self.variance)
+
+
+class DemandSample(NamedTuple):
+    """The brake-cylinder pressure, gauge, that the driver's handle or valve demands."""
+
+    t_ns: int
+    pressure_pa: float
+
+    def is_valid(self) -> bool:
+        """Whether it is finite and physically possible."""
+        return abs(self.pressure_pa) <= MAX_PRESSURE_PA
 
 
 class WheelSample(NamedTuple):
-    """Measured angular speeds of the axles."""
+    """Measured angular speeds of the axles, every time in the same order; NaN where one is not known."""
 
     t_ns: int
     speeds_radps: tuple[float, ...]
 
+    @property
+    def known_radps(self) -> tuple[float, ...]:
+        """Those of the axles that are known."""
+        return tuple(speed for speed in self.speeds_radps if not math.isnan(speed))
+
     def is_valid(self) -> bool:
-        """Whether there are any and all are finite."""
-        return bool(self.speeds_radps) and all(map(math.isfinite, self.speeds_radps))
+        """Whether any is known and none infinite."""
+        known = self.known_radps
+        return bool(known) and all(map(math.isfinite, known))
 
 
 class ForceSample(NamedTuple):
@@ -70,29 +109,51 @@ class ForceSample(NamedTuple):
 
 
 class Measurement(NamedTuple):
-    """One position fix with what the other sensors knew at its time.
+    """What is known of one time: a position with what the other sensors measured up to it, or that alone.
 
-    `brake_pressure_pa` is gauge; None stands for "not measured".
+    Pressures are gauge; None stands for "not measured". Without a position `variance_m2` is infinite, and `position_m`
+    says nothing. `pressures`, `speeds`, `wheels` and `imu` are all samples since the measurement before, by their
+    stamps; each comes once. One that was late may be stamped before that, by `pressure_wait_s` at most.
     """
 
     t_ns: int
     position_m: float
     variance_m2: float
     brake_pressure_pa: float | None = None
+    """The newest one, up to `pressure_age_s` old."""
     speed_mps: float | None = None
-    wheel_radps: float | None = None
-    """Angular speed of the median axle."""
+    """The newest one since the measurement before, up to `pressure_wait_s` old."""
+    demand_pa: float | None = None
+    """What the handle or valve demands: the newest one, up to `pressure_age_s` old."""
+    pressures: tuple[PressureSample, ...] = ()
+    speeds: tuple[SpeedSample, ...] = ()
+    wheels: tuple[WheelSample, ...] = ()
+    imu: tuple[ImuSample, ...] = ()
+
+    @property
+    def has_position(self) -> bool:
+        """Whether a position was measured."""
+        return self.variance_m2 != math.inf
 
     def is_valid(self) -> bool:
-        """Whether every number is finite and physically possible."""
-        pressure, speed, wheel = self.brake_pressure_pa, self.speed_mps, self.wheel_radps
-        return (
-            PositionSample(*self[:3]).is_valid()
-            and (pressure is None or PressureSample(self.t_ns, pressure).is_valid())
-            and (speed is None or SpeedSample(self.t_ns, speed).is_valid())
-            and (wheel is None or math.isfinite(wheel))
+        """Whether every number is finite and physically possible; a position need not be there."""
+        scalars: tuple[tuple[Callable[[int, float], Sample], float | None], ...] = (
+            (PressureSample, self.brake_pressure_pa),
+            (SpeedSample, self.speed_mps),
+            (DemandSample, self.demand_pa),
         )
+        beside = [kind(self.t_ns, value) for kind, value in scalars if value is not None]
+        position = [PositionSample(*self[:3])] if self.has_position else []
+        every = chain(position, beside, self.pressures, self.speeds, self.wheels, self.imu)
+        return all(sample.is_valid() for sample in every)
 
 
-Sample = PositionSample | PressureSample | SpeedSample | WheelSample | ForceSample | Measurement
+Sample = (
+    PositionSample | PressureSample | SpeedSample | ImuSample | DemandSample | WheelSample | ForceSample | Measurement
+)
 """Whatever the gate for time takes."""
+
+
+def _is_variance(variance: float | None) -> bool:
+    """Whether a variance is one, or unknown."""
+    return variance is None or 0.0 < variance < math.inf

@@ -29,7 +29,7 @@ class Stream(NamedTuple):
     allowed_ns: int = 0
     """When the next sample would come if all had kept the mean (generic cell rate algorithm)."""
     spent_ns: int | None = None
-    """Stamp up to which the samples have been used up, where each is one observation."""
+    """Stamp up to which the samples have been used up, where each is given out once."""
 
     def refusal(self, t_ns: int) -> Outcome | None:
         """Why a sample of that stamp may not be added; None where it may."""
@@ -76,11 +76,16 @@ class Stream(NamedTuple):
         return self.newest_ns is not None and self.newest_ns >= t_ns
 
     def latest(self, t_ns: int) -> Any | None:
-        """The newest sample that is not later than a time and not used up; None where there is none."""
+        """The newest sample that is not later than a time; None where there is none."""
         index = bisect_right(self.samples, t_ns, key=_stamp) - 1
-        if index < 0 or (self.spent_ns is not None and self.samples[index].t_ns <= self.spent_ns):
-            return None
-        return self.samples[index]
+        return None if index < 0 else self.samples[index]
+
+    def unspent(self, first_ns: int, last_ns: int) -> tuple[Any, ...]:
+        """The samples from the first to the last time that are not used up."""
+        if self.spent_ns is not None:
+            first_ns = max(first_ns, self.spent_ns + 1)
+        first, end = (bisect_left(self.samples, t_ns, key=_stamp) for t_ns in (first_ns, last_ns + 1))
+        return self.samples[first:end]
 
 
 def _stamp(sample: Any) -> int:

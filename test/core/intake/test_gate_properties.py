@@ -10,7 +10,16 @@ from collections.abc import Callable, Mapping
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from adhesion_node.core import Config, PositionSample, PressureSample, Sample, SpeedSample, WheelSample
+from adhesion_node.core import (
+    Config,
+    DemandSample,
+    ImuSample,
+    PositionSample,
+    PressureSample,
+    Sample,
+    SpeedSample,
+    WheelSample,
+)
 from adhesion_node.core.estimator import gate_of
 from adhesion_node.core.intake.inbox import Pushed, drain, push, settle
 from adhesion_node.core.intake.outcome import Outcome
@@ -22,6 +31,8 @@ KINDS: tuple[Callable[[int], Sample], ...] = (
     lambda ms: PressureSample(ms * MS, float(ms)),
     lambda ms: SpeedSample(ms * MS, 10.0),
     lambda ms: WheelSample(ms * MS, (20.0,)),
+    lambda ms: ImuSample(ms * MS, -0.1),
+    lambda ms: DemandSample(ms * MS, float(ms)),
 )
 WAIT_MS = round(Config().pressure_wait_s * 1000)
 LAG_MS = 500
@@ -91,15 +102,21 @@ def test_every_position_is_released_or_counted_once(
         assert not inbox.anchors.samples
         for anchor, values in matched:
             for value, source in zip(values, gate.sources, strict=True):
-                assert value is None or 0 <= anchor.t_ns - value.t_ns <= source.age_ns
+                assert source.each or value is None or 0 <= anchor.t_ns - value.t_ns <= source.age_ns
+                assert not source.each or all(sample.t_ns <= anchor.t_ns for sample in value)
+                assert not source.each or list(value) == sorted(set(value))
 
 
 @settings(deadline=None, max_examples=60)
-@given(sensors(), st.lists(st.integers(0, WAIT_MS - 1), min_size=4, max_size=4), st.lists(st.integers(0, LAG_MS - 1)))
+@given(
+    sensors(),
+    st.lists(st.integers(0, WAIT_MS - 1), min_size=len(KINDS), max_size=len(KINDS)),
+    st.lists(st.integers(0, LAG_MS - 1)),
+)
 def test_no_order_of_arrival_is_seen(streams: list[list[int]], delays: list[int], late: list[int]) -> None:
     """Each sensor is delayed by less than the wait; with max_lag_s positions come in any order within it."""
     for lag_ms, further in ((0, [0]), (LAG_MS, late or [0])):
         gate = gate_of(Config(max_lag_s=lag_ms / 1000))
         own = delays if lag_ms == 0 else [0, *delays[1:]]
-        prompt = passed(gate, arrived(streams, dict.fromkeys(range(4), 0), [0]))[:2]
+        prompt = passed(gate, arrived(streams, dict.fromkeys(range(len(KINDS)), 0), [0]))[:2]
         assert passed(gate, arrived(streams, dict(enumerate(own)), further))[:2] == prompt

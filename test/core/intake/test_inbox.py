@@ -10,7 +10,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adhesion_node.core import Config, ForceSample, PositionSample, PressureSample, Sample, SpeedSample, WheelSample
+from adhesion_node.core import (
+    Config,
+    DemandSample,
+    ForceSample,
+    ImuSample,
+    PositionSample,
+    PressureSample,
+    Sample,
+    SpeedSample,
+    WheelSample,
+)
 from adhesion_node.core.creep.config import CreepConfig
 from adhesion_node.core.creep.estimator import gate_of as creep_gate_of
 from adhesion_node.core.estimator import gate_of
@@ -81,14 +91,16 @@ def test_pairs_equal_stamps_at_once() -> None:
     feeder = running()
     assert feeder.push(pressure(1.1, 5.0)) == []
     ((anchor, values),) = feeder.push(position(1.1))
-    assert (anchor, values) == (position(1.1), (pressure(1.1, 5.0), None, None))
+    assert (anchor, values) == (position(1.1), (pressure(1.1, 5.0), None, (pressure(1.1, 5.0),), (), (), ()))
 
 
 def test_in_the_beginning_every_sensor_is_waited_for() -> None:
     feeder = Feeder()
     assert feeder.push(pressure(0.0, 5.0), position(0.0)) == []
-    ((_, values),) = feeder.push(speed(0.0, 9.0), WheelSample(0, (20.0,)))
-    assert values == (pressure(0.0, 5.0), speed(0.0, 9.0), WheelSample(0, (20.0,)))
+    others: list[Sample] = [speed(0.0, 9.0), WheelSample(0, (20.0,)), ImuSample(0, -0.1), DemandSample(0, 6.0)]
+    assert feeder.push(*others[:-1]) == []
+    ((_, values),) = feeder.push(others[-1])
+    assert values == (pressure(0.0, 5.0), others[3], (pressure(0.0, 5.0),), *((each,) for each in others[:3]))
 
 
 def test_the_order_of_arrival_within_a_tick_does_not_matter() -> None:
@@ -101,7 +113,7 @@ def test_the_order_of_arrival_within_a_tick_does_not_matter() -> None:
         wanted = wanted or feeder.matched
         assert feeder.matched == wanted
     assert wanted is not None
-    assert [values[:2] for _, values in wanted] == [(tick[1], tick[2]) for tick in ticks]
+    assert [(values[0], values[3]) for _, values in wanted] == [(tick[1], (tick[2],)) for tick in ticks]
 
 
 def test_waits_for_the_pressure_of_its_own_time() -> None:
@@ -139,14 +151,35 @@ def test_an_old_value_counts_as_none() -> None:
     assert known[2.1] is None
 
 
-def test_a_speed_counts_once_and_only_fresh() -> None:
+def test_every_speed_comes_once_between_two_positions() -> None:
     feeder = running()
     for k in range(1, 6):
         feeder.push(pressure(1 + k / 10, 0.0), speed(1 + k / 10, float(k)), position(1 + k / 10))
-    feeder.push(pressure(1.55, 0.0), position(1.55), pressure(2.0, 0.0), position(2.0))
+    feeder.push(pressure(1.55, 0.0), position(1.55), speed(1.62, 7.0), speed(1.6, 6.0), speed(1.7, 8.0))
+    feeder.push(pressure(1.7, 0.0), position(1.7), speed(1.71, 9.0))
     feeder.drain()
-    speeds = {each.anchor.t_ns / S: each.values[1] and each.values[1].speed_mps for each in feeder.matched}
-    assert [speeds[t] for t in (1.3, 1.4, 1.5, 1.55, 2.0)] == [3.0, 4.0, 5.0, None, None]
+    speeds = {each.anchor.t_ns / S: [one.speed_mps for one in each.values[3]] for each in feeder.matched}
+    assert [speeds[t] for t in (1.3, 1.4, 1.5, 1.55, 1.7)] == [[1.0, 2.0, 3.0], [4.0], [5.0], [], [6.0, 7.0, 8.0]]
+
+
+def test_a_speed_that_comes_late_is_given_out_with_the_next_position_if_it_is_not_too_old() -> None:
+    """Speeds of 2 Hz, 0.4 s late, beside positions of 10 Hz: they are not waited for so long."""
+    feeder = running()
+    for k in range(1, 40):
+        late = [speed(1 + k / 10 - 0.4, float(k))] if k % 5 == 0 else []
+        feeder.push(pressure(1 + k / 10, 0.0), *late, position(1 + k / 10))
+    feeder.drain()
+    ages = [each.anchor.t_ns - one.t_ns for each in feeder.matched for one in each.values[3]]
+    assert len(ages) >= 6
+    assert max(ages) <= 0.3 * S + 1
+
+
+def test_the_samples_of_a_long_gap_are_bounded() -> None:
+    feeder = running()
+    feeder.push(*(speed(1 + k / 200, float(k)) for k in range(2000)))
+    feeder.push(position(11.0))
+    ((_, values),) = feeder.drain()[-1:]
+    assert [one.speed_mps for one in values[3]] == [float(k) for k in range(1600, 2000)]
 
 
 def test_late_and_double_anchors_are_told() -> None:

@@ -40,7 +40,7 @@ def read(sent: SensorMessage, message: Any) -> Any:
 def test_plain_messages_are_read_as_those_of_ros(fault: str) -> None:
     world = World("cruise", ALL_SENSORS, Plan(fault, 1.0))
     sent = [message for _, messages in ticks(world, 1) for message in messages][:400]
-    assert {message.topic for message in sent} == set(ADHESION_INPUTS)
+    assert {message.topic for message in sent} <= set(ADHESION_INPUTS)
     assert [read(m, m.build(plain)) for m in sent] == [read(m, message_of(m)) for m in sent]
 
 
