@@ -1,0 +1,90 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Creep force of a braked wheel: Polach's curve with friction that falls with the sliding speed.
+
+    F/Q = mu0 ((1 - A) exp(-B w) + A) (2/pi) (k_A e/(1 + (k_A e)^2) + arctan(k_S e)),    e = (pi/4) K s/mu0
+
+w is the sliding speed v - r omega, s = w/v the creep, Q the load. K is the slope of F/Q at s = 0 by Kalker's linear
+theory where k_A = k_S = 1; contaminated rails have smaller k, so a softer contact. Oldrich Polach, "Creep forces in
+simulations of traction vehicles running on adhesion limit", Wear 258 (2005) 992-1000, equations 2 to 6 and its table.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from .journey import Array
+
+KALKER_SLOPE = 120.0
+"""G a b c11/Q of a wheel of 0.45 m under 7 to 8 t."""
+
+CREEPING_MPS = 0.2
+"""Below this speed of the train the creep counts against this one: a quotient of two zeros is none."""
+
+CONDITIONS = np.array([0.05, 0.08, 0.15, 0.25])
+K_A, K_S = np.array([0.3, 0.3, 0.3, 1.0]), np.array([0.1, 0.1, 0.1, 0.4])
+FALL_A, FALL_B = np.array([0.85, 0.5, 0.5, 0.4]), np.array([0.10, 0.15, 0.15, 0.60])
+"""The curve's parameters at these mu0: a film of leaves, wet, wet, dry; between them they follow log mu0."""
+
+
+class Contact(NamedTuple):
+    """What the rail offers at some places; equal shapes."""
+
+    mu0: Array
+    k_a: Array
+    k_s: Array
+    fall_a: Array
+    fall_b: Array
+
+
+def contact(mu0: Array) -> Contact:
+    """Return the curves of rails of these mu0, any shape."""
+    place, nodes = np.log(mu0), np.log(CONDITIONS)
+    return Contact(mu0, *(np.interp(place, nodes, values) for values in (K_A, K_S, FALL_A, FALL_B)))
+
+
+def adhesion(sliding_mps: Array, speed_mps: Array, rail: Contact) -> tuple[Array, Array]:
+    """Return F/Q, positive where it brakes the train, and its derivative by the sliding speed, s/m."""
+    stretch = np.pi / 4.0 * KALKER_SLOPE / (rail.mu0 * np.maximum(speed_mps, CREEPING_MPS))
+    e = stretch * sliding_mps
+    x, y = rail.k_a * e, rail.k_s * e
+    q = 1.0 / (1.0 + x * x)
+    shape = x * q + np.arctan(y)
+    falling = (1.0 - rail.fall_a) * np.exp(-rail.fall_b * np.abs(sliding_mps))
+    friction = falling + rail.fall_a
+    rising = stretch * (rail.k_a * (1.0 - x * x) * q * q + rail.k_s / (1.0 + y * y))
+    scale = 2.0 / np.pi * rail.mu0
+    slope = rising * friction - np.sign(sliding_mps) * rail.fall_b * falling * shape
+    return scale * shape * friction, scale * slope
+
+
+_CREEPS = np.geomspace(2e-4, 1.0, 400)
+_SPEEDS = np.concatenate([[0.0], np.geomspace(0.3, 110.0, 60)])
+_LEVELS = np.geomspace(0.005, 1.0, 160)
+
+
+def _peaks() -> tuple[Array, Array]:
+    speed = np.maximum(_SPEEDS, CREEPING_MPS)[None, :, None]
+    rail = Contact(*(values[:, None, None] for values in contact(_LEVELS)))
+    curves = adhesion(_CREEPS * speed, speed, rail)[0]
+    best = curves.argmax(axis=-1)
+    return curves.max(axis=-1) / _LEVELS[:, None], _CREEPS[best]
+
+
+_PEAK_RATIO, _PEAK_CREEP = _peaks()
+
+
+def peak(speed_mps: Array, rail: Contact) -> tuple[Array, Array]:
+    """Return the peak of F/Q and its creep; bilinear in a table over log mu0 and speed, shapes broadcast."""
+    level = np.interp(np.log(rail.mu0), np.log(_LEVELS), np.arange(_LEVELS.size))
+    speed = np.interp(speed_mps, _SPEEDS, np.arange(_SPEEDS.size))
+    i, j = (np.minimum(at.astype(np.intp), size - 2) for at, size in ((level, _LEVELS.size), (speed, _SPEEDS.size)))
+    a, b = level - i, speed - j
+
+    def look(table: Array) -> Array:
+        low = table[i, j] * (1.0 - b) + table[i, j + 1] * b
+        high = table[i + 1, j] * (1.0 - b) + table[i + 1, j + 1] * b
+        result: Array = low * (1.0 - a) + high * a
+        return result
+
+    return rail.mu0 * look(_PEAK_RATIO), look(_PEAK_CREEP)

@@ -1,0 +1,52 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Motion of R trains side by side, their wheels by a linearly implicit step.
+
+    M dv = -(sum F + R) dt,    m du = (F - B) dt  per group,    F = Q mu(w, v),  w = v - u
+
+u = r omega is the rim's speed, m = J/r^2, R the running resistance with that of the grade. A rolling wheel is stiff
+(the slower the train the more), so every step takes F + (dF/dw)(dv - du) for F and solves for all du and dv at once:
+the matrix is an arrowhead. No sum runs across the trains, so none depends on those beside it.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from . import creep
+from .journey import GRAVITY, Array
+from .train import Train
+
+
+class Motion(NamedTuple):
+    """Where R trains are: (R, 1), and how fast the rims of their wheels turn: (R, A)."""
+
+    position_m: Array
+    speed_mps: Array
+    rim_mps: Array
+
+
+def step(
+    motion: Motion, train: Train, rail: creep.Contact, brake_n: Array, running_n: Array, step_s: float
+) -> tuple[Motion, Array]:
+    """Return the motion a step later, and the mean force at the rails of every train, N, (R, 1).
+
+    A wheel that stands while its brake is stronger than the rail stays locked; a train that stops stays.
+    """
+    position, speed, rim = motion
+    load = train.mass_kg * GRAVITY / rim.shape[1]
+    mu, slope = creep.adhesion(speed - rim, speed, rail)
+    force, slope = load * mu, load * slope
+    locked = (rim <= 0.0) & (force < brake_n)
+    share = np.where(locked, 1.0, train.wheel_kg / (train.wheel_kg + step_s * slope))
+    free, stiff = share * force + (1.0 - share) * brake_n, share * slope
+    mass = train.mass_kg + step_s * stiff.sum(axis=1, keepdims=True)
+    change = -step_s * (free.sum(axis=1, keepdims=True) + running_n) / mass
+    force = free + stiff * change
+    turned = np.where(locked, 0.0, rim + step_s * (force - brake_n) / train.wheel_kg)
+    stops = speed + change <= 0.0
+    part = np.where(speed <= 0.0, 0.0, np.where(stops, speed / np.maximum(-change, 1e-300), 1.0))
+    after = np.where(stops, 0.0, speed + change)
+    position = position + 0.5 * (speed + after) * part * step_s
+    rim = np.where(stops, 0.0, np.maximum(turned, 0.0))
+    return Motion(position, after, rim), force.sum(axis=1, keepdims=True) * part

@@ -1,0 +1,117 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The way: mu0 of the rail and the grade, drawn along the track for one run."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import lfilter
+
+from .creep import contact
+from .journey import Array
+
+CELL_M = 1.0
+"""Spacing of the places at which the way is drawn; between them it is straight."""
+
+ROUGHNESS, CORRELATION_M = 0.05, 100.0
+"""Log-normal: standard deviation of log mu0, and length after which its correlation has fallen to 1/e."""
+
+CLEANED_BY = 4.0
+"""Groups after which the cleaning of the rail is down to 1/e of what is still to come."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rail:
+    """The rail of a scenario. Its mu0 is the mean over the train: the first group meets less, the last more."""
+
+    level: Callable[[Array, np.random.Generator], Array]
+    """mu0 at places, m, shape (N,)."""
+    cleaning: float = 1.0
+    """mu0 under the last group over that under the first."""
+    level_std: float = 0.10
+    """Standard deviation between days, of log mu0 of the whole way."""
+    roughness: float = ROUGHNESS
+
+    def cleaned(self, groups: int) -> Array:
+        """Return the factor on mu0 of every group, shape (A,): what passed before it has cleaned the rail."""
+        passed = -np.expm1(-np.arange(groups) / CLEANED_BY)
+        factor = 1.0 + (self.cleaning - 1.0) * passed / passed[-1]
+        return np.asarray(factor / factor.mean())
+
+
+Grade = Callable[[Array, np.random.Generator], Array]
+"""Rise over run at places, m, shape (N,)."""
+
+
+class Way(NamedTuple):
+    """What is drawn of one run, at places every `CELL_M` from `start_m` on; shape (N,) or (N, 5)."""
+
+    start_m: float
+    contact: Array
+    """mu0, k_A, k_S, A, B of the rail before any cleaning."""
+    grade: Array
+    """Mean under a train whose front is at the place."""
+
+
+def draw(rail: Rail, grade: Grade, train_m: float, way_m: float, rng: np.random.Generator) -> Way:
+    """Draw the way under a train from its rear at the start to `way_m` before it."""
+    start = -CELL_M * np.ceil(train_m / CELL_M + 1.0)
+    place = np.arange(start, way_m + CELL_M, CELL_M)
+    day = rail.level_std * np.clip(rng.standard_normal(), -2.0, 2.0)
+    rough = rail.roughness * correlated(place.size, CELL_M / CORRELATION_M, rng)
+    mu0 = rail.level(place, rng) * np.exp(day + rough)
+    height = np.concatenate([[0.0], np.cumsum(grade(place, rng)[:-1]) * CELL_M])
+    mean = (height - np.interp(place - train_m, place, height)) / train_m
+    return Way(float(start), np.stack(contact(mu0), axis=-1), mean)
+
+
+def correlated(count: int, step: float, rng: np.random.Generator) -> Array:
+    """Draw a stationary Gauss-Markov sequence of variance 1; `step` in correlation lengths."""
+    keep = np.exp(-step)
+    drawn = rng.standard_normal(count)
+    drawn[1:] *= np.sqrt(1.0 - keep * keep)
+    return np.asarray(lfilter([1.0], [1.0, -keep], drawn))
+
+
+def steady(mu0: float) -> Callable[[Array, np.random.Generator], Array]:
+    """One level everywhere; a grade, too."""
+    return lambda place, rng: np.full(place.shape, mu0)
+
+
+def along(*points: tuple[float, float]) -> Callable[[Array, np.random.Generator], Array]:
+    """Straight between (place, m; level), level outside."""
+    places, levels = np.array(points).T
+    return lambda place, rng: np.interp(place, places, levels)
+
+
+def patches(
+    base: float, patch: float, between_m: tuple[float, float], length_m: tuple[float, float]
+) -> Callable[[Array, np.random.Generator], Array]:
+    """Patches of another level, with borders; gaps and lengths are drawn evenly from their ranges."""
+
+    def level(place: Array, rng: np.random.Generator) -> Array:
+        count = int(np.ceil(np.ptp(place) / (between_m[0] + length_m[0]))) + 1
+        pieces = np.stack([rng.uniform(*between_m, count), rng.uniform(*length_m, count)], axis=1)
+        borders = place[0] + np.cumsum(pieces)
+        return np.where(np.searchsorted(borders, place, side="right") % 2 == 0, base, patch)
+
+    return level
+
+
+def undulating(highest: float, wave_m: tuple[float, float] = (1000.0, 4000.0)) -> Grade:
+    """Three waves of drawn lengths and phases, together at most `highest`."""
+
+    def grade(place: Array, rng: np.random.Generator) -> Array:
+        shortest, longest = wave_m
+        lengths = shortest * (longest / shortest) ** rng.random(3)
+        phases = rng.uniform(0.0, 2.0 * np.pi, 3)
+        weights = rng.dirichlet(np.ones(3))
+        waves = np.sin(2.0 * np.pi * place[:, None] / lengths + phases) @ weights
+        return np.asarray(highest * waves)
+
+    return grade
+
+
+LEVEL: Grade = steady(0.0)
