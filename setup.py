@@ -57,6 +57,7 @@ setup(
         "scipy>=1.11,<2",
         "matplotlib>=3.6,<4",
         "argcomplete>=3,<4",
+        "pyproj>=3.4,<4",
         "mcap>=1.5,<2",
         "zstandard>=0.22,<1",
         "rosbags>=0.11.6,<0.12",

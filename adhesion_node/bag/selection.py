@@ -34,7 +34,8 @@ def select(
     for the creep curve, a wheel speed.
     """
     renamed = _rename(recorded, remaps)
-    creep = any(same_name(target, topics.WHEEL_SPEED.name) for target in renamed.values())
+    enough = (*topics.POSITIONS, topics.WHEEL_SPEED)
+    has_any = any(same_name(target, topic.name) for target in renamed.values() for topic in enough)
     chosen = list(_OURS) if names is None else list(names)
     selection: dict[str, str] = {}
     for name in chosen:
@@ -45,7 +46,7 @@ def select(
             if (kind := recorded[source]) != (needed := _OURS.get(own, kind)):
                 what = _what_there_is(name, recorded)
                 raise ValueError(f"topic {source}: type = {kind}: {name} needs {needed}. {what}")
-        elif names is not None or (same_name(name, topics.POSITION.name) and not creep):
+        elif names is not None or (same_name(name, topics.POSITION.name) and not has_any):
             raise ValueError(f"topic {name}: not in the recording. {_what_there_is(name, recorded)}")
     return selection
 

@@ -108,7 +108,8 @@ class Replay(Node):
     def _position(self) -> Publisher:
         """Return the publisher whose subscribers count: the position's, or the first one's without a position."""
         named = {publisher.topic_name: publisher for publisher in self._outputs.values()}
-        return named.get(self.resolve_topic_name(topics.POSITION.name)) or next(iter(named.values()))
+        places = (named.get(self.resolve_topic_name(topic.name)) for topic in topics.POSITIONS)
+        return next(filter(None, places), None) or next(iter(named.values()))
 
     def _warn_of_losses(self) -> None:
         """At full speed only a reliable subscriber can slow the replay down; any other one may lose messages."""

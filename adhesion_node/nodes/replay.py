@@ -9,7 +9,7 @@ from functools import partial
 
 from ..bag import BagReader, select_from
 from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
-from ..wire.topics import POSITION
+from ..wire.topics import POSITIONS
 
 EXAMPLES = (
     "replay my_run --offline",
@@ -67,7 +67,8 @@ def _offline(options: argparse.Namespace) -> int:
 
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
-        wanted = options.estimator or (ADHESION if POSITION.name in selection.values() else CREEP)
+        places = {topic.name for topic in POSITIONS}
+        wanted = options.estimator or (ADHESION if places & set(selection.values()) else CREEP)
         run = offline.run if wanted == ADHESION else creep_offline.run
         return run(options, reader, selection)
 

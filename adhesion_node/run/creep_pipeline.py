@@ -17,7 +17,7 @@ from .engine import EstimatorPipeline, Verbs
 class CreepPipeline(EstimatorPipeline[CreepState, CreepEstimate, CreepEstimate]):
     """From samples to estimates of the creep curve."""
 
-    anchor = WHEEL_SPEED
+    anchors = (WHEEL_SPEED,)
 
     def __init__(self, config: CreepConfig) -> None:
         verbs = (creep.advance, creep.settle, creep.finish)

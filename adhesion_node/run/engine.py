@@ -49,8 +49,8 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
     Mutable: the one stateful thing around the pure core.
     """
 
-    anchor: Topic
-    """Its messages are the measurements; what the other sensors send belongs to them."""
+    anchors: tuple[Topic, ...]
+    """Their messages are the measurements; what the other sensors send belongs to them."""
 
     def __init__(self, verbs: Verbs[S, E]) -> None:
         self._verbs = verbs
@@ -83,7 +83,7 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message of a topic that never became a sample."""
-        self.measurements += topic == self.anchor.name
+        self.measurements += any(topic == anchor.name for anchor in self.anchors)
         self._before[reason] += 1
 
     @property

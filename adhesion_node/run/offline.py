@@ -15,9 +15,10 @@ from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
 from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.settings import SEED, SETTINGS, given, setup_of
-from ..wire.topics import ADHESION_INPUTS, POSITION, TRUTH_MU, TRUTH_STATE, Topic
+from ..wire.topics import ADHESION_INPUTS, FIX, TRUTH_MU, TRUTH_STATE, Topic
 from .engine import EstimatorPipeline
 from .pipeline import Pipeline
+from .reader import Reader
 from .score import Truth, mean_relative_error_percent
 
 Recorded = tuple[str, Any, int]
@@ -28,9 +29,13 @@ Output = TypeVar("Output")
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
-    if POSITION.name not in selection.values():
-        raise ValueError(f"bag = {reader.path}: holds no {POSITION.name}, without which nothing is identified")
     setup, truth = setup_of(parameters_of(options)), Truth()
+    anchors = [topic.name for topic in Reader(ADHESION_INPUTS, setup.line).anchors]
+    if not set(anchors) & set(selection.values()):
+        fix = f"; a {FIX.name} needs track_line" if FIX.name in selection.values() else ""
+        raise ValueError(
+            f"bag = {reader.path}: holds no {' or '.join(anchors)}, without which nothing is identified{fix}"
+        )
     pipeline = Pipeline(setup.config, setup.seed)
     replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.line)
     result = summary(pipeline, replayed, truth)
@@ -69,12 +74,13 @@ def feed(
     pipeline: EstimatorPipeline[Any, Any, Output], recorded: Iterable[Recorded], inputs: Sequence[Topic], line: Line
 ) -> Iterator[tuple[Sample, list[Output], float]]:
     """Push the messages of `inputs`; yield each sample, what it completed and how long that took, s."""
-    topics = {topic.name: topic for topic in inputs}
+    reader = Reader(inputs, line)
+    topics = {topic.name: topic for topic in reader.inputs}
     for name, message, _ in recorded:
         if name not in topics:
             continue
         try:
-            sample = topics[name].read(message, line)
+            sample = reader.read(topics[name], message)
         except Rejected as refusal:
             pipeline.refuse(name, refusal.reason)
         else:

@@ -8,7 +8,7 @@ from typing import final
 
 from ..core import Config, Estimate, Prediction, State, estimator, predict
 from ..core.physics.braking import BrakingCurve
-from ..wire.topics import POSITION
+from ..wire.topics import POSITIONS
 from .engine import EstimatorPipeline, Verbs
 
 
@@ -19,7 +19,7 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     Raises ValueError for a negative seed.
     """
 
-    anchor = POSITION
+    anchors = POSITIONS
 
     def __init__(self, config: Config, seed: int) -> None:
         verbs = (estimator.advance, estimator.settle, estimator.finish)

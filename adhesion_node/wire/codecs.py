@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from types import SimpleNamespace
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from ..core.intake.samples import (
 )
 from ..core.physics.train import Array
 from ..core.setting import check_settings, setting
+
+if TYPE_CHECKING:  # it needs a geodesy library, and that only where there is a track line
+    from .track_line import TrackLine
 
 NS = 1_000_000_000
 
@@ -62,9 +65,30 @@ class Line:
         MAX_AMBIENT_PA,
         group="intake",
     )
+    position_source: str = setting(
+        "auto",
+        "Topic of the positions; auto: fix where there is a track_line, else position, else odometry",
+        choices=("auto", "position", "fix", "odometry"),
+        group="intake",
+    )
+    position_std_m: float = setting(
+        3.0,
+        "Standard deviation of a position whose message gives none (covariance 0 or of type unknown)",
+        "m",
+        1e-3,
+        1e4,
+        group="intake",
+    )
+    max_cross_track_m: float = setting(
+        25.0, "Distance from track_line beyond which a fix is refused", "m", 0.1, 1e4, group="intake"
+    )
+    track: "TrackLine | None" = None
+    """The track's centre line, on which a `fix` is projected."""
 
     def __post_init__(self) -> None:
         check_settings(self, "")
+        if self.position_source == "fix" and self.track is None:
+            raise ValueError("position_source = 'fix': set track_line, too, on which a fix is projected")
 
 
 NOMINAL = Line()
@@ -103,8 +127,19 @@ class Reason(Enum):
 
     WRONG_FRAME = f"set header.frame_id to '{FRAME}', or the reader's parameter frame to what it is"
     NOT_FINITE = "give a finite number, or publish nothing while there is none"
-    BAD_VARIANCE = f"give covariance[0] in SI units squared, {MIN_VARIANCE_M2:g} to {MAX_VARIANCE_M2:g}"
+    BAD_VARIANCE = (
+        f"give covariance[0] in SI units squared, {MIN_VARIANCE_M2:g} to {MAX_VARIANCE_M2:g}, or 0 where unknown"
+    )
     IMPLAUSIBLE_POSITION = f"position is in m along the track, within +-{MAX_POSITION_M:g}"
+    NO_FIX = "the receiver has no fix: nothing is used until it has one"
+    IMPLAUSIBLE_FIX = "latitude is in degrees, within +-90, longitude within +-180"
+    NO_TRACK_LINE = "set track_line to a GeoJSON or CSV file with the centre line of the track"
+    OFF_TRACK = (
+        "is track_line that of this way, does it reach beyond the ends of the way, are latitude and longitude "
+        "exchanged? Raise max_cross_track_m only if the line or the receiver is that poor"
+    )
+    AMBIGUOUS = "the line comes by twice: nothing is used here; give each way or direction a track_line of its own"
+    OTHER_SOURCE = "another topic gives the positions: name the one that shall in position_source"
     IMPLAUSIBLE_PRESSURE = (
         f"fluid_pressure is absolute, in Pa, {MIN_ABSOLUTE_PA:g} to {MAX_ABSOLUTE_PA:g}: "
         f"add {ATMOSPHERE_PA:g} Pa to a gauge pressure, or the pressure of your air, and set ambient_pressure_pa "

@@ -16,13 +16,6 @@ from . import codecs
 from .codecs import FRAME, Codec, Fields, Line, New, Reason, Rejected, header, plausible, stamp_ns
 
 
-def read_position(message: Any, _line: Line) -> samples.PositionSample:
-    """Read a measured position, m and m^2, from a PoseWithCovarianceStamped; raises Rejected."""
-    place, spread, what = codecs.place_of(message), message.pose.covariance[0], "position covariance[0]"
-    variance = plausible(what, spread, Reason.BAD_VARIANCE, samples.MAX_VARIANCE_M2, samples.MIN_VARIANCE_M2)
-    return samples.PositionSample(stamp_ns(message.header), place, variance)
-
-
 def read_brake_pressure(message: Any, line: Line) -> samples.PressureSample:
     """Read a brake-cylinder pressure, gauge Pa, from a FluidPressure (absolute Pa); raises Rejected."""
     return samples.PressureSample(stamp_ns(message.header), _gauge_pa(message, line))
@@ -76,7 +69,7 @@ def read_traction_force(message: Any, _line: Line) -> samples.ForceSample:
     return samples.ForceSample(stamp_ns(message.header), force)
 
 
-def _writer(written: Callable[[New, Sequence[float], float], Fields]) -> Callable[..., Fields]:
+def writer(written: Callable[[New, Sequence[float], float], Fields]) -> Callable[..., Fields]:
     """Put the header before what is `written` of the sensor's numbers and their variance."""
 
     def write(new: New, t_ns: int, numbers: Sequence[float], variance: float = 0.0, frame: str = FRAME) -> Fields:
@@ -114,10 +107,9 @@ def _force(new: New, force_n: Sequence[float], _variance: float) -> Fields:
     return {"wrench": new("geometry_msgs/msg/Wrench", **wrench)}
 
 
-POSITION = Codec(read_position, _writer(lambda new, x, variance: {"pose": codecs.pose(new, x[0], variance)}))
-BRAKE_PRESSURE = Codec(read_brake_pressure, _writer(_pressure))
-BRAKE_DEMAND = Codec(read_brake_demand, _writer(_pressure))
-SPEED = Codec(read_speed, _writer(lambda new, speed, variance: {"twist": codecs.twist(new, speed[0], variance)}))
-IMU = Codec(read_imu, _writer(_imu))
-WHEEL_SPEED = Codec(read_wheel_speed, _writer(_wheels))
-TRACTION_FORCE = Codec(read_traction_force, _writer(_force))
+BRAKE_PRESSURE = Codec(read_brake_pressure, writer(_pressure))
+BRAKE_DEMAND = Codec(read_brake_demand, writer(_pressure))
+SPEED = Codec(read_speed, writer(lambda new, speed, variance: {"twist": codecs.twist(new, speed[0], variance)}))
+IMU = Codec(read_imu, writer(_imu))
+WHEEL_SPEED = Codec(read_wheel_speed, writer(_wheels))
+TRACTION_FORCE = Codec(read_traction_force, writer(_force))

@@ -6,17 +6,21 @@ import argparse
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core import Config
 from ..core.atp.config import SupervisionConfig
 from ..core.creep.config import CreepConfig
 from ..core.creep.vehicle import Vehicle
-from ..core.physics.track import parse_track
+from ..core.intake.samples import MAX_POSITION_M
+from ..core.physics.track import Grade, Track, parse_track
 from ..core.physics.train import Train
 from ..core.setting import Setting, check_settings, make, setting, settings_of
 from . import parameter_file
 from .codecs import Line
+
+if TYPE_CHECKING:
+    from .track_line import TrackLine
 
 TRACK = Setting(
     "track",
@@ -26,9 +30,26 @@ TRACK = Setting(
     group="track",
 )
 
+TRACK_LINE = Setting(
+    "track_line",
+    "",
+    "File with the track's centre line, GeoJSON or CSV: a fix is projected on it; its heights are the track's grades",
+    group="track",
+)
+TRACK_START = Setting(
+    "track_start_m",
+    0.0,
+    "Position of the first point of track_line",
+    "m",
+    -MAX_POSITION_M,
+    MAX_POSITION_M,
+    group="track",
+)
+
 SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
 
-FRAME_ID, AMBIENT = settings_of(Line)
+OF_LINE = settings_of(Line)
+FRAME_ID, AMBIENT, *_ = OF_LINE
 
 _SILENCE = "Silence of the sensor after which /diagnostics says STALE"
 SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
@@ -49,7 +70,7 @@ class Watchdogs:
 
 
 _OF_TRAIN = settings_of(Train, "train.", "train")
-SETTINGS = (SEED, FRAME_ID, AMBIENT, SENSOR_TIMEOUT, *settings_of(Config), *_OF_TRAIN, TRACK)
+SETTINGS = (SEED, *OF_LINE, SENSOR_TIMEOUT, *settings_of(Config), *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START)
 """All settings of the estimator."""
 
 CREEP_SETTINGS = (
@@ -104,8 +125,28 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     check_names(values, SETTINGS)
     seed, timeout_s, track = (one.check(values.get(one.name, one.default)) for one in (SEED, SENSOR_TIMEOUT, TRACK))
     train = make(Train, values, "train.")
-    config = make(Config, values, train=train, track=parse_track(str(track), train.length_m))
-    return Setup(config, int(seed), make(Line, values), float(timeout_s))
+    profile, line = parse_track(str(track), train.length_m), _track_line(values)
+    if line is not None:
+        profile = _with_grades(profile, line.grades(train.length_m))
+    config = make(Config, values, train=train, track=profile)
+    return Setup(config, int(seed), make(Line, values, track=line), float(timeout_s))
+
+
+def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":
+    """The track's centre line, where there is one; raises ValueError with what to mend in its file."""
+    path, start_m = (one.check(values.get(one.name, one.default)) for one in (TRACK_LINE, TRACK_START))
+    if not path:
+        return None
+    from .track_file import read_track_line  # only here: without a line no geodesy is loaded
+
+    return read_track_line(str(path), float(start_m))
+
+
+def _with_grades(track: Track, grades: tuple[Grade, ...]) -> Track:
+    """The profile with the grades that the line's heights tell; ValueError where it has grades of its own."""
+    if grades and any(isinstance(section, Grade) for section in track.sections):
+        raise ValueError("track has grades and track_line has heights: leave out the one or the other")
+    return Track((*track.sections, *grades), track.train_length_m)
 
 
 def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:

@@ -8,7 +8,7 @@ Pure data, no ROS. Names are relative, so that namespaces separate trains.
 from enum import Enum
 from typing import Any, NamedTuple
 
-from . import curves, results, sensors
+from . import curves, positions, results, sensors
 from .codecs import FRAME, NOMINAL, Codec, Line, New, Reason, Rejected
 
 
@@ -75,8 +75,8 @@ class Topic(NamedTuple):
         return self.codec
 
 
-def _sensor(name: str, type_name: str, codec: Codec, meaning: str) -> Topic:
-    return Topic(name, type_name, Role.SENSOR, Quality.SENSOR, Frame.LINE, codec, meaning)
+def _sensor(name: str, type_name: str, codec: Codec, meaning: str, frame: Frame = Frame.LINE) -> Topic:
+    return Topic(name, type_name, Role.SENSOR, Quality.SENSOR, frame, codec, meaning)
 
 
 def _result(name: str, type_name: str, codec: Codec, meaning: str, quality: Quality = Quality.RESULT) -> Topic:
@@ -100,8 +100,22 @@ def _status(name: str, meaning: str) -> Topic:
 POSITION = _sensor(
     "position",
     "geometry_msgs/msg/PoseWithCovarianceStamped",
-    sensors.POSITION,
-    "**in**: measured position along the track, pose.position.x m, covariance[0] m²",
+    positions.POSITION,
+    "**in**: measured position along the track, pose.position.x m, covariance[0] m²; 0 is unknown: `position_std_m`",
+)
+FIX = _sensor(
+    "fix",
+    "sensor_msgs/msg/NavSatFix",
+    positions.FIX,
+    "**in**, instead of `position`, with `track_line`: latitude and longitude, projected on that line; the covariance "
+    "along it, `position_std_m` where it is 0 or of type unknown",
+    Frame.ANY,
+)
+ODOMETRY = _sensor(
+    "odometry",
+    "nav_msgs/msg/Odometry",
+    positions.ODOMETRY,
+    "**in**, instead of `position`: the same by pose.pose.position.x and its covariance[0]; the twist is not used",
 )
 BRAKE_PRESSURE = _sensor(
     "brake_pressure",
@@ -216,6 +230,9 @@ RESULTS, CREEP_RESULTS = topics_of(Role.ADHESION), topics_of(Role.CREEP)
 RECORDED = tuple(topic for topic in TOPICS if topic.role is not Role.CLOCK)
 """What the recorder subscribes to; /clock is left out because every message carries its log time."""
 
-ADHESION_INPUTS = (BRAKE_PRESSURE, BRAKE_DEMAND, SPEED, IMU, WHEEL_SPEED, POSITION)
+POSITIONS = (FIX, POSITION, ODOMETRY)
+"""What can give the positions: where there are several, the first of these that is heard."""
+
+ADHESION_INPUTS = (BRAKE_PRESSURE, BRAKE_DEMAND, SPEED, IMU, WHEEL_SPEED, *POSITIONS)
 CREEP_INPUTS = (SPEED, TRACTION_FORCE, WHEEL_SPEED)
-"""What the estimators take in. The last one is that without which there is no estimate."""
+"""What the estimators take in. The last one, or one of `POSITIONS`, is that without which there is no estimate."""

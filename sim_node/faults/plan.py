@@ -73,7 +73,7 @@ FAULTS: Mapping[str, Fault] = {
     "nan": Fault("additional messages with NaN", _RARELY, stream=streams.bad(value=float("nan"))),
     "inf": Fault("additional messages with -Inf", _RARELY, stream=streams.bad(value=float("-inf"))),
     "huge": Fault("additional messages with 1e308", _RARELY, stream=streams.bad(value=1e308)),
-    "zero_variance": Fault("additional positions with an empty covariance", _RARELY, stream=streams.bad(variance=0.0)),
+    "zero_variance": Fault("positions with an empty covariance", _RARELY, stream=streams.undeclared),
     "negative_variance": Fault(
         "additional positions with a negative variance", _RARELY, stream=streams.bad(variance=-0.25)
     ),

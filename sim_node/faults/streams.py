@@ -68,6 +68,7 @@ duplicated = hit(lambda messages, dose, rng: messages * 2)
 outlying = each(POSITION, lambda message, dose, rng: moved(message, math.copysign(dose.size, rng.standard_normal())))
 shifted = each(POSITION, lambda message, dose, rng: moved(message, dose.size))
 misframed = each(POSITION, lambda message, dose, rng: message._replace(frame="map"))
+undeclared = each(POSITION, lambda message, dose, rng: message._replace(variance=0.0))
 in_kmh = each(SPEED, lambda message, dose, rng: message._replace(values=(3.6 * message.values[0],)))
 gauge = each(BRAKE_PRESSURE, lambda message, dose, rng: moved(message, -ATMOSPHERE_PA))
 

@@ -7,17 +7,20 @@ from __future__ import annotations
 import pytest
 
 from adhesion_node.bag import parse_remap, select
-from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, RECORDED, WHEEL_SPEED
+from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, FIX, MU, ODOMETRY, POSITION, RECORDED, WHEEL_SPEED
 
 RECORDED_ELSEWHERE = {"/odo/pose": POSITION.type, "/brake_pressure": BRAKE_PRESSURE.type, "/x": MU.type}
 
 
 def test_selection_renames_and_takes_sensors_and_truth_alone() -> None:
     own = {f"/{topic.name}": topic.type for topic in RECORDED} | {CLOCK.name: CLOCK.type}
-    sensors = ("position", "brake_pressure", "speed", "wheel_speed", "traction_force")
+    places = ("position", "fix", "odometry")
+    sensors = (*places, "brake_pressure", "brake_demand", "speed", "imu", "wheel_speed", "traction_force")
     assert select(own) == {f"/{name}": name for name in (*sensors, "truth/state", "truth/mu")}
     creep = {"/wheel_speed": WHEEL_SPEED.type}
     assert select(creep) == {"/wheel_speed": "wheel_speed"}, "a recording for the creep curve needs no position"
+    for other in (FIX, ODOMETRY):
+        assert select({f"/{other.name}": other.type}) == {f"/{other.name}": other.name}, "it is a position, too"
     remapped = select(RECORDED_ELSEWHERE, [parse_remap("odo/pose:=/position")])
     assert remapped == {"/odo/pose": "position", "/brake_pressure": "brake_pressure"}
     assert select(RECORDED_ELSEWHERE, [], ["brake_pressure", "/x"]) == {"/brake_pressure": "brake_pressure", "/x": "/x"}

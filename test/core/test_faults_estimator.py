@@ -95,7 +95,7 @@ def is_stale(line: Line) -> Callable[[], bool]:
     return lambda: bool(line.heard[topics.DIAGNOSTICS]) and last(line).level == DiagnosticStatus.STALE
 
 
-@pytest.mark.parametrize("fault", ["nan", "inf", "huge", "zero_variance", "negative_variance"])
+@pytest.mark.parametrize("fault", ["nan", "inf", "huge", "negative_variance"])
 def test_what_nobody_can_use_changes_no_bit(make_line: MakeLine, fault: str) -> None:
     line = make_line()
     run = ticks(fault, share=0.3)
@@ -241,7 +241,7 @@ def test_silence_is_stale_within_the_timeout_and_a_tick(make_line: MakeLine) -> 
 def test_a_sensor_never_heard_is_stale(make_line: MakeLine) -> None:
     line = make_line(sensor_timeout_s=0.1)
     line.spin_until(line.executor, is_stale(line))
-    assert "/position: nothing received yet, publishers: 1" in last(line).message
+    assert "/position or /odometry: nothing received yet, publishers: 2" in last(line).message
 
 
 def test_with_sim_time_silence_is_measured_by_the_clock(make_line: MakeLine) -> None:

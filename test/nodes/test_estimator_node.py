@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import messages
@@ -23,7 +25,7 @@ from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET, AdhesionLaw
 from adhesion_node.core.physics.train import CRH3, GRAVITY
 from adhesion_node.nodes.estimator import PARAMETERS, Estimator
-from adhesion_node.nodes.ros import qos
+from adhesion_node.nodes.ros import qos, types
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import ATMOSPHERE_PA
@@ -53,7 +55,7 @@ class Line:
     heard: dict[topics.Topic, list[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.outputs = {topic: qos.advertise(self.driver, topic) for topic in topics.ADHESION_INPUTS}
+        self.outputs = {topic: qos.advertise(self.driver, topic) for topic in self.estimator.inputs}
         for topic in (*topics.RESULTS, topics.DIAGNOSTICS):
             self.heard[topic] = []
             qos.subscribe(self.driver, topic, self.heard[topic].append, qos.RESULT)
@@ -118,6 +120,27 @@ def test_live_equals_offline_to_the_bit(line: Line) -> None:
     assert line.estimator.digest == offline_digest(readings)
     line.hear_all()
     assert line.values()["digest"] == line.estimator.digest
+
+
+def test_fixes_on_a_track_line_are_positions(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, tmp_path: Path
+) -> None:
+    """Along a meridian, where a chainage of s m is a latitude; fixes off the line are refused and counted."""
+    (tmp_path / "line.csv").write_text("lat,lon\n47,8\n47.2,8\n", encoding="utf-8")
+    overrides = [Parameter("track_line", value=str(tmp_path / "line.csv"))]
+    estimator = Estimator(context=context, parameter_overrides=overrides)
+    line = Line(executor, spin_until, estimator, Node("driver", context=context))
+    for longitude in (8.0, 8.001):
+        for step in range(20):
+            t_ns = S + step * S // 10 + (longitude > 8.0)
+            latitude = 47.1 + step * 2.5 / 111_170.0
+            line.send(topics.FIX, topics.FIX.build(types.new, t_ns, (latitude, longitude, math.nan), 0.0, "gnss"))
+    line.send(topics.ODOMETRY, topics.ODOMETRY.build(types.new, 3 * S, (0.0,), 1.0))
+    line.estimator.close()
+    assert line.estimator.latest.position_m == pytest.approx(11_117.0 + 19 * 2.5, abs=5.0)
+    line.hear_all()
+    dropped = {key: value for key, value in line.values().items() if key.startswith("dropped.")}
+    assert dropped == {"dropped.OFF_TRACK": "20", "dropped.OTHER_SOURCE": "1"}
 
 
 def test_other_measurements_give_another_digest() -> None:
@@ -186,7 +209,7 @@ def bad_positions(t_ns: int) -> Iterator[Any]:
         yield message
     for position in (float("nan"), float("inf"), 1e9):
         yield messages.position(t_ns, position, 0.5)
-    for variance in (0.0, -1.0):
+    for variance in (1e300, -1.0):
         message = messages.position(t_ns, 10.0, 0.5)
         message.pose.covariance[0] = variance
         yield message

@@ -28,6 +28,7 @@ OPTIONAL = {"distributed": "cluster"}
 
 BY_APT = {
     *("python3-numpy", "python3-scipy", "python3-matplotlib", "python3-argcomplete", "python3-aiohttp"),
+    "python3-pyproj",
     *("python3-ruamel.yaml", "python3-hypothesis", "python3-pytest"),
 }
 BY_PIP = {"python3-rosbags-pip", "mcap-ros2-support"}
@@ -38,6 +39,7 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "scipy": ("scipy", "python3-scipy"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "argcomplete": ("argcomplete", "python3-argcomplete"),
+    "pyproj": ("pyproj", "python3-pyproj"),
     "rosbags": ("rosbags", "python3-rosbags-pip"),
     "ruamel": ("ruamel.yaml", "python3-ruamel.yaml"),
     "mcap": ("mcap", "mcap-ros2-support"),

@@ -319,14 +319,14 @@ def in_map(topic: Topic, cdr: bytes) -> bytes:
 
 
 def test_a_few_bad_messages_are_counted_and_change_nothing(tmp_path: Path, offline: Offline) -> None:
-    """As if they were not there: NaN, no variance, another frame, a gauge pressure."""
+    """As if they were not there: NaN, a negative variance, another frame, a gauge pressure."""
 
     def spoil(topic: Topic, index: int, cdr: bytes) -> bytes:
         t_ns = START_NS + samples_[index][0].t_ns
         if topic is POSITION and index == 20:
             return cdrs.position(t_ns, float("nan"), 0.25)
         if topic is POSITION and index in (40, 41):
-            return cdrs.position(t_ns, 1.0, 0.0)
+            return cdrs.position(t_ns, 1.0, -1.0)
         if topic is POSITION and index == 60:
             return in_frame("", cdr, topic)
         if topic is BRAKE_PRESSURE and index == 10:
@@ -345,7 +345,7 @@ def test_a_few_bad_messages_are_counted_and_change_nothing(tmp_path: Path, offli
 
 def test_a_bag_without_any_estimate_has_failed(tmp_path: Path, offline: Offline) -> None:
     def no_variance(topic: Topic, _: int, cdr: bytes) -> bytes:
-        return cdrs.position(START_NS, 1.0, 0.0) if topic is POSITION else cdr
+        return cdrs.position(START_NS, 1.0, -1.0) if topic is POSITION else cdr
 
     write_run(tmp_path / "bad", samples()[:20], edit=no_variance)
     code, result, _, err = offline(tmp_path / "bad")

@@ -72,6 +72,7 @@ def other(value: Value) -> Value:
         "wet": "snow",
         "rail_condition": "particle_em",
         "track": "map",
+        "auto": "position",
         "": "tunnel 0 1000",
     }
     return others[value]
@@ -118,7 +119,8 @@ def write_changed(path: Path) -> dict[str, Any]:
     """Write the file with every value of the estimator changed, and return the values."""
     document = YAML(typ="safe").load(DEFAULTS.read_text(encoding="utf-8"))
     section = document["estimator"]["ros__parameters"]
-    document["estimator"]["ros__parameters"] = _changed(section)
+    path.with_suffix(".csv").write_text("lat,lon\n47,8\n47.1,8\n", encoding="utf-8")
+    document["estimator"]["ros__parameters"] = _changed(section) | {"track_line": str(path.with_suffix(".csv"))}
     with path.open("w", encoding="utf-8") as stream:
         YAML(typ="safe").dump(document, stream)
     return sections(path)["estimator"]

@@ -15,9 +15,9 @@ from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.setting import Setting
 from adhesion_node.wire.codecs import Line
-from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
+from adhesion_node.wire.settings import OF_LINE, SETTINGS, Setup, parse_setting, setup_of
 
-FREE_TEXTS = {"track", "frame"}
+FREE_TEXTS = {"track", "frame", "track_line"}
 """The settings that are neither a number nor one of a few words."""
 
 NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]
@@ -44,7 +44,7 @@ def in_use(setup: Setup, name: str) -> Any:
     """Return what a set-up makes of a setting."""
     if name in ("seed", "sensor_timeout_s"):
         return getattr(setup, name)
-    if name in ("frame", "ambient_pressure_pa"):
+    if name in {one.name for one in OF_LINE}:
         return getattr(setup.line, name)
     group, _, field = name.rpartition(".")
     return getattr(setup.config.train if group else setup.config, field)
@@ -73,13 +73,13 @@ def test_nothing_named_is_the_nominal_set_up() -> None:
     assert setup_of({setting.name: setting.default for setting in SETTINGS}) == setup
 
 
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if s.name != "track"], ids=named)
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if not s.name.startswith("track")], ids=named)
 def test_every_setting_is_used(setting: Setting) -> None:
     value = another(setting)
     assert value != setting.default
     changed = setup_of({setting.name: value})
     assert in_use(changed, setting.name) == value
-    others = [other.name for other in SETTINGS if other not in (setting,) and other.name != "track"]
+    others = [other.name for other in SETTINGS if other != setting and not other.name.startswith("track")]
     assert [in_use(changed, name) for name in others] == [in_use(setup_of({}), name) for name in others]
 
 

@@ -96,7 +96,8 @@ class Track:
         breaks = np.unique(np.array(ends, dtype=np.float64))
         levels = np.zeros(breaks.size + 1)
         for s in self.sections:
-            levels[1:][(breaks >= s.start_m) & (breaks < s.end_m)] += s.resistance(self.train_length_m)
+            first, last = breaks.searchsorted((s.start_m, s.end_m))
+            levels[first + 1 : last + 1] += s.resistance(self.train_length_m)
         object.__setattr__(self, "_breaks", breaks)
         object.__setattr__(self, "_levels", levels)
 

@@ -16,6 +16,7 @@ from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.setting import Setting
 from adhesion_node.run.engine import EstimatorPipeline
+from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Line, Rejected
 from adhesion_node.wire.topics import Topic
@@ -46,7 +47,7 @@ class Kind(NamedTuple, Generic[P]):
     parameters: Sequence[Setting]
     set_up: Callable[[Mapping[str, Any]], SetUp[P]]
     inputs: Sequence[Topic]
-    """The last one must not fall silent."""
+    """The last one, or a position, must not fall silent."""
     results: Sequence[Topic]
     findings: Callable[[P], list[Finding]]
     """How the estimation stands, in words, and the numbers behind it."""
@@ -63,7 +64,8 @@ class EstimatingNode(Node, Generic[P]):
         self._reported_ns = 0
         self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/{kind.entry}"
         self.published: Counter[Topic] = Counter()
-        self._intake = Intake(self, self, kind.inputs, line, timeout_s)
+        self._reader = Reader(kind.inputs, line)
+        self._intake = Intake(self, self, self._reader, timeout_s)
         outputs = (*kind.results, topics.DIAGNOSTICS)
         self._outputs = {topic: qos.advertise(self, topic, tell=self._intake.tell) for topic in outputs}
         self.create_service(Trigger, "~/reset", self._on_reset)
@@ -73,6 +75,11 @@ class EstimatingNode(Node, Generic[P]):
     def heard(self) -> Counter[Topic]:
         """Messages received by topic."""
         return self._intake.heard
+
+    @property
+    def inputs(self) -> tuple[Topic, ...]:
+        """What it subscribes to."""
+        return self._reader.inputs
 
     @property
     def latest(self) -> Any:
@@ -121,6 +128,7 @@ class EstimatingNode(Node, Generic[P]):
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._publish(self.pipeline.reset())
+        self._reader.source = None
         return self._answered(response, "reset", "started anew")
 
     def _on_set_enabled(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:

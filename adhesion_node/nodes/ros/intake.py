@@ -3,7 +3,7 @@
 """The way of sensor messages into a node: subscribed, counted, read or refused, and what an operator must know."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from rclpy.clock import ROSClock
@@ -11,8 +11,9 @@ from rclpy.node import Node
 
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import NS, Line, Reason, Rejected
+from adhesion_node.wire.codecs import NS, Reason, Rejected
 from adhesion_node.wire.topics import Topic
 
 from . import qos
@@ -37,25 +38,23 @@ class Listener(Protocol):
 
 
 class Intake:
-    """Subscribes `inputs`; the last one of them must not fall silent for longer than `timeout_s`.
+    """Subscribes what `reader` reads; its anchor must not fall silent for longer than `timeout_s`.
 
     `heard` counts the messages by topic, refused ones included. While `enabled` is False all are refused.
     """
 
-    def __init__(self, node: Node, listener: Listener, inputs: Sequence[Topic], line: Line, timeout_s: float) -> None:
+    def __init__(self, node: Node, listener: Listener, reader: Reader, timeout_s: float) -> None:
         self.heard: Counter[Topic] = Counter()
         self.enabled = True
-        self._node, self._listener, self._line = node, listener, line
+        self._node, self._listener, self._reader = node, listener, reader
         self._newest_ns = 0
         self._counts: Counter[str] = Counter()
         self._refusals: dict[str, str] = {}
         self._events: dict[str, str] = {}
-        self._watched = inputs[-1]
-        self._watched_name = node.resolve_topic_name(self._watched.name)
         self._silence = Silence(node, timeout_s, self._on_silence)
-        for topic in inputs:
+        for topic in reader.inputs:
             qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
-        node.get_logger().info(f"ready: waiting for {self._watched_name}")
+        node.get_logger().info(f"ready: waiting for {' or '.join(self._watched)}")
 
     @property
     def now_ns(self) -> int:
@@ -82,7 +81,7 @@ class Intake:
         found = [Finding(Severity.WARN, text) for text in (*self._refusals.values(), *self._events.values())]
         self._refusals.clear()
         # What happened to the watched topic stands until that is heard again: it may be why it is silent.
-        self._events = {name: text for name, text in self._events.items() if name == self._watched_name}
+        self._events = {name: text for name, text in self._events.items() if name in self._watched}
         if self._silence.for_s is not None:
             found.append(Finding(Severity.STALE, self._silent(self._silence.for_s)))
         if not self.enabled:
@@ -93,11 +92,18 @@ class Intake:
             found.append(Finding(Severity.WARN, f"{clocks} publishers of {name}: time jumps, stop all but one"))
         return found
 
+    @property
+    def _watched(self) -> list[str]:
+        """The full names of what must not fall silent: of the anchor, before that is known of all that may be it."""
+        source = self._reader.source
+        return [self._node.resolve_topic_name(one.name) for one in ((source,) if source else self._reader.anchors)]
+
     def _silent(self, for_s: float) -> str:
-        name = self._watched_name
+        names = self._watched
+        name = " or ".join(names)
         if self._silence.ever_heard:
             return f"{name}: nothing for {for_s:.1f} s: is the sensor alive? If it is that slow, raise sensor_timeout_s"
-        publishers = self._node.count_publishers(name)
+        publishers = sum(map(self._node.count_publishers, names))
         return f"{name}: nothing received yet, publishers: {publishers}: is the sensor running, its topic remapped?"
 
     def _on_silence(self) -> None:
@@ -107,9 +113,9 @@ class Intake:
     def _receiver(self, topic: Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             self.heard[topic] += 1
-            if topic == self._watched:
+            if topic in self._reader.anchors and self._reader.source in (None, topic):
                 self._silence.heard()
-                self._events.pop(self._watched_name, None)
+                self._events.pop(self._node.resolve_topic_name(topic.name), None)
             try:
                 sample = self._sample(topic, message)
             except Rejected as refusal:
@@ -126,4 +132,4 @@ class Intake:
     def _sample(self, topic: Topic, message: Any) -> Any:
         if not self.enabled:
             raise Rejected(Reason.DISABLED, "disabled")
-        return topic.read(message, self._line)
+        return self._reader.read(topic, message)

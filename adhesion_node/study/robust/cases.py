@@ -120,7 +120,7 @@ FAULTS = (
     _lasting("NaN on top", "nan"),
     _lasting("-Inf on top", "inf"),
     _lasting("1e308 on top", "huge"),
-    _lasting("no variance, on top", "zero_variance"),
+    _lasting("no variance told", "zero_variance"),
     _lasting("negative variance, on top", "negative_variance"),
     _lasting("0.3 s late, max_lag_s 0.5", "late", config=Config(max_lag_s=0.5)),
     _lasting("0.3 s late, too late", "late"),

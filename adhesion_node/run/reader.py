@@ -1,0 +1,45 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Reads what an estimator takes in, live and offline, and sees to it that one topic alone gives the positions."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..core import Sample
+from ..wire.codecs import Line, Reason, Rejected
+from ..wire.topics import FIX, POSITIONS, Topic
+
+
+class Reader:
+    """Reads messages of `inputs`; `anchors` are those of them without which there is no estimate, the best one first.
+
+    Two sensors of the position never agree to the metre, and going to and fro between them would look like steps of
+    the train. So one of the anchors counts alone: the first in order of those that have been heard. `position_source`
+    names one.
+    """
+
+    def __init__(self, inputs: Sequence[Topic], line: Line) -> None:
+        possible = [topic for topic in inputs if topic in POSITIONS and _is_meant(topic, line)]
+        self.line = line
+        self.anchors = tuple(possible) or (inputs[-1],)
+        self.inputs = tuple(topic for topic in inputs if topic in possible or topic not in POSITIONS)
+        self.source: Topic | None = None
+        """The anchor that counts; None before one was heard."""
+
+    def read(self, topic: Topic, message: Any) -> Sample:
+        """Read a message of one of the inputs; raises Rejected."""
+        if topic not in self.anchors:
+            sample: Sample = topic.read(message, self.line)
+            return sample
+        if self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
+            raise Rejected(Reason.OTHER_SOURCE, f"{topic.name} beside {self.source.name}")
+        sample = topic.read(message, self.line)
+        self.source = topic
+        return sample
+
+
+def _is_meant(topic: Topic, line: Line) -> bool:
+    """Whether a topic may give the positions: without a track line a fix cannot."""
+    if line.position_source == "auto":
+        return topic != FIX or line.track is not None
+    return topic.name == line.position_source

@@ -1,0 +1,73 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The codecs of what can give the positions: along the track, by satellite, by odometry."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from ..core.intake.samples import MAX_VARIANCE_M2, MIN_VARIANCE_M2, PositionSample
+from . import codecs
+from .codecs import TRAIN, Codec, Fields, Line, New, Reason, Rejected, plausible, stamp_ns
+from .sensors import writer
+
+NO_FIX = -1
+"""NavSatStatus: no position. -2, a status never set, is taken for one."""
+
+UNKNOWN, DIAGONAL_KNOWN = 0, 2
+"""Types of a NavSatFix's covariance; 1 is approximated, 3 known."""
+
+
+def read_position(message: Any, line: Line) -> PositionSample:
+    """Read a position along the track, m and m^2, from a message with a `pose`; raises Rejected."""
+    place = codecs.place_of(message)
+    return PositionSample(stamp_ns(message.header), place, _variance(message.pose.covariance[0], line))
+
+
+def read_fix(message: Any, line: Line) -> PositionSample:
+    """Read a position along the track, m and m^2, from a NavSatFix; raises Rejected.
+
+    Of its covariance, east-north-up, that along the track counts.
+    """
+    if line.track is None:
+        raise Rejected(Reason.NO_TRACK_LINE, "track_line = ''")
+    if message.status.status == NO_FIX:
+        raise Rejected(Reason.NO_FIX, f"status = {message.status.status}")
+    latitude = plausible("latitude", message.latitude, Reason.IMPLAUSIBLE_FIX, 90.0)
+    longitude = plausible("longitude", message.longitude, Reason.IMPLAUSIBLE_FIX, 180.0)
+    known = message.position_covariance_type != UNKNOWN
+    east, mixed, _, mixed_too, north, *_ = map(float, message.position_covariance) if known else [0.0] * 9
+    widest = max(_variance(spread, line) for spread in (east, north))
+    place = line.track.place(latitude, longitude, widest**0.5, line.max_cross_track_m)
+    along = place.east**2 * east + place.east * place.north * (mixed + mixed_too) + place.north**2 * north
+    return PositionSample(stamp_ns(message.header), place.along_m, _variance(along, line))
+
+
+def _variance(given: float, line: Line) -> float:
+    """The variance, m^2, of a position; 0 is unknown, as in ROS."""
+    if given == 0.0:
+        return line.position_std_m**2
+    return plausible("position covariance[0]", given, Reason.BAD_VARIANCE, MAX_VARIANCE_M2, MIN_VARIANCE_M2)
+
+
+def _fix(new: New, place: Sequence[float], variance: float) -> Fields:
+    """A fix at latitude and longitude, degrees, and height, m or NaN where it is not known."""
+    latitude, longitude, altitude = place
+    spread = (variance, 0.0, 0.0, 0.0, variance, 0.0, 0.0, 0.0, 4.0 * variance)  # GNSS: twice as wide in height
+    return {
+        "status": new("sensor_msgs/msg/NavSatStatus", status=0, service=1),
+        "latitude": latitude,
+        "longitude": longitude,
+        "altitude": altitude,
+        "position_covariance": spread,
+        "position_covariance_type": DIAGONAL_KNOWN if variance else UNKNOWN,
+    }
+
+
+def _odometry(new: New, x: Sequence[float], variance: float) -> Fields:
+    still = codecs.twist(new, 0.0, 0.0)
+    return {"child_frame_id": TRAIN, "pose": codecs.pose(new, x[0], variance), "twist": still}
+
+
+POSITION = Codec(read_position, writer(lambda new, x, variance: {"pose": codecs.pose(new, x[0], variance)}))
+FIX = Codec(read_fix, writer(_fix))
+ODOMETRY = Codec(read_position, writer(_odometry))
