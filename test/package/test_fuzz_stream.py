@@ -30,8 +30,9 @@ from adhesion_node.core.methods.protocol import Context, MethodWindow, Verdict
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire.codecs import FRAME, MAX_ABSOLUTE_PA, Reason, Rejected
-from adhesion_node.wire.topics import POSITION, SENSORS
+from adhesion_node.wire.codecs import FRAME, MAX_ABSOLUTE_PA, Line, Reason, Rejected
+from adhesion_node.wire.topics import POSITIONS, SENSORS
+from adhesion_node.wire.track_line import line_of
 
 S = 10**9
 GOOD = ride([(3.0, 0.0), (9.0, 410e3), (1.0, 0.0), (3.0, 200e3)])
@@ -132,8 +133,9 @@ class Watched:
 
     def refuse(self, topic: str, refusal: Rejected) -> None:
         assert Reason[refusal.reason].value in str(refusal)
-        self.positions += topic == POSITION.name
-        self.refused_positions += topic == POSITION.name
+        is_position = any(topic == one.name for one in POSITIONS)
+        self.positions += is_position
+        self.refused_positions += is_position
         self.pipeline.refuse(topic, refusal.reason)
 
     def finish(self) -> None:
@@ -204,20 +206,59 @@ HEADERS = st.builds(
     st.sampled_from([0, 1, 5 * 10**8, 2**32 - 1]),
     st.sampled_from([FRAME, FRAME, FRAME, "", "map"]),
 )
-POSITIONS = st.builds(
+VARIANCES = NUMBERS | st.just(0.25)
+POSES = st.builds(
     lambda x, variance: SimpleNamespace(pose=fields("position.x", x), covariance=[variance, *[0.0] * 35]),
     NUMBERS,
-    NUMBERS | st.just(0.25),
+    VARIANCES,
 )
+TWISTS = st.builds(
+    lambda x, variance: SimpleNamespace(twist=fields("linear.x", x), covariance=[variance, *[0.0] * 35]),
+    NUMBERS,
+    VARIANCES,
+)
+MERIDIAN = Line(track=line_of("a meridian", np.array([47.0, 47.1]), np.array([8.0, 8.0]), None, 0.0))
 MESSAGES = st.one_of(
-    st.tuples(st.just("position"), st.builds(lambda h, pose: SimpleNamespace(header=h, pose=pose), HEADERS, POSITIONS)),
     st.tuples(
-        st.just("brake_pressure"),
+        st.sampled_from(["position", "odometry"]),
+        st.builds(lambda h, pose: SimpleNamespace(header=h, pose=pose), HEADERS, POSES),
+    ),
+    st.tuples(
+        st.just("fix"),
+        st.builds(
+            lambda h, latitude, longitude, spread, kind: SimpleNamespace(
+                header=h,
+                status=SimpleNamespace(status=0),
+                latitude=latitude,
+                longitude=longitude,
+                position_covariance=spread,
+                position_covariance_type=kind,
+            ),
+            HEADERS,
+            NUMBERS | st.floats(46.99, 47.11),
+            NUMBERS | st.floats(7.9999, 8.0001),
+            st.lists(VARIANCES, min_size=9, max_size=9),
+            st.integers(0, 3),
+        ),
+    ),
+    st.tuples(
+        st.just("imu"),
+        st.builds(
+            lambda h, along, spread: SimpleNamespace(
+                header=h, linear_acceleration=SimpleNamespace(x=along), linear_acceleration_covariance=[spread] * 9
+            ),
+            HEADERS,
+            NUMBERS,
+            VARIANCES | st.just(-1.0),
+        ),
+    ),
+    st.tuples(
+        st.sampled_from(["brake_pressure", "brake_demand"]),
         st.builds(lambda h, p: SimpleNamespace(header=h, fluid_pressure=p), HEADERS, NUMBERS | st.just(511325.0)),
     ),
     st.tuples(
         st.just("speed"),
-        st.builds(lambda h, v: SimpleNamespace(header=h, twist=fields("twist.linear.x", v)), HEADERS, NUMBERS),
+        st.builds(lambda h, twist: SimpleNamespace(header=h, twist=twist), HEADERS, TWISTS),
     ),
     st.tuples(
         st.just("traction_force"),
@@ -240,14 +281,15 @@ def test_any_messages_are_read_or_refused_with_a_remedy(config: Config, messages
     watched = Watched(config)
     for topic, message in messages:
         try:
-            sample = SENSED[topic].read(message)
+            sample = SENSED[topic].read(message, MERIDIAN)
         except Rejected as refusal:
             watched.refuse(topic, refusal)
             continue
-        values = sample[1] if topic == "wheel_speed" else sample[1:]
-        assert values
-        assert all(map(math.isfinite, values))
-        if isinstance(sample, (PositionSample, PressureSample, SpeedSample)):
+        if topic == "wheel_speed":
+            assert sample.known_radps
+        else:
+            assert all(value is None or math.isfinite(value) for value in sample)
+        if topic != "traction_force":
             watched.push(sample)
     watched.finish()
 
