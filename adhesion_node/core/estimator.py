@@ -7,6 +7,7 @@ present braking; every L accepted measurements give an `Estimate`. Randomness co
 number alone, so the same samples give the same bits whoever feeds them.
 """
 
+import math
 from collections.abc import Iterable, Iterator
 
 from .config import Config
@@ -14,7 +15,7 @@ from .estimate import Estimate
 from .following import follow, last_window
 from .intake import inbox as gate
 from .intake.outcome import Event, Outcome
-from .intake.pairing import Gate, Inbox, Matched, Source
+from .intake.pairing import Gate, Inbox, Matched, Source, Tick
 from .intake.samples import (
     DemandSample,
     ImuSample,
@@ -44,12 +45,17 @@ def gate_of(config: Config) -> Gate:
         sources=(
             Source(PressureSample, wait, age),
             Source(DemandSample, wait, age),
-            *(Source(kind, wait, wait, each=True) for kind in (PressureSample, SpeedSample, WheelSample, ImuSample)),
+            Source(PressureSample, wait, wait, each=True),
+            Source(SpeedSample, wait, wait, each=True, leads=True),
+            Source(WheelSample, wait, wait, each=True),
+            Source(ImuSample, wait, wait, each=True),
         ),
         max_lag_ns=round(config.max_lag_s * 1e9),
         far_ns=round(config.max_gap_s * 1e9),
         reset_ns=round(config.reset_s * 1e9),
         late_run=config.max_outliers,
+        tick_ns=round(config.tick_s * 1e9),
+        tick_for_ns=round(config.tick_for_s * 1e9),
     )
 
 
@@ -119,7 +125,9 @@ def _take_all(config: Config, state: State, matched: Iterable[Matched]) -> tuple
 def _measurement(config: Config, matched: Matched) -> Measurement:
     if isinstance(matched.anchor, Measurement):
         return matched.anchor
-    t_ns, position_m, variance_m2 = matched.anchor
+    t_ns, position_m, variance_m2 = (
+        (matched.anchor.t_ns, 0.0, math.inf) if isinstance(matched.anchor, Tick) else matched.anchor
+    )
     pressure, demand, pressures, speeds, wheels, imu = matched.values
     fresh = bool(speeds) and t_ns - speeds[-1].t_ns <= round(config.pressure_wait_s * 1e9)
     return Measurement(

@@ -16,6 +16,9 @@ from .intake.samples import MAX_VARIANCE_M2, Measurement
 from .methods.protocol import Verdict
 from .state import State
 
+SAYS_NOTHING_M2 = 1e14
+"""Variance of a position that was not measured, for the methods: it says nothing and keeps every formula finite."""
+
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
@@ -36,7 +39,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     dt_s = (measurement.t_ns - state.newest.t_ns) * 1e-9
     braked = config.brake(state.newest.brake_pressure_pa) > 0.0
     belief = coast(state.belief, dt_s, config.speed_noise_rate(braked))
-    if measurement.has_position and belief.covariance[0, 0] >= MAX_VARIANCE_M2:
+    if measurement.has_position and belief.covariance[0, 0] > 0.5 * MAX_VARIANCE_M2:
         state, belief = state._replace(window=None), tracker.place(belief, measurement)
     innovation = tracker.innovation(belief, measurement)
     if innovation > config.gate_sigma:
@@ -74,8 +77,8 @@ def _accept(
     sample = WindowSample(
         measurement.t_ns,
         brake,
-        measurement.position_m if measurement.has_position else 0.0,
-        measurement.variance_m2,
+        measurement.position_m if measurement.has_position else float(belief.mean[0]),
+        min(measurement.variance_m2, SAYS_NOTHING_M2),
         measurement.speed_mps or 0.0,
         _speed_variance(config, measurement),
         _wheel_mps(config, measurement),

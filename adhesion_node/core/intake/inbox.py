@@ -14,7 +14,8 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from .outcome import Event, Outcome
-from .pairing import Gate, Inbox, Matched, S, release
+from .pairing import Gate, Inbox, Matched, S
+from .release import release
 from .samples import Measurement, Sample
 
 
@@ -54,7 +55,8 @@ def push(gate: Gate, inbox: Inbox, sample: Sample) -> Pushed:
 def drain(gate: Gate, inbox: Inbox) -> Pushed:
     """End of the data: all that waits, with what is known so far; what is set aside was stray."""
     strays = _strays(inbox.now_ns, inbox.suspects)
-    return _with(strays, settle(gate, inbox._replace(suspects=())))
+    inbox = inbox._replace(suspects=())
+    return _with(strays, Pushed(*release(gate, inbox, len(inbox.anchors.samples), inbox.now_ns)))
 
 
 def settle(gate: Gate, inbox: Inbox) -> Pushed:
@@ -76,29 +78,35 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     if in_order and inbox.released_ns is not None:
         first_ns = inbox.released_ns - gate.kept_ns
     stream = stream.since(first_ns)
-    inbox = inbox._replace(now_ns=_newest(inbox.now_ns, sample)).with_stream(type(sample), stream)
+    now_ns = _newest(inbox.now_ns, sample)
+    inbox = inbox._replace(now_ns=now_ns).with_stream(type(sample), stream.delayed(now_ns - sample.t_ns))
     return Pushed(*release(gate, inbox, inbox.anchors.excess))
 
 
 def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     t_ns, newest_ns, released_ns = anchor.t_ns, inbox.anchors.newest_ns, inbox.released_ns
-    if t_ns == released_ns:
+    if t_ns == inbox.anchored_ns:
         return Pushed(inbox, events=(_doubled(anchor),))
-    if newest_ns is not None and t_ns < max(newest_ns - gate.max_lag_ns, t_ns if released_ns is None else released_ns):
-        return _late(gate, inbox, anchor, newest_ns)
+    now_ns = _newest(inbox.now_ns, anchor)
+    inbox = inbox._replace(anchors=inbox.anchors.delayed(now_ns - t_ns))
+    reached = [] if released_ns is None else [released_ns + 1]
+    reached += [] if newest_ns is None else [newest_ns - gate.max_lag_ns]
+    if t_ns < max(reached, default=t_ns):
+        return _late(gate, inbox, anchor)
     refused = inbox.anchors.refusal(t_ns)
     if refused is not None:
         return Pushed(inbox, events=(Event(refused, _named(anchor)),))
-    inbox = inbox._replace(now_ns=_newest(inbox.now_ns, anchor), anchors=inbox.anchors.added(anchor), late=(0, 0))
+    inbox = inbox._replace(now_ns=now_ns, anchors=inbox.anchors.added(anchor), late=(0, 0))
     return Pushed(*release(gate, inbox, inbox.anchors.excess))
 
 
-def _late(gate: Gate, inbox: Inbox, anchor: Any, newest_ns: int) -> Pushed:
+def _late(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     """Drop a late anchor; after enough of them in a row begin anew with the next that is after the one before."""
     count, before_ns = inbox.late
     count = count + 1
     if count >= gate.late_run and anchor.t_ns > before_ns:
         return _anew(gate, inbox, anchor)
+    newest_ns = max(inbox.anchors.newest_ns or anchor.t_ns, inbox.released_ns or anchor.t_ns)
     event = Event(Outcome.LATE, f"{_named(anchor)}, {(newest_ns - anchor.t_ns) / S:g} s behind the newest")
     return Pushed(inbox._replace(late=(count, anchor.t_ns)), events=(event,))
 

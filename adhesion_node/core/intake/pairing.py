@@ -1,10 +1,9 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""What waits at the gate, and when it is paired and released.
+"""What waits at the gate, and what an anchor is paired with.
 
-An anchor waits until every other sensor that is there has come as far as its stamp, at most `wait_ns` by the anchors'
-own stamps, and until late anchors could have come. Whether a sensor is there its earlier stamps tell, never whether it
-happens to have arrived; so what an anchor is paired with does not depend on the order of arrival.
+Whether a sensor is there its earlier stamps tell, never whether it happens to have arrived; so what an anchor is
+paired with does not depend on the order of arrival.
 """
 
 from __future__ import annotations
@@ -13,7 +12,6 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from .samples import Measurement
 from .stream import Stream
 
 S = 1_000_000_000
@@ -37,6 +35,8 @@ class Source(NamedTuple):
     each: bool = False
     """Whether an anchor gets every sample since the one before, each once, and such as came late and are no older
     than it by more than the age; else the last value holds."""
+    leads: bool = False
+    """Whether it is enough by itself, without any anchor."""
 
 
 class Gate(NamedTuple):
@@ -52,6 +52,10 @@ class Gate(NamedTuple):
     """So is one further back. A jump of the time further than this, or back, begins anew."""
     late_run: int
     """So many late anchors in a row show that the time has gone back."""
+    tick_ns: int = 0
+    """Without an anchor for so long the other sensors are given out by themselves; 0: never."""
+    tick_for_ns: int = 0
+    """How long after the last anchor or sample of a source that `leads`."""
 
     @property
     def kept_ns(self) -> int:
@@ -59,8 +63,14 @@ class Gate(NamedTuple):
         return max((PRESENT_NS, *(source.age_ns + source.wait_ns for source in self.sources)))
 
 
+class Tick(NamedTuple):
+    """A time at which there is no anchor."""
+
+    t_ns: int
+
+
 class Matched(NamedTuple):
-    """An anchor and the samples of its time, in the order of `Gate.sources`."""
+    """An anchor, or a `Tick`, and the samples of its time, in the order of `Gate.sources`."""
 
     anchor: Any
     values: tuple[Any, ...]
@@ -73,8 +83,10 @@ class Inbox(NamedTuple):
     now_ns: int | None = None
     """Newest stamp of any sensor that is believed."""
     begun_ns: int = 0
-    """First anchor, of all or after a gap."""
+    """First anchor or tick, of all or after a gap."""
     released_ns: int | None = None
+    """Newest anchor or tick that was released."""
+    anchored_ns: int | None = None
     """Newest anchor that was released."""
     anchors: Stream = Stream()
     """Anchors that wait."""
@@ -95,43 +107,7 @@ class Inbox(NamedTuple):
         return self._replace(others=MappingProxyType({**self.others, kind: stream}))
 
 
-def release(gate: Gate, inbox: Inbox, count: int) -> tuple[Inbox, tuple[Matched, ...]]:
-    """Release the first `count` anchors and all that need not wait any longer, each with the samples of its time."""
-    matched: list[Matched] = []
-    for anchor in inbox.anchors.samples:
-        begins = inbox.released_ns is None or anchor.t_ns > inbox.released_ns + gate.far_ns
-        at_turn = inbox._replace(begun_ns=anchor.t_ns) if begins else inbox
-        if len(matched) >= count and _waits(gate, at_turn, anchor):
-            break
-        sources = () if isinstance(anchor, Measurement) else gate.sources
-        values = tuple((_each if source.each else _value)(at_turn, source, anchor.t_ns) for source in sources)
-        spent = {
-            source.kind: at_turn.others[source.kind]._replace(spent_ns=value[-1].t_ns)
-            for source, value in zip(sources, values, strict=True)
-            if source.each and value
-        }
-        others = MappingProxyType({**at_turn.others, **spent}) if spent else at_turn.others
-        inbox = at_turn._replace(released_ns=anchor.t_ns, others=others)
-        matched.append(Matched(anchor, values))
-    left = inbox.anchors._replace(samples=inbox.anchors.samples[len(matched) :])
-    return inbox._replace(anchors=left) if matched else inbox, tuple(matched)
-
-
-def _waits(gate: Gate, inbox: Inbox, anchor: Any) -> bool:
-    newest_ns = inbox.anchors.newest_ns
-    if newest_ns is None or anchor.t_ns > newest_ns - gate.max_lag_ns:  # an earlier one may still come
-        return True
-    if isinstance(anchor, Measurement):  # complete as it is
-        return False
-    return any(
-        anchor.t_ns > newest_ns - source.wait_ns
-        and not inbox.stream(source.kind).has_reached(anchor.t_ns)
-        and _is_present(inbox, source, anchor.t_ns)
-        for source in gate.sources
-    )
-
-
-def _is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
+def is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
     """Whether a sensor is there: heard not long before, and so by now, whatever the order of arrival.
 
     In the beginning each may still come.
@@ -142,16 +118,16 @@ def _is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
 
 def _known_ns(inbox: Inbox, source: Source, t_ns: int) -> int:
     """Up to when the samples of a sensor are used at a time: what was not waited for must have been there before."""
-    return t_ns if _is_present(inbox, source, t_ns) else t_ns - source.wait_ns
+    return t_ns if is_present(inbox, source, t_ns) else t_ns - source.wait_ns
 
 
-def _value(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
+def value_of(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
     """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
     latest = inbox.stream(source.kind).latest(_known_ns(inbox, source, t_ns))
     return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest
 
 
-def _each(inbox: Inbox, source: Source, t_ns: int) -> tuple[Any, ...]:
+def each_of(inbox: Inbox, source: Source, t_ns: int) -> tuple[Any, ...]:
     """The samples of a sensor up to a time that are not used up, the newest ones where they are too many."""
     before_ns = t_ns if inbox.released_ns is None else min(inbox.released_ns, t_ns)
     unspent = inbox.stream(source.kind).unspent(before_ns - source.age_ns, _known_ns(inbox, source, t_ns))

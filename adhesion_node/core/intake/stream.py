@@ -30,6 +30,8 @@ class Stream(NamedTuple):
     """When the next sample would come if all had kept the mean (generic cell rate algorithm)."""
     spent_ns: int | None = None
     """Stamp up to which the samples have been used up, where each is given out once."""
+    lag_ns: int = 0
+    """How far behind the newest stamp of all sensors the samples have come of late, and a quarter more."""
 
     def refusal(self, t_ns: int) -> Outcome | None:
         """Why a sample of that stamp may not be added; None where it may."""
@@ -43,10 +45,10 @@ class Stream(NamedTuple):
         """The stream with one more sample."""
         t_ns = sample.t_ns
         if self.newest_ns is None:
-            return Stream((*self.samples, sample), t_ns, t_ns + INTERVAL_NS)
+            return self._replace(samples=(sample,), newest_ns=t_ns, allowed_ns=t_ns + INTERVAL_NS)
         if t_ns >= self.newest_ns:
             allowed_ns = max(t_ns, self.allowed_ns) + INTERVAL_NS
-            return Stream((*self.samples, sample), t_ns, allowed_ns, self.spent_ns)
+            return self._replace(samples=(*self.samples, sample), newest_ns=t_ns, allowed_ns=allowed_ns)
         samples = list(self.samples)
         insort(samples, sample, key=_stamp)
         return self._replace(samples=tuple(samples))
@@ -55,6 +57,10 @@ class Stream(NamedTuple):
         """What is stamped from the first to the last time, as the beginning of a stream."""
         kept = [sample for sample in self.samples if first_ns <= sample.t_ns <= last_ns]
         return Stream(tuple(kept), kept[-1].t_ns, kept[-1].t_ns + INTERVAL_NS) if kept else Stream()
+
+    def delayed(self, behind_ns: int) -> Stream:
+        """The stream after a sample so far behind the newest stamp of all; the next one forgets a fifth of that."""
+        return self._replace(lag_ns=max(behind_ns * 5 // 4, self.lag_ns * 4 // 5))
 
     @property
     def excess(self) -> int:
@@ -74,6 +80,11 @@ class Stream(NamedTuple):
     def has_reached(self, t_ns: int) -> bool:
         """Whether a sample with this or a later stamp has come."""
         return self.newest_ns is not None and self.newest_ns >= t_ns
+
+    def next_ns(self, t_ns: int) -> int | None:
+        """The stamp of the first kept sample behind a time; None where there is none."""
+        index = bisect_right(self.samples, t_ns, key=_stamp)
+        return self.samples[index].t_ns if index < len(self.samples) else None
 
     def latest(self, t_ns: int) -> Any | None:
         """The newest sample that is not later than a time; None where there is none."""

@@ -1,0 +1,137 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""When an anchor is released, or a tick where anchors fail to come: by stamps only, whatever the order of arrival.
+
+An anchor waits until every other sensor that is there has come as far as its stamp, at most `wait_ns` by the anchors'
+own stamps, and until late anchors could have come. A tick stands `tick_ns` after what was released before, or a
+multiple of that where nothing has been measured in between. It waits until neither an anchor nor another sample of
+its time can be expected: as long as they were late so far, and never less than an anchor would wait for them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from types import MappingProxyType
+from typing import Any
+
+from .pairing import Gate, Inbox, Matched, Source, Tick, each_of, is_present, value_of
+from .samples import Measurement
+
+NEAR_TICK = 5
+"""An anchor within this part of `tick_ns` behind a tick takes its place: sensors jitter."""
+
+
+def release(gate: Gate, inbox: Inbox, count: int, until_ns: int | None = None) -> tuple[Inbox, tuple[Matched, ...]]:
+    """Release the first `count` anchors and all that need not wait any longer, each with the samples of its time.
+
+    Up to `until_ns` no tick waits.
+    """
+    anchors, matched = inbox.anchors.samples, list[Matched]()
+    taken = 0
+    while (turn := _turn(gate, inbox, anchors[taken:][:1], taken < count, until_ns)) is not None:
+        inbox, values = _given_out(gate, inbox, turn)
+        matched.append(Matched(turn, values))
+        taken += not isinstance(turn, Tick)
+    left = inbox.anchors._replace(samples=anchors[taken:])
+    return inbox._replace(anchors=left) if taken else inbox, tuple(matched)
+
+
+def _turn(gate: Gate, inbox: Inbox, waiting: tuple[Any, ...], forced: bool, until_ns: int | None) -> Any | None:
+    """The anchor or tick that may be released next, in order; None: wait."""
+    tick_ns = _next_tick_ns(gate, inbox)
+    near_ns = gate.tick_ns // NEAR_TICK
+    if tick_ns is not None and not (waiting and waiting[0].t_ns <= tick_ns + near_ns):
+        due = until_ns is not None and tick_ns <= until_ns
+        return Tick(tick_ns) if due or (forced and waiting) or _is_due(gate, inbox, tick_ns, near_ns) else None
+    if not waiting or forced:
+        return waiting[0] if waiting else None
+    anchor = waiting[0]
+    begins = _begins(gate, inbox, anchor.t_ns)
+    at_turn = inbox._replace(begun_ns=anchor.t_ns) if begins else inbox
+    if not _is_last(gate, inbox, anchor.t_ns):
+        return None
+    if isinstance(anchor, Measurement):  # complete as it is
+        return anchor
+    # before it, a tick may still come to be
+    before_ns, ticks = inbox.released_ns, 0
+    if gate.tick_ns and before_ns is not None:
+        ticks = (anchor.t_ns - near_ns - 1 - before_ns) // gate.tick_ns
+    may_tick = ticks > 0 and before_ns is not None and _lacks(gate, inbox, before_ns + ticks * gate.tick_ns)
+    return None if may_tick or _lacks(gate, at_turn, anchor.t_ns) else anchor
+
+
+def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, ...]]:
+    """The samples of the time of an anchor or tick; those that come once are used up."""
+    t_ns, sources = turn.t_ns, () if isinstance(turn, Measurement) else gate.sources
+    if _begins(gate, inbox, t_ns):
+        inbox = inbox._replace(begun_ns=t_ns)
+    values = tuple((each_of if source.each else value_of)(inbox, source, t_ns) for source in sources)
+    spent = {
+        source.kind: inbox.others[source.kind]._replace(spent_ns=value[-1].t_ns)
+        for source, value in zip(sources, values, strict=True)
+        if source.each and value
+    }
+    others = MappingProxyType({**inbox.others, **spent}) if spent else inbox.others
+    anchored_ns = inbox.anchored_ns if isinstance(turn, Tick) else t_ns
+    return inbox._replace(released_ns=t_ns, anchored_ns=anchored_ns, others=others), values
+
+
+def _begins(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
+    return inbox.released_ns is None or t_ns > inbox.released_ns + gate.far_ns
+
+
+def _is_last(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
+    """Whether by the anchors' own stamps no earlier one can come than a time."""
+    newest_ns = inbox.anchors.newest_ns
+    return newest_ns is not None and t_ns <= newest_ns - gate.max_lag_ns
+
+
+def _lacks(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
+    """Whether a sensor that is there has not come as far as a time, and is to be waited for by the anchors' stamps."""
+    newest_ns = inbox.anchors.newest_ns
+    return any(
+        (newest_ns is None or t_ns > newest_ns - source.wait_ns)
+        and not inbox.stream(source.kind).has_reached(t_ns)
+        and is_present(inbox, source, t_ns)
+        for source in gate.sources
+    )
+
+
+def _next_tick_ns(gate: Gate, inbox: Inbox) -> int | None:
+    """When the other sensors have something new to tell next, if no anchor comes before; None: at no time so far."""
+    leading = [source for source in gate.sources if source.leads]
+    streams = [inbox.stream(source.kind) for source in leading]
+    before_ns = inbox.released_ns
+    if before_ns is None:
+        before_ns = min((stream.samples[0].t_ns for stream in streams if stream.samples), default=None)
+    if not gate.tick_ns or before_ns is None or inbox.now_ns is None or inbox.now_ns < before_ns + gate.tick_ns:
+        return None
+    led = (inbox.anchored_ns, *(stream.spent_ns for stream in streams))
+    led_ns = max((t_ns for t_ns in led if t_ns is not None), default=before_ns)
+    first_ns = _earliest(gate, inbox, gate.sources, before_ns)
+    if first_ns is None or first_ns <= led_ns + gate.tick_for_ns:
+        return first_ns
+    return _earliest(gate, inbox, leading, before_ns)
+
+
+def _earliest(gate: Gate, inbox: Inbox, sources: Iterable[Source], before_ns: int) -> int | None:
+    """The first tick at which one of the sensors has told something since what was released before."""
+    ticks = []
+    for source in sources:
+        new_ns = inbox.stream(source.kind).next_ns(before_ns)
+        if new_ns is not None:
+            t_ns = before_ns - (before_ns - new_ns) // gate.tick_ns * gate.tick_ns
+            if not is_present(inbox, source, t_ns):
+                t_ns = before_ns - (before_ns - new_ns - source.wait_ns) // gate.tick_ns * gate.tick_ns
+            ticks.append(t_ns)
+    return min(ticks, default=None)
+
+
+def _is_due(gate: Gate, inbox: Inbox, tick_ns: int, near_ns: int) -> bool:
+    """Whether no anchor can be expected that would take a tick's place, nor a sample of its time."""
+    if _is_last(gate, inbox, tick_ns + near_ns) and not _lacks(gate, inbox, tick_ns):
+        return True
+    late = (stream.lag_ns for stream in inbox.others.values() if stream.lag_ns <= gate.far_ns)
+    wait_ns = gate.max_lag_ns + max((source.wait_ns for source in gate.sources), default=0)
+    wait_ns = max(wait_ns, inbox.anchors.lag_ns, *late)
+    return inbox.now_ns is not None and inbox.now_ns >= tick_ns + near_ns + wait_ns
