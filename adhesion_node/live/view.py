@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.atp.supervision import TrainState
+from ..core.atp.received import TrainState
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, POSITION, SPEED, STATE, Topic

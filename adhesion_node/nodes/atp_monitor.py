@@ -6,8 +6,8 @@
 
     adhesion/state, adhesion/braking_curve  ->  atp/status
 
-It judges at each state. Two watchdogs judge when no state comes, because silence is no message: one on the ROS clock,
-and one on the machine's own for the case that the ROS clock stands still.
+It judges a state and the curve made of it as a pair. Two watchdogs judge when no pair comes, because silence is no
+message: one on the ROS clock, and one on the machine's own for the case that the ROS clock stands still.
 """
 
 from collections import Counter
@@ -18,17 +18,9 @@ from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 
 from adhesion_node.core.atp.config import SupervisionConfig
-from adhesion_node.core.atp.supervision import (
-    NS_PER_S,
-    Decision,
-    Level,
-    Severity,
-    StampedCurve,
-    TrainState,
-    Unavailable,
-    decide,
-    unsafe,
-)
+from adhesion_node.core.atp.plausibility import Course
+from adhesion_node.core.atp.received import NS_PER_S, StampedCurve, TrainState, Unavailable
+from adhesion_node.core.atp.supervision import Decision, Level, Severity, decide, unsafe
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Rejected
@@ -65,7 +57,8 @@ class AtpMonitor(Node):
         self._config = make(SupervisionConfig, values)
         self._state: TrainState | Unavailable = Unavailable(_SILENCE)
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
-        self._judged = False
+        self._course = Course()
+        self._judged = self._apart = False
         self.heard: Counter[Topic] = Counter()
         self.published: Counter[Topic] = Counter()
         self._now_ns = self._stamp_ns = self._seen_ns = 0
@@ -82,18 +75,34 @@ class AtpMonitor(Node):
     def _on_curve(self, message: Any) -> None:
         self.heard[topics.BRAKING_CURVE] += 1
         try:
-            read = topics.BRAKING_CURVE.read(message)
-            self._curve = StampedCurve(read.t_ns, read.curve)
+            self._curve = topics.BRAKING_CURVE.read(message)
         except Rejected as refusal:
             self._curve = Unavailable(f"refused: {refusal}")
+        self._judge_pair()
 
     def _on_state(self, message: Any) -> None:
         self.heard[topics.STATE] += 1
         try:
-            self._state = topics.STATE.read(message)
+            state = topics.STATE.read(message)
+            self._course = self._course.after(self._config, state)
+            complaint = self._course.complaint(self._config)
+            self._state = Unavailable(complaint) if complaint else state
         except Rejected as refusal:
             self._state = Unavailable(f"refused: {refusal}")
-        self._judge()
+        self._judge_pair()
+
+    def _judge_pair(self) -> None:
+        """Judge, unless the other half is still on its way: then a watchdog waits for it as for one that is silent."""
+        apart = (
+            isinstance(self._state, TrainState)
+            and isinstance(self._curve, StampedCurve)
+            and self._state.t_ns != self._curve.t_ns
+        )
+        if not apart:
+            self._judge()
+        elif not self._apart:
+            self._judged = True
+        self._apart = apart
 
     def _on_watchdog(self) -> None:
         if not self._judged:

@@ -27,9 +27,9 @@ from ..core import Estimate
 from ..nodes.atp_monitor import AtpMonitor
 from ..nodes.estimator import Estimator
 from ..nodes.recorder import Recorder
-from ..wire.topics import CLOCK, POSITION, STATE
+from ..wire.topics import BRAKING_CURVE, CLOCK, POSITION, STATE
 
-TARGET_M, STOP_M = 8000.0, 9000.0
+TARGET_M, STOP_M = 8250.0, 9000.0
 """The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
 
 PATIENCE_S = 10.0
@@ -105,7 +105,7 @@ def _at_rest(simulator: Simulator, estimator: Estimator, monitor: AtpMonitor, re
     sent = Counter({POSITION: simulator.samples, CLOCK: simulator.samples}) + estimator.published + monitor.published
     return (
         estimator.heard[POSITION] == simulator.samples
-        and monitor.heard[STATE] == estimator.published[STATE]
+        and all(monitor.heard[topic] == estimator.published[topic] for topic in (STATE, BRAKING_CURVE))
         and all(recorder.heard[topic] == count for topic, count in sent.items())
         and all(node.get_clock().now().nanoseconds == simulator.now_ns for node in (estimator, monitor, recorder))
         and not any(timer.is_ready() for timer in monitor.timers)

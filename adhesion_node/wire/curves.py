@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..core.atp.received import StampedCurve
 from ..core.intake.samples import MAX_POSITION_M
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import Array
@@ -17,15 +18,12 @@ if TYPE_CHECKING:  # see results.py
     from ..core.estimate import Estimate
 
 
-class PlacedCurve(NamedTuple):
-    """A braking curve, the time it was made for, and the place, m, at which it begins."""
-
-    t_ns: int
-    position_m: float
-    curve: BrakingCurve
+STEP_TOLERANCE, ROUNDING_M2_PER_S2 = 0.05, 1e-6
+"""Share by which the way between two points may differ from what their decelerations and speeds give,
+and of v^2 what rounding makes of it."""
 
 
-def read_curve(message: Any, _line: Line) -> PlacedCurve:
+def read_curve(message: Any, _line: Line) -> StampedCurve:
     """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected."""
     points = message.points
     if list(message.joint_names) != [TRAIN] or len(points) < 2:
@@ -40,7 +38,7 @@ def read_curve(message: Any, _line: Line) -> PlacedCurve:
     place, velocity, acceleration, time = np.ascontiguousarray(rows.T)
     curve = BrakingCurve(place - place[0], velocity, -acceleration, time)
     _check_course(curve)
-    return PlacedCurve(stamp_ns(message.header), float(place[0]), curve)
+    return StampedCurve(stamp_ns(message.header), float(place[0]), curve)
 
 
 def write_curve(new: New, t_ns: int, position_m: float, curve: BrakingCurve) -> Fields:
@@ -85,6 +83,21 @@ def _check_course(curve: BrakingCurve) -> None:
             raise Rejected(Reason.BAD_CURVE, f"braking curve: {what} turns at point {int(np.argmin(steps)) + 1}")
     if curve.speed_mps[-1] < 0 or curve.deceleration_mps2.min() <= 0:
         raise Rejected(Reason.BAD_CURVE, "braking curve: a negative speed or no deceleration")
+    _check_ways(curve)
+
+
+def _check_ways(curve: BrakingCurve) -> None:
+    """Between two points v^2 falls by 2 a ds, with a between their decelerations."""
+    way, slowing = np.diff(curve.distance_m), curve.deceleration_mps2
+    weaker, stronger = np.minimum(slowing[:-1], slowing[1:]), np.maximum(slowing[:-1], slowing[1:])
+    lost = -np.diff(np.square(curve.speed_mps))
+    least, most = 2.0 * weaker * way * (1.0 - STEP_TOLERANCE), 2.0 * stronger * way * (1.0 + STEP_TOLERANCE)
+    wrong = (lost < least - ROUNDING_M2_PER_S2) | (lost > most + ROUNDING_M2_PER_S2)
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        told = f"v^2 falls by {lost[at]:.4g} m^2/s^2 from point {at} to {at + 1}"
+        given = f"{way[at]:.4g} m at {weaker[at]:.4g} to {stronger[at]:.4g} m/s^2"
+        raise Rejected(Reason.IMPLAUSIBLE_CURVE, f"braking curve: {told}, on {given}")
 
 
 SAFE = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.safe))

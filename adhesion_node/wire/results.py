@@ -7,13 +7,15 @@ A writer returns None where there is nothing to publish.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..core.atp.supervision import TrainState
+from ..core.atp.received import TrainState
+from ..core.intake.samples import MIN_VARIANCE_M2
 from ..core.physics.train import GRAVITY
 from . import codecs
-from .codecs import TRAIN, Codec, Fields, Line, New, finite, header, stamp_ns
+from .codecs import TRAIN, Codec, Fields, Line, New, Reason, Rejected, finite, header, stamp_ns
 
 if TYPE_CHECKING:  # the simulator uses these codecs, too, and must not know the estimators
     from ..core.prediction import Prediction
@@ -68,9 +70,24 @@ def write_deceleration(new: New, prediction: Prediction) -> Fields | None:
     return {"header": header(new, estimate.t_ns), "accel": accel}
 
 
-def read_state(message: Any, _line: Line) -> TrainState:
-    """Read the train's state, m and m/s, from an Odometry; raises Rejected."""
-    return TrainState(stamp_ns(message.header), codecs.place_of(message), codecs.speed_of(message))
+def read_state(message: Any, _line: Line, least: float = 0.0) -> TrainState:
+    """Read the train's state, m and m/s, with its standard deviations, from an Odometry; raises Rejected.
+
+    No variance may be below `least`.
+    """
+    place, speed = codecs.place_of(message), codecs.speed_of(message)
+    deviations = []
+    for what, part in (("position", message.pose), ("speed", message.twist)):
+        variance = finite(f"{what} covariance[0]", part.covariance[0])
+        if variance < least:
+            raise Rejected(Reason.BAD_VARIANCE, f"{what} covariance[0] = {variance:g}")
+        deviations.append(math.sqrt(variance))
+    return TrainState(stamp_ns(message.header), place, speed, *deviations)
+
+
+def read_estimated_state(message: Any, line: Line) -> TrainState:
+    """Read a state that was estimated: none is exact, a variance of 0 was left out. Raises Rejected."""
+    return read_state(message, line, MIN_VARIANCE_M2)
 
 
 def write_state(
@@ -118,7 +135,7 @@ MU_LOWER = Codec(read_number, lambda _, made: None if made.estimate.withheld els
 CREEP_MU_MAX = Codec(read_number, lambda _, found: {"data": found.mu_max} if found.known else None)
 CREEP_LAMBDA_M = Codec(read_number, lambda _, found: {"data": found.lambda_m} if found.known else None)
 DECELERATION = Codec(read_deceleration, write_deceleration)
-STATE, ESTIMATED_STATE = Codec(read_state, write_state), Codec(read_state, write_estimated_state)
+STATE, ESTIMATED_STATE = Codec(read_state, write_state), Codec(read_estimated_state, write_estimated_state)
 STATUS = Codec(read_statuses, write_status)
 CLOCK = Codec(
     lambda message, _: codecs.nanoseconds(message.clock), lambda new, t_ns: {"clock": codecs.moment(new, t_ns)}

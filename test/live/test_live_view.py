@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adhesion_node.core.atp.supervision import TrainState
+from adhesion_node.core.atp.received import TrainState
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.live.view import EXPECTED, LATE_S, MOST_POINTS, View
 from adhesion_node.web import as_json

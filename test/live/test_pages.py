@@ -11,7 +11,7 @@ import pytest
 from test_live_view import STATUS, S, estimate
 from test_picture import TRUTH, record
 
-from adhesion_node.core.atp.supervision import TrainState
+from adhesion_node.core.atp.received import TrainState
 from adhesion_node.live.view import View
 from adhesion_node.report.__main__ import main
 from adhesion_node.wire.topics import POSITION

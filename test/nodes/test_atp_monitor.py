@@ -20,7 +20,8 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rosgraph_msgs.msg import Clock
 
-from adhesion_node.core.atp.supervision import Level, StampedCurve
+from adhesion_node.core.atp.received import StampedCurve
+from adhesion_node.core.atp.supervision import Level
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.ros import qos
@@ -41,6 +42,7 @@ SETTINGS = {
     "acceleration_mps2": 0.0,
     "speed_margin_mps": 0.0,
     "position_margin_m": 10.0,
+    "margin_sigma": 0.0,
     "valid_for_s": 2.0,
     "check_rate_hz": 2.0,
     "clock_timeout_s": 3600.0,  # the tests' clock stands between their steps
@@ -69,6 +71,7 @@ class Line:
     monitor: AtpMonitor
     driver: Node
     heard: list[DiagnosticArray] = field(default_factory=list)
+    pairs: int = 0
 
     def __post_init__(self) -> None:
         qos.subscribe(self.driver, topics.ATP_STATUS, self.heard.append, qos.RESULT)
@@ -96,7 +99,27 @@ class Line:
         self.spin_until(self.executor, lambda: self.monitor._curve is not before)
 
     def send_state(self, message: Any) -> DiagnosticStatus:
-        return self.next_status(lambda: self.state.publish(message))
+        """Publish a state; return what the monitor says once it has it."""
+        before = self.monitor._state
+        self.state.publish(message)
+        self.spin_until(self.executor, lambda: self.monitor._state is not before)
+        self.spin_until(self.executor, lambda: stamp_ns(self.heard[-1].header) == self.monitor._stamp_ns)
+        (status,) = self.heard[-1].status
+        return status
+
+    def send_pair(self, position_m: float, speed_mps: float = 40.0, offset_s: float = 0.0) -> DiagnosticStatus:
+        """Publish a curve and a state of one stamp, a nanosecond behind the pair before."""
+        self.pairs += 1
+        stamp_s = offset_s - 1e-6 + 1e-9 * self.pairs
+        self.send_curve(curve(stamp_s, position_m))
+        return self.send_state(state(position_m, speed_mps, stamp_s))
+
+    def tick_twice(self, offset_s: float) -> DiagnosticStatus:
+        """Let the watchdog pass by once and then speak, 1.2 s behind `offset_s`; return what it says."""
+        self.monitor._judged = True
+        self.set_time(START_S + offset_s + 0.6)
+        self.spin_until(self.executor, lambda: not self.monitor._judged)
+        return self.next_status(lambda: self.set_time(START_S + offset_s + 1.2))
 
     def next_status(self, act: Callable[[], None]) -> DiagnosticStatus:
         count = len(self.heard)
@@ -126,8 +149,8 @@ def state(position_m: float, speed_mps: float = 40.0, offset_s: float = 0.0) -> 
     return messages.state_message(t_ns(offset_s), position_m, 0.01, speed_mps, 0.01)
 
 
-def curve(offset_s: float = 0.0) -> Any:
-    return messages.curve_message(t_ns(offset_s), constant_curve(50.0, 0.8), 0.0)
+def curve(offset_s: float = 0.0, position_m: float = 0.0) -> Any:
+    return messages.curve_message(t_ns(offset_s), constant_curve(50.0, 0.8), position_m)
 
 
 def values(status: DiagnosticStatus) -> dict[str, str]:
@@ -146,9 +169,8 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
     ],
 )
 def test_the_level_follows_the_margin(line: Line, margin_m: float, level: str, diagnostic: bytes) -> None:
-    line.send_curve(curve())
-    line.send_state(state(0.0))  # ends the emergency of the time without a curve
-    status = line.send_state(state(5000.0 - NEEDED_M - margin_m))
+    line.send_pair(0.0)  # ends the emergency of the time without a curve
+    status = line.send_pair(5000.0 - NEEDED_M - margin_m)
     assert (status.name, status.level) == ("atp_monitor/supervision", diagnostic)
     told = values(status)
     assert told["level"] == level
@@ -160,12 +182,11 @@ def test_the_level_follows_the_margin(line: Line, margin_m: float, level: str, d
     limits = [float(told[f"{name}_mps"]) for name in ("indication", "permitted", "warning", "sbi", "ebi")]
     assert limits == sorted(limits)
     assert sum(limit < 40.0 for limit in limits) == [name.name for name in Level].index(level)
-    assert stamp_ns(line.heard[-1].header) == t_ns() + 2  # watchdog and first state have spoken at this time
+    assert stamp_ns(line.heard[-1].header) == t_ns() + 3  # spoken on the watchdog, the curve alone, the pair
 
 
 def test_an_intervention_holds_until_the_permitted_speed_is_kept(line: Line) -> None:
-    line.send_curve(curve())
-    levels = [values(line.send_state(state(5000.0 - NEEDED_M - margin)))["level"] for margin in (900, -50, 250, 300)]
+    levels = [values(line.send_pair(5000.0 - NEEDED_M - margin))["level"] for margin in (900, -50, 250, 300)]
     assert levels == ["NORMAL", "EMERGENCY_BRAKE", "EMERGENCY_BRAKE", "INDICATION"]
 
 
@@ -210,11 +231,10 @@ def test_a_clock_that_stops_after_the_last_judgement_is_seen(
 
 
 def test_the_clock_moving_again_ends_the_emergency_of_its_standing(line: Line) -> None:
-    line.send_curve(curve())
     line.monitor._clock_timeout_s = -1.0  # as if it had stood for long
-    assert "stood still" in line.send_state(state(0.0)).message
+    assert "stood still" in line.send_pair(0.0).message
     line.monitor._clock_timeout_s = 3600.0
-    assert values(line.send_state(state(0.0)))["level"] == "NORMAL"
+    assert values(line.send_pair(0.0))["level"] == "NORMAL"
 
 
 def test_without_a_curve_the_train_must_stop(line: Line) -> None:
@@ -225,13 +245,11 @@ def test_without_a_curve_the_train_must_stop(line: Line) -> None:
 
 
 def test_the_watchdog_speaks_in_silence_and_says_what_has_expired(line: Line) -> None:
-    line.send_curve(curve())
-    assert values(line.send_state(state(0.0)))["level"] == "NORMAL"
+    assert values(line.send_pair(0.0))["level"] == "NORMAL"
     # 0.5 s per tick; the tick after a judgement stays silent, the next one speaks.
-    line.set_time(START_S + 0.6)
-    line.spin_until(line.executor, lambda: not line.monitor._judged)
-    assert len(line.heard) == 2
-    status = line.next_status(lambda: line.set_time(START_S + 1.2))
+    count = len(line.heard)
+    status = line.tick_twice(0.0)
+    assert len(line.heard) == count + 1
     assert values(status)["level"] == "NORMAL"
     assert float(values(status)["margin_m"]) == pytest.approx(5000.0 - 40.0 * 1.2 - NEEDED_M, abs=1.0)
     line.next_status(lambda: line.set_time(START_S + 1.7))
@@ -243,37 +261,88 @@ def test_the_watchdog_speaks_in_silence_and_says_what_has_expired(line: Line) ->
 
 
 def test_a_curve_expires_while_states_still_come(line: Line) -> None:
-    line.send_curve(curve())
-    line.next_status(lambda: line.set_time(START_S + 3.0))
-    status = line.send_state(state(100.0, offset_s=3.0))
-    assert "braking curve expired: 3 s old" in status.message
-    line.send_curve(curve(3.0))
-    assert values(line.send_state(state(100.0, offset_s=3.0)))["level"] == "NORMAL"
+    line.send_pair(0.0)
+    line.set_time(START_S + 3.0)
+    line.send_state(state(100.0, offset_s=3.0))
+    assert "braking curve expired: 4.2 s old" in line.tick_twice(3.0).message
+    assert values(line.send_pair(150.0, offset_s=4.2))["level"] == "NORMAL"
 
 
 def test_a_clock_that_jumps_back_leaves_no_curve_from_the_future(line: Line) -> None:
-    line.send_curve(curve())
+    line.send_pair(0.0)
     line.set_time(START_S - 100.0)
-    status = line.send_state(state(100.0, offset_s=-100.0))
-    assert "braking curve is stamped 100 s ahead of the clock" in status.message
+    line.send_state(state(100.0, offset_s=-100.0))
+    assert "braking curve is stamped 98.8 s ahead of the clock" in line.tick_twice(-100.0).message
 
 
 def test_a_refused_curve_replaces_the_good_one(line: Line) -> None:
-    line.send_curve(curve())
-    assert values(line.send_state(state(0.0)))["level"] == "NORMAL"
+    assert values(line.send_pair(0.0))["level"] == "NORMAL"
     broken = curve()
     broken.points[5].velocities = [math.nan]
+    count = len(line.heard)
     line.send_curve(broken)
-    status = line.send_state(state(0.0))
+    line.spin_until(line.executor, lambda: len(line.heard) > count)
+    (status,) = line.heard[-1].status
     assert values(status)["level"] == "EMERGENCY_BRAKE"
     assert "braking curve: refused: braking curve point 5" in status.message
 
 
 def test_a_refused_state_is_an_emergency(line: Line) -> None:
-    line.send_curve(curve())
+    line.send_pair(0.0)
     status = line.send_state(state(math.nan))
     assert values(status)["level"] == "EMERGENCY_BRAKE"
     assert "state: refused: position x = nan" in status.message
+
+
+@pytest.mark.parametrize(
+    ("spoil", "message"),
+    [
+        (lambda point: setattr(point, "positions", [point.positions[0] / 1000.0]), "give positions in m"),
+        (lambda point: setattr(point, "velocities", [point.velocities[0] * 3.6]), "velocities in m/s"),
+        (lambda point: setattr(point, "positions", [3000.0]), "refused: braking curve: v^2 falls by"),
+        (lambda point: setattr(point, "positions", [point.positions[0] - 3000.0]), "begins at 0 m"),
+    ],
+)
+def test_a_curve_in_other_units_or_from_another_place_is_an_emergency(
+    line: Line, spoil: Callable[[Any], None], message: str
+) -> None:
+    assert values(line.send_pair(3000.0))["level"] == "NORMAL"
+    impossible = curve(position_m=3000.0)
+    for point in impossible.points:
+        spoil(point)
+    line.send_curve(impossible)
+    status = line.send_state(state(3000.0))
+    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
+    assert message in status.message
+
+
+def test_a_stamp_ahead_of_the_clock_is_an_emergency_that_ends_with_it(line: Line) -> None:
+    assert values(line.send_pair(0.0))["level"] == "NORMAL"
+    assert "state is stamped 1.9 s ahead of the clock, at most 0.1 s are used" in line.send_pair(0.0, 40.0, 1.9).message
+    assert values(line.send_pair(0.0, 40.0, 0.1))["level"] == "NORMAL"
+
+
+def test_a_state_is_judged_with_its_own_curve(line: Line) -> None:
+    """A speed may jump by more than the curve before covers: no emergency until the next one is there."""
+    assert values(line.send_pair(0.0, 40.0))["level"] == "NORMAL"
+    count = len(line.heard)
+    line.send_state(state(0.0, 56.0))
+    assert len(line.heard) == count
+    line.curve.publish(messages.curve_message(t_ns(), constant_curve(56.0, 0.8), 0.0))
+    line.spin_until(line.executor, lambda: len(line.heard) > count)
+    (status,) = line.heard[-1].status
+    assert values(status)["level"] == "NORMAL"
+    assert float(values(status)["supervised_mps"]) == 56.0
+
+
+def test_states_without_curves_are_judged_by_the_watchdog_however_many_come(line: Line) -> None:
+    line.send_pair(0.0)
+    for step in range(1, 13):
+        line.set_time(START_S + step / 4)
+        line.send_state(state(10.0 * step, offset_s=step / 4))
+    (status,) = line.heard[-1].status
+    assert values(status)["level"] == "EMERGENCY_BRAKE"
+    assert "braking curve expired" in status.message
 
 
 def test_a_curve_from_before_the_monitor_started_is_used(

@@ -183,7 +183,9 @@ def test_without_estimates_it_says_what_to_do(left_out: tuple[Topic, ...], tmp_p
 def curve(second: int, length_m: float) -> bytes:
     """Return a braking curve of that second, by hand: as it runs to 60, 40 and 0 m/s, it passes 50 at 2 lengths."""
     speeds = np.array([80.0 - 2.0 * second, 60.0, 40.0, 0.0])
-    by_hand = BrakingCurve(length_m * np.array([0.0, 1.0, 3.0, 9.0]), speeds, np.ones(4), np.arange(4.0))
+    places = length_m * np.array([0.0, 1.0, 3.0, 9.0])
+    slowing = np.diff(speeds**2) / (-2.0 * np.diff(places))
+    by_hand = BrakingCurve(places, speeds, np.resize([slowing.min(), slowing.max()], 4), np.arange(4.0))
     message = messages.curve_message(START_NS + second * S, by_hand, 70.0)
     return serialize(as_rosbags(message, BRAKING_CURVE.type), BRAKING_CURVE.type)
 

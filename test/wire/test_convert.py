@@ -128,8 +128,23 @@ def test_the_state_goes_round() -> None:
     message = messages.state_message(T_NS, 1500.0, 0.04, 70.0, 0.01)
     assert (message.child_frame_id, message.pose.pose.orientation.w) == ("train", 1.0)
     assert (message.pose.covariance[0], message.twist.covariance[0]) == (0.04, 0.01)
-    assert topics.STATE.read(message) == (T_NS, 1500.0, 70.0)
-    assert topics.STATE.read(as_rosbags(message, "nav_msgs/msg/Odometry")) == (T_NS, 1500.0, 70.0)
+    assert topics.STATE.read(message) == (T_NS, 1500.0, 70.0, 0.2, 0.1)
+    assert topics.STATE.read(as_rosbags(message, "nav_msgs/msg/Odometry")) == (T_NS, 1500.0, 70.0, 0.2, 0.1)
+    assert topics.STATE.read(messages.state_message(T_NS, 1500.0, 0.04, -7.0, 0.01)).speed_mps == -7.0
+
+
+@pytest.mark.parametrize("part", ["pose", "twist"])
+@pytest.mark.parametrize(
+    ("variance", "reason"), [(0.0, "BAD_VARIANCE"), (-1.0, "BAD_VARIANCE"), (math.nan, "NOT_FINITE")]
+)
+def test_an_estimated_state_tells_how_sure_it_is(part: str, variance: float, reason: str) -> None:
+    message = messages.state_message(T_NS, 1500.0, 0.04, 70.0, 0.01)
+    getattr(message, part).covariance[0] = variance
+    with pytest.raises(reading.Rejected, match=r"(position|speed) covariance\[0\] = ") as refusal:
+        topics.STATE.read(message)
+    assert refusal.value.reason == reason
+    if variance == 0.0:  # what a simulator knows is exact
+        assert topics.TRUTH_STATE.read(message).speed_mps == 70.0
 
 
 CURVE = braking.curve(CRH3, 80.0, 0.08, target_mps=10.0)
@@ -170,6 +185,26 @@ def test_a_curve_without_length_goes_round() -> None:
     assert set(read.speed_mps) == {10.0}
 
 
+SHAPES = (0.01, 0.2, lambda v: 0.05 + 3.0 / (v + 20.0), lambda v: 0.05 + 0.1 * (v < 33.0))
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 0.5, 20.0, 100.0])
+@pytest.mark.parametrize("mu", SHAPES)
+def test_every_curve_of_ours_is_plausible(speed_mps: float, mu: Any) -> None:
+    made = braking.curve(CRH3, speed_mps, mu)
+    assert topics.BRAKING_CURVE.read(messages.curve_message(T_NS, made, 1e6)).position_m == 1e6
+
+
+def _scaled(positions: float = 1.0, velocities: float = 1.0, accelerations: float = 1.0) -> Callable[[Any], None]:
+    def spoil(message: Any) -> None:
+        for point in message.points:
+            point.positions = [point.positions[0] * positions]
+            point.velocities = [point.velocities[0] * velocities]
+            point.accelerations = [point.accelerations[0] * accelerations]
+
+    return spoil
+
+
 def _set(name: str, index: int, value: float) -> Callable[[Any], None]:
     return lambda message: setattr(message.points[index], name, [value])
 
@@ -181,6 +216,16 @@ def _set(name: str, index: int, value: float) -> Callable[[Any], None]:
         (lambda m: setattr(m, "joint_names", ["wheel"]), "BAD_CURVE", r"joints = \['wheel'\], points = 64: give one"),
         (lambda m: setattr(m, "points", []), "BAD_CURVE", r"points = 0"),
         (lambda m: setattr(m.points[3], "velocities", []), "BAD_CURVE", r"without exactly one value of each kind"),
+        (
+            _scaled(positions=1e-3),
+            "IMPLAUSIBLE_CURVE",
+            r"v\^2 falls by .* from point 0 to 1, on 0\.\d+ m at .*: give .* in m,",
+        ),
+        (_scaled(positions=0.0), "IMPLAUSIBLE_CURVE", r"on 0 m at"),
+        (_scaled(velocities=3.6), "IMPLAUSIBLE_CURVE", r"from point 0 to 1"),
+        (_scaled(accelerations=3.6), "IMPLAUSIBLE_CURVE", r"from point 0 to 1"),
+        (_scaled(positions=0.93), "IMPLAUSIBLE_CURVE", r"from point 0 to 1"),
+        (_set("velocities", 40, 35.0), "IMPLAUSIBLE_CURVE", r"from point (39|40)"),
         (_set("positions", 3, math.nan), "NOT_FINITE", r"braking curve point 3 = \[nan"),
         (_set("velocities", 0, math.inf), "NOT_FINITE", r"braking curve point 0"),
         (_set("positions", 0, -1e308), "NOT_FINITE", r"braking curve point 0"),

@@ -37,13 +37,35 @@ class SupervisionConfig:
         4.0, "Time that the driver has from the permitted speed to the service brake, T_driver", "s", 0.0, 60.0
     )
     acceleration_mps2: float = setting(
-        0.4, "Acceleration until the brake acts, A_est; from the cut-off on at most 0.4", "m/s^2", 0.0, 2.0
+        0.4,
+        "Acceleration since the state and until the brake acts, A_est; from the cut-off on at most 0.4",
+        "m/s^2",
+        0.0,
+        2.0,
     )
     speed_margin_mps: float = setting(0.5, "Margin for a speed that is estimated too low, V_delta0", "m/s", 0.0, 10.0)
     position_margin_m: float = setting(
         5.0, "Margin for a position that is estimated too far back (max safe front end)", "m", 0.0, 1e4
     )
+    margin_sigma: float = setting(
+        3.0, "Standard deviations of the state by which the train may be further ahead and faster", "", 0.0, 10.0
+    )
+    max_position_std_m: float = setting(
+        20.0, "Standard deviation of the position up to which a state is used", "m", 1e-3, 1e4
+    )
+    max_speed_std_mps: float = setting(
+        2.0, "Standard deviation of the speed up to which a state is used", "m/s", 1e-3, 50.0
+    )
+    roll_back_tolerance_m: float = setting(
+        2.0, "Way that the train may roll back, beyond what the standard deviations explain", "m", 0.0, 1e3
+    )
+    max_deceleration_mps2: float = setting(
+        3.0, "Deceleration up to which a braking curve is believed; no train brakes harder", "m/s^2", 0.1, 20.0
+    )
     valid_for_s: float = setting(2.0, "Age up to which a curve and a state are used", "s", 0.01, 3600.0)
+    max_ahead_s: float = setting(
+        0.1, "How far a stamp may be ahead of the clock: so much way may be missed", "s", 0.0, 10.0
+    )
 
     def __post_init__(self) -> None:
         check_settings(self, "")

@@ -19,6 +19,7 @@ from ...command.options import progress
 from ...core import Config
 from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
+from ...core.atp.received import TrainState
 from ...core.physics import braking
 from ...core.physics.adhesion import WET
 from ...core.physics.braking import BrakingCurve
@@ -89,6 +90,7 @@ def rows(scenario: str, said: list[Prediction], kwet: float) -> Iterator[dict[st
     _, target_kmh = BRAKINGS[scenario]
     config = SupervisionConfig(target_speed_kmh=target_kmh)
     for speed_kmh in SPEEDS_KMH[scenario]:
+        train = _train(_last(said, speed_kmh * KMH), speed_kmh * KMH)
         for case, (mu, curve) in _cases(said, speed_kmh * KMH, kwet).items():
             yield {
                 "scenario": scenario,
@@ -96,7 +98,7 @@ def rows(scenario: str, said: list[Prediction], kwet: float) -> Iterator[dict[st
                 "target_kmh": target_kmh,
                 "case": case,
                 "mu": mu,
-                **_limits(config, curve, speed_kmh * KMH),
+                **_limits(config, curve, train),
             }
 
 
@@ -123,12 +125,20 @@ def _last(said: list[Prediction], speed_mps: float) -> Prediction | None:
     return next((one for one in reversed(said) if one.estimate.speed_mps >= speed_mps), None)
 
 
-def _limits(config: SupervisionConfig, curve: BrakingCurve | None, speed_mps: float) -> dict[str, float | None]:
+def _train(last: Prediction | None, speed_mps: float) -> TrainState:
+    """The train at a speed, as sure as the last estimate before it."""
+    sure = (0.0, 0.0) if last is None else (last.estimate.position_std_m, last.estimate.speed_std_mps)
+    return TrainState(0, 0.0, speed_mps, *sure)
+
+
+def _limits(config: SupervisionConfig, curve: BrakingCurve | None, train: TrainState) -> dict[str, float | None]:
     """Distances, m, of the estimated front end before the target at which each limit is met."""
     if curve is None:
         return {f"{name}_m": None for name in etcs.Limits._fields}
-    found = etcs.distances(config, curve, np.array([speed_mps]))
-    return {f"{name}_m": float(value[0]) + config.position_margin_m for name, value in found._asdict().items()}
+    ahead_m, fastest_mps = train.at_most(config, train.t_ns)
+    found = etcs.distances(config, curve, np.array([fastest_mps]))
+    margin_m = config.position_margin_m + ahead_m
+    return {f"{name}_m": float(value[0]) + margin_m for name, value in found._asdict().items()}
 
 
 def lines(table: list[dict[str, Any]]) -> Iterator[str]:

@@ -10,16 +10,8 @@ import numpy as np
 import pytest
 
 from adhesion_node.core.atp.config import SupervisionConfig
-from adhesion_node.core.atp.supervision import (
-    Decision,
-    Level,
-    Severity,
-    StampedCurve,
-    TrainState,
-    Unavailable,
-    decide,
-    held,
-)
+from adhesion_node.core.atp.received import StampedCurve, TrainState, Unavailable
+from adhesion_node.core.atp.supervision import Decision, Level, Severity, decide, held, measured
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.physics.train import CRH3, KMH
@@ -51,13 +43,13 @@ CONFIG = SupervisionConfig(
 )
 NEEDED_M = 1000.0 + 80.0
 """40 m/s to a stand at 0.8 m/s^2: 1600/1.6 m; 2 s of build-up at 40 m/s."""
-CURVE = StampedCurve(NOW_NS, constant(40.0))
+CURVE = StampedCurve(NOW_NS, 0.0, constant(40.0))
 
 
 def at_margin(margin_m: float, previous: Level = Level.NORMAL) -> Decision:
     """Decide `margin_m` before the emergency intervention at 40 m/s."""
     position = 5000.0 - 10.0 - NEEDED_M - margin_m
-    return decide(CONFIG, NOW_NS, TrainState(NOW_NS, position, 40.0), CURVE, previous)
+    return decide(CONFIG, NOW_NS, TrainState(NOW_NS, position, 40.0), CURVE._replace(position_m=position), previous)
 
 
 @pytest.mark.parametrize(
@@ -88,7 +80,8 @@ def test_the_published_speeds_are_those_that_decide() -> None:
     for margin in np.linspace(-200.0, 900.0, 200):
         decision = at_margin(float(margin))
         assert decision.reading is not None
-        _, _, _, permitted, warning, sbi, ebi, indication = decision.reading
+        _, _, _, permitted, warning, sbi, ebi, indication, supervised = decision.reading
+        assert supervised == 40.0
         assert indication <= permitted <= warning <= sbi <= ebi
         exceeded = sum(limit < 40.0 for limit in (indication, permitted, warning, sbi, ebi))
         assert decision.level is list(Level)[exceeded]
@@ -112,8 +105,24 @@ def test_an_intervention_holds_until_the_permitted_speed_is_kept(
 
 def test_what_is_held_is_never_less_than_what_is_measured() -> None:
     for previous in Level:
-        for now in Level:
-            assert list(Level).index(held(previous, now)) >= list(Level).index(now)
+        for margin in np.linspace(-200.0, 900.0, 100):
+            reading = at_margin(float(margin)).reading
+            assert reading is not None
+            assert list(Level).index(held(previous, reading)) >= list(Level).index(measured(reading))
+
+
+@pytest.mark.parametrize(
+    ("previous", "margin_m", "level"),
+    [  # 59 m of way and margin for each m/s of 40, T_indication 9 s on top
+        (Level.INDICATION, 650.0, Level.INDICATION),
+        (Level.INDICATION, 670.0, Level.NORMAL),
+        (Level.EMERGENCY_BRAKE, 650.0, Level.INDICATION),
+        (Level.OVERSPEED, 290.0, Level.OVERSPEED),
+        (Level.NORMAL, 650.0, Level.NORMAL),
+    ],
+)
+def test_a_level_is_left_once_its_limit_is_kept_by_one_kmh(previous: Level, margin_m: float, level: Level) -> None:
+    assert at_margin(margin_m, previous).level is level
 
 
 def test_a_train_that_brakes_only_when_the_emergency_brake_is_called_keeps_the_target() -> None:
@@ -122,7 +131,7 @@ def test_a_train_that_brakes_only_when_the_emergency_brake_is_called_keeps_the_t
     position, speed, time, braking_since = 0.0, 60.0, 0.0, None
     while speed > 0.0 and position < 6000.0:
         now_ns = NOW_NS + round(time * 1e9)
-        curve = StampedCurve(now_ns, braking.curve(CRH3, speed, 0.07))
+        curve = StampedCurve(now_ns, position, braking.curve(CRH3, speed, 0.07))
         if braking_since is None:
             decision = decide(config, now_ns, TrainState(now_ns, position, speed), curve)
             braking_since = time if decision.level is Level.EMERGENCY_BRAKE else None
@@ -138,7 +147,7 @@ def test_a_train_that_brakes_only_when_the_emergency_brake_is_called_keeps_the_t
 
 def test_a_state_that_is_old_is_moved_on_at_its_speed() -> None:
     state = TrainState(NOW_NS - SECOND_NS, 1000.0, 40.0)
-    decision = decide(CONFIG, NOW_NS, state, CURVE)
+    decision = decide(CONFIG, NOW_NS, state, CURVE._replace(position_m=1040.0))
     assert decision.reading is not None
     assert decision.reading.distance_to_target_m == pytest.approx(5000.0 - 1000.0 - 40.0)
     assert decision.reading.margin_m == pytest.approx(5000.0 - 1000.0 - 40.0 - 10.0 - NEEDED_M)
@@ -148,7 +157,7 @@ def test_a_state_that_is_old_is_moved_on_at_its_speed() -> None:
 @pytest.mark.parametrize("position_m", [0.0, 4999.0, 5001.0, 9000.0])
 def test_at_the_target_speed_all_is_well_wherever_the_train_is(position_m: float) -> None:
     config = replace(CONFIG, target_speed_kmh=36.0)
-    decision = decide(config, NOW_NS, TrainState(NOW_NS, position_m, 10.0), CURVE)
+    decision = decide(config, NOW_NS, TrainState(NOW_NS, position_m, 10.0), CURVE._replace(position_m=position_m))
     assert decision.level is Level.NORMAL
     assert decision.reading is not None
     assert decision.reading.braking_distance_m == 0.0
@@ -165,7 +174,8 @@ def test_at_the_target_speed_all_is_well_wherever_the_train_is(position_m: float
 )
 def test_beyond_the_target_its_speed_is_a_ceiling(speed_kmh: float, level: Level) -> None:
     config = replace(CONFIG, target_speed_kmh=36.0)
-    assert decide(config, NOW_NS, TrainState(NOW_NS, 5100.0, speed_kmh * KMH), CURVE).level is level
+    state = TrainState(NOW_NS, 5100.0, speed_kmh * KMH)
+    assert decide(config, NOW_NS, state, CURVE._replace(position_m=5100.0)).level is level
 
 
 def test_far_before_the_target_the_line_speed_is_a_ceiling() -> None:
@@ -185,10 +195,11 @@ LOST = Unavailable("none received yet")
         (LOST, CURVE, "state: none received yet"),
         (GOOD_STATE, LOST, "braking curve: none received yet"),
         (GOOD_STATE._replace(t_ns=NOW_NS - 3 * SECOND_NS), CURVE, "state expired: 3 s old, valid for 2 s"),
+        (GOOD_STATE._replace(t_ns=NOW_NS + SECOND_NS), CURVE, "state is stamped 1 s ahead of the clock, at most 0.1 s"),
         (GOOD_STATE, CURVE._replace(t_ns=NOW_NS - 5 * SECOND_NS), "braking curve expired: 5 s old, valid for 2 s"),
         (GOOD_STATE, CURVE._replace(t_ns=NOW_NS + 100 * SECOND_NS), "braking curve is stamped 100 s ahead of the"),
-        (GOOD_STATE, StampedCurve(NOW_NS, constant(30.0)), "begins at 108.0 km/h but the train runs at 144.0 km/h"),
-        (GOOD_STATE, StampedCurve(NOW_NS, constant(40.0, 20.0)), "ends at 72.0 km/h, above the target speed 0.0 km/h"),
+        (GOOD_STATE, CURVE._replace(curve=constant(30.0)), "begins at 108.0 km/h but the train runs at 144.0 km/h"),
+        (GOOD_STATE, CURVE._replace(curve=constant(40.0, 20.0)), "ends at 72.0 km/h, above the target speed 0.0 km/h"),
     ],
 )
 def test_whatever_is_missing_old_or_not_covered_is_an_emergency_that_says_why(
@@ -202,14 +213,14 @@ def test_whatever_is_missing_old_or_not_covered_is_an_emergency_that_says_why(
 
 
 def test_a_curve_is_used_up_to_its_last_moment() -> None:
-    curve = CURVE._replace(t_ns=NOW_NS - 2 * SECOND_NS)
+    curve = CURVE._replace(t_ns=NOW_NS - 2 * SECOND_NS, position_m=-80.0)
     assert decide(CONFIG, NOW_NS, GOOD_STATE, curve).level is Level.NORMAL
     assert decide(CONFIG, NOW_NS + 1, GOOD_STATE, curve).level is Level.EMERGENCY_BRAKE
 
 
 def test_a_curve_that_ends_at_the_rounded_target_speed_reaches_it() -> None:
     config = replace(CONFIG, target_speed_kmh=36.0)
-    curve = StampedCurve(NOW_NS, constant(40.0, 10.0 + 1e-9))
+    curve = CURVE._replace(curve=constant(40.0, 10.0 + 1e-9))
     assert decide(config, NOW_NS, GOOD_STATE, curve).level is Level.NORMAL
 
 

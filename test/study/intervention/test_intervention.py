@@ -21,12 +21,13 @@ from adhesion_node.study.intervention import study as intervention
 
 
 def prediction(speed_kmh: float, mu: float, mu_lower: float) -> Prediction:
-    estimate: Any = SimpleNamespace(speed_mps=speed_kmh * KMH, mu=mu, mu_lower=mu_lower)
+    sure = {"position_std_m": 1.0, "speed_std_mps": 0.1}
+    estimate: Any = SimpleNamespace(speed_mps=speed_kmh * KMH, mu=mu, mu_lower=mu_lower, **sure)
     safe, nominal = (braking.curve(CRH3, speed_kmh * KMH, value) if value else None for value in (mu_lower, mu))
     return Prediction(estimate, safe, nominal)
 
 
-SAID = [prediction(290, 0.060, 0.0), prediction(252, 0.070, 0.060), prediction(249, 0.075, 0.070)]
+SAID = [prediction(290, 0.060, 0.0), prediction(256, 0.070, 0.060), prediction(249, 0.075, 0.070)]
 
 
 def by_case(speed_kmh: int, said: list[Prediction] = SAID, kwet: float = 0.8) -> dict[str, dict[str, Any]]:
@@ -35,10 +36,13 @@ def by_case(speed_kmh: int, said: list[Prediction] = SAID, kwet: float = 0.8) ->
 
 
 def needed(speed_kmh: float, mu: Any) -> float:
-    """EBI, m, by hand: 1.5 s of build-up at up to 0.4 m/s^2, 0.5 m/s too slow, 5 m too far back, 107.5 km/h there."""
-    speed = speed_kmh * KMH + 0.5
+    """EBI, m, by hand: 1.5 s of build-up at up to 0.4 m/s^2, 107.5 km/h at the target.
+
+    The train is 0.5 m/s and three standard deviations faster than told, and 5 m and three further ahead.
+    """
+    speed = speed_kmh * KMH + 0.8
     length = float(braking.curve(CRH3, speed + 0.6, mu, 107.5 * KMH).distance_m[-1])
-    return length + (speed + 0.3) * 1.5 + 5.0
+    return length + (speed + 0.3) * 1.5 + 8.0
 
 
 def test_each_case_brakes_by_its_own_adhesion() -> None:
@@ -49,7 +53,7 @@ def test_each_case_brakes_by_its_own_adhesion() -> None:
     assert list(found) == list(adhesion)
     for case, mu in adhesion.items():
         # Beyond its first point a curve is continued at its weakest deceleration: some metres on the safe side.
-        assert -0.5 < found[case]["ebi_m"] - needed(250, mu) < 15.0, case
+        assert -0.5 < found[case]["ebi_m"] - needed(250, mu) < 20.0, case
 
 
 def test_the_estimate_is_the_last_one_whose_curve_begins_above_the_speed() -> None:
@@ -84,8 +88,8 @@ def test_the_command_prints_the_table_and_writes_json(
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 2 * (2 + 4)
     assert printed[2].split()[3] == "no"  # curve
-    # 280 km/h: T_bs = 2 s, T_warning = 2 s, T_driver = 4 s, T_indication = 9 s
-    assert printed[2].split()[-4:] == ["156", "311", "467", "1167"]
+    # 280 km/h and 0.3 m/s: T_bs = 2 s, T_warning = 2 s, T_driver = 4 s, T_indication = 9 s
+    assert printed[2].split()[-4:] == ["156", "312", "468", "1171"]
 
 
 def test_without_a_curve_there_is_no_figure(
