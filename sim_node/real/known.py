@@ -1,0 +1,46 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What an onboard unit is told of a real train and its track, in the estimator's own terms."""
+
+from dataclasses import asdict
+from typing import Any
+
+from adhesion_node.core.physics.track import Grade, Track
+from adhesion_node.core.physics.train import GRAVITY, KMH, Train
+
+from .plant.scenarios import Scenario
+from .sensors.fitted import Fitted
+
+
+def train(scenario: Scenario) -> Train:
+    """Return the train by its papers: the pads' friction stands for whatever makes the force of the full brake."""
+    nominal = scenario.nominal
+    weight_kn = 1e-3 * nominal.mass_kg * GRAVITY
+    c0, c1, c2 = nominal.resistance
+    known: dict[str, Any] = {
+        "mass_kg": nominal.mass_kg,
+        "length_m": nominal.length_m,
+        "full_pressure_pa": nominal.full_pa,
+        "wheel_radius_m": nominal.wheel_radius_m,
+        "rotating_mass_fraction": nominal.rotating,
+        "resistance_c0": c0 / weight_kn,
+        "resistance_c1": c1 * KMH / weight_kn,
+        "resistance_c2": c2 * KMH**2 / weight_kn,
+    }
+    like = Train(**known)
+    return Train(pad_friction=like.pad_friction * nominal.brake_n / like.brake_force(nominal.full_pa), **known)
+
+
+def parameters(scenario: Scenario, fitted: Fitted) -> dict[str, Any]:
+    """Return the estimator's parameters by name: train, known grades, and what its sensors are."""
+    grades = "; ".join(f"grade {one.start_m} {one.end_m} {one.rise_m}" for one in _grades(scenario))
+    return {f"train.{name}": value for name, value in asdict(train(scenario)).items()} | {"track": grades} | fitted.told
+
+
+def track(scenario: Scenario) -> Track:
+    """Return the grades that are known."""
+    return Track(_grades(scenario), scenario.nominal.length_m)
+
+
+def _grades(scenario: Scenario) -> tuple[Grade, ...]:
+    return tuple(Grade(start, end, slope * (end - start)) for start, end, slope in scenario.known_grade)

@@ -1,0 +1,36 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Brake pressures, absolute: what the driver or the valve demands, one cylinder's, or the mean of all."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from adhesion_node.core.setting import check_settings, setting
+from adhesion_node.wire.codecs import ATMOSPHERE_PA
+from adhesion_node.wire.topics import BRAKE_PRESSURE, Topic
+
+from ..plant.journey import Array
+from .sensor import Measured, Ride, one
+
+DEMANDED, CYLINDER, MEAN = "demanded", "cylinder", "mean"
+
+
+@dataclass(frozen=True, slots=True)
+class Pressure:
+    """A gauge of the brake. Raises ValueError naming what is out of range."""
+
+    of: str = setting(DEMANDED, "What it is the pressure of", choices=(DEMANDED, CYLINDER, MEAN))
+    axle: int = 0
+    std_pa: float = setting(2e3, "Noise", "Pa", 0.0, 1e5)
+    topic: Topic = BRAKE_PRESSURE
+
+    def __post_init__(self) -> None:
+        check_settings(self, "pressure ")
+
+    def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
+        """Measure the pressure, Pa absolute."""
+        cylinders = ride.journey.cylinder_pa
+        gauge = {DEMANDED: ride.journey.demanded_pa, CYLINDER: cylinders[:, self.axle], MEAN: cylinders.mean(axis=1)}
+        noise = self.std_pa * rng.standard_normal(time_s.size)
+        return one(ride.at(time_s, gauge[self.of]) + ATMOSPHERE_PA + noise, self.std_pa**2)
