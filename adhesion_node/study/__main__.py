@@ -9,6 +9,7 @@ from ..command.options import DONE, help_texts, json_option, report, run_tool
 from .bound import study as bound
 from .he import study as creep
 from .intervention import study as intervention
+from .real import study as real
 from .robust import study as robust
 from .xie import distances, sensitivity, tables, tune_ekf
 
@@ -26,6 +27,11 @@ STUDIES = {
         robust,
         "the default method where rail, sensors or train are not what it believes, and under faults",
         "--runs 40",
+    ),
+    "real": (
+        real,
+        "the estimator on trains, rails and sensors that share no model with it, held against goals",
+        "--runs 20 --only leaves,wet --figures figures",
     ),
     "bound": (bound, "the posterior Cramér-Rao bound of mu over a braking", "--json -"),
     "intervention": (

@@ -15,7 +15,7 @@ from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
 from ..baselines.ekf import TUNED, EkfState, Tuning, ekf_step
 from . import lockstep
-from .world import Refusal, SimulatedRun
+from .world import Refusal, Sent, SimulatedRun
 
 
 class Lane(NamedTuple):
@@ -85,9 +85,14 @@ class Estimator(NamedTuple):
 def _by_pipeline(estimator: Estimator, lane: Lane) -> LaneResult:
     """Sample by sample through the pipeline, as the live node and the replay run."""
     pipeline = Pipeline(estimator.config_in(lane), estimator.seed_in(lane))
+    return through(pipeline, lane.run.sent, lane.run.world.over_s)
+
+
+def through(pipeline: Pipeline, sent: Iterable[Sent], over_s: float = 0.0) -> LaneResult:
+    """Push what is received in its order; the fault, if there is one, is over at `over_s`."""
     outputs, first_s = list[Output](), dict[str, float]()
     now_s, before = 0.0, 0
-    for now_s, received in lane.run.sent:
+    for now_s, received in sent:
         for sample in received:
             if isinstance(sample, Refusal):
                 pipeline.refuse(*sample)
@@ -95,7 +100,7 @@ def _by_pipeline(estimator: Estimator, lane: Lane) -> LaneResult:
                 outputs += [Output(prediction, now_s, pipeline.accepted) for prediction in pipeline.push(sample)]
         if received:
             first_s = dict.fromkeys(pipeline.dropped, now_s) | first_s
-        before = pipeline.accepted if now_s < lane.run.world.over_s else before
+        before = pipeline.accepted if now_s < over_s else before
     outputs += [Output(prediction, now_s, pipeline.accepted, at_end=True) for prediction in pipeline.finish()]
     dropped = pipeline.dropped
     dropped_s = {reason: first_s.get(reason, now_s) for reason in dropped}

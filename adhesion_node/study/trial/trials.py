@@ -153,7 +153,7 @@ def _rows(lane: Lane, result: LaneResult) -> Rows:
             (
                 *(lane.run.seed, lane.start_mu, truth.t_ns, output.out_s),
                 *(truth.position_m, truth.speed_mps, truth.mu, math.nan),
-                *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, _length(output.prediction)),
+                *(e.mu, e.mu_std, e.mu_lower, e.position_m, e.speed_mps, length_m(output.prediction)),
                 *(truth.regime == ADHESION_LIMITED, False, e.regime is Regime.ADHESION_LIMITED),
                 *(e.withheld, output.at_end),
                 *(e.window, output.accepted - result.accepted_before, e.changes),
@@ -169,6 +169,6 @@ def _rows(lane: Lane, result: LaneResult) -> Rows:
     return rows
 
 
-def _length(prediction: Prediction) -> float:
+def length_m(prediction: Prediction) -> float:
     """Length, m, of the safe curve; NaN where there is none."""
     return math.nan if prediction.safe is None else float(prediction.safe.distance_m[-1])

@@ -94,12 +94,13 @@ def simulate(world: World, seed: int) -> SimulatedRun:
         born.setdefault(truth.t_ns, truth)
         for message in messages:
             born.setdefault(message.t_ns, truth)
-        sent.append(Sent(truth.t_ns * 1e-9, tuple(map(_received, messages))))
+        sent.append(Sent(truth.t_ns * 1e-9, tuple(map(received, messages))))
     samples = (sample for _, received in sent for sample in received if not isinstance(sample, Refusal))
     return SimulatedRun(world, seed, tuple(sent), tuple(paired(Config(), samples)), born)
 
 
-def _received(message: SensorMessage) -> Sample | Refusal:
+def received(message: SensorMessage) -> Sample | Refusal:
+    """What the codecs make of a message."""
     try:
         sample: Sample = message.topic.read(message.build(plain))
         return sample

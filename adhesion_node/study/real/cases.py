@@ -1,0 +1,119 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The cases of `study real`: a train on its rail, and the sensors that it is fitted with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+from sim_node.real import known
+from sim_node.real.drive import Drive, drive
+from sim_node.real.plant.scenarios import SCENARIOS
+from sim_node.real.sensors.fitted import FITTED
+
+from ...core import Config
+from . import point_mass
+from .truth import USED_S
+
+AIDED = ("gnss_doppler", "gnss_imu", "radar", "doppler_only", "full")
+"""Sets with a speed of their own or an accelerometer."""
+
+UNSOUND = ("tacho", "gnss_outages", "gnss_stamps", "one_cylinder", "no_pressure")
+"""Sets whose sensors cannot be trusted, or lack what a narrow answer needs."""
+
+SLOWEST_BUILD_UP = 1.15
+"""A train's brake may take so much longer to build up than its papers say."""
+
+
+class Case(NamedTuple):
+    """A line of the table."""
+
+    scenario: str
+    fitted: str
+
+    @property
+    def name(self) -> str:
+        """Of the line."""
+        return f"{self.scenario} {self.fitted}"
+
+    @property
+    def rail(self) -> str:
+        """What sets its goals: "leaves", "patches", or nothing."""
+        if self.scenario.startswith("patch"):
+            return "patches"
+        return "leaves" if "leaves" in self.scenario or self.scenario == "salisbury" else ""
+
+    @property
+    def config(self) -> Config:
+        """What the estimator is told: the train by its papers, the known grades, what its sensors are, not how good."""
+        if self.scenario == point_mass.NAME:
+            return Config()
+        scenario = SCENARIOS[self.scenario]
+        train, told = known.train(scenario), dict[str, Any](FITTED[self.fitted].told)
+        return Config(train, known.track(scenario), assumed_pressure_pa=train.full_pressure_pa, **told)
+
+    @property
+    def built_after_s(self) -> float:
+        """Time from the full demand until the brake has built up everywhere, and the mean of used is all behind it."""
+        if self.scenario == point_mass.NAME:
+            return USED_S / 2
+        nominal = SCENARIOS[self.scenario].nominal
+        return SLOWEST_BUILD_UP * nominal.build_up_s + nominal.length_m / nominal.propagation_mps + USED_S / 2
+
+    def drives(self, seeds: Iterable[int]) -> tuple[Drive, ...]:
+        """Drive every seed."""
+        if self.scenario == point_mass.NAME:
+            return point_mass.drives(seeds)
+        return drive(SCENARIOS[self.scenario], FITTED[self.fitted], tuple(seeds))
+
+
+CASES = tuple(
+    Case(scenario, fitted)
+    for scenario, sets in (
+        (point_mass.NAME, "white"),
+        ("wet", "white gnss gnss_wheels gnss_doppler gnss_imu radar doppler_only tacho axle_speed"),
+        ("wet", "gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
+        ("wet_mass_over", "white gnss_wheels"),
+        ("wet_pads_weak", "gnss_wheels"),
+        ("wet_fast", "gnss_doppler"),
+        ("undulating", "gnss_imu"),
+        ("sequence", "gnss_wheels"),
+        ("rotating", "gnss_doppler"),
+        ("drying", "gnss_wheels"),
+        ("mixed", "gnss_wheels"),
+        ("dry", "gnss full"),
+        ("dry_pads_weak", "white gnss_wheels"),
+        ("dry_mass_over", "gnss_wheels"),
+        ("dry_fast", "gnss_wheels"),
+        ("undulating_dry", "gnss_wheels"),
+        ("sequence_dry", "gnss_doppler"),
+        ("leaves", "white gnss gnss_wheels gnss_imu gnss_outages one_cylinder one_cylinder_wheels"),
+        ("leaves", "mean_cylinder mean_cylinder_wheels mean_cylinder_demand wheel_dropouts no_pressure full"),
+        ("leaves_severe", "gnss_doppler"),
+        ("downhill_leaves", "gnss_wheels"),
+        ("salisbury", "gnss_doppler"),
+        ("patches", "gnss gnss_wheels full"),
+        ("patch_fall", "gnss_doppler"),
+        ("metro_dry", "gnss_wheels"),
+        ("metro_wet", "gnss_wheels"),
+        ("metro_leaves", "gnss_doppler"),
+        ("freight_dry", "gnss"),
+        ("freight_wet", "gnss_doppler"),
+        ("freight_leaves", "gnss"),
+        ("tram_dry", "gnss_wheels"),
+        ("tram_wet", "full"),
+        ("tram_leaves", "gnss_wheels"),
+    )
+    for fitted in sets.split()
+)
+"""The lines of the table."""
+
+
+def chosen(only: str) -> tuple[Case, ...]:
+    """The cases whose names hold one of the texts, separated by commas. Raises ValueError without any."""
+    wanted = [text.strip().lower() for text in only.split(",") if text.strip()]
+    some = tuple(case for case in CASES if not wanted or any(text in case.name.lower() for text in wanted))
+    if not some:
+        raise ValueError(f"only = {only}: give parts of {'; '.join(case.name for case in CASES)}")
+    return some

@@ -1,0 +1,104 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What truly was at the times of the estimates: adhesion used, sliding axles, the remaining way, the rail's borders."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from sim_node.real.plant.creep import contact, peak
+from sim_node.real.plant.journey import PERIOD_S, Journey
+
+from ...core.physics.train import Array
+
+USED_S = 1.0
+"""Time, centred, over which the used adhesion is averaged: slide protection swings it by its cycle."""
+
+SLID_S = 3.0
+"""An axle group that slid so lately still counts: slide protection lets it roll in between."""
+
+BORDER_RATIO = 0.75
+"""A rail has a border where its adhesion falls below this share of what it was, or rises above its inverse, ..."""
+
+BORDER_M = 100.0
+"""... within this distance."""
+
+MARGIN = 0.05
+"""Part of the change at either end of a border that does not count."""
+
+
+class Border(NamedTuple):
+    """Where the rail changes: times, s, between which the train passes it, and by what the adhesion is multiplied."""
+
+    start_s: float
+    end_s: float
+    ratio: float
+
+
+class Truth(NamedTuple):
+    """What truly was at N times, arrays (N,), of a journey."""
+
+    true_speed_mps: Array
+    used: Array
+    """Adhesion that the train's force used, averaged over `USED_S`."""
+    available: Array
+    slid: Array
+    """Share of the axle groups that slid within the last `SLID_S`."""
+    remaining_m: Array
+    """Way to the standstill; NaN before the full brake."""
+
+
+def truth_at(journey: Journey, t_s: Array) -> Truth:
+    """Look the truth up at N times, s."""
+    remaining = np.where(journey.time_s >= journey.full_from_s, journey.position_m[-1] - journey.position_m, np.nan)
+    columns = (journey.speed_mps, averaged(journey.used), journey.available, slid(journey), remaining)
+    return Truth(*(np.interp(t_s, journey.time_s, column) for column in columns))
+
+
+def averaged(values: Array) -> Array:
+    """Mean over `USED_S` centred at every time, over what there is of it at the ends; shape (T,)."""
+    half = round(USED_S / 2 / PERIOD_S)
+    total = np.concatenate(([0.0], np.cumsum(values)))
+    index = np.arange(values.size)
+    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, values.size)
+    return np.asarray((total[last] - total[first]) / (last - first))
+
+
+def slid(journey: Journey) -> Array:
+    """Share of the axle groups that slid at any time within the last `SLID_S`, shape (T,).
+
+    A group slides beyond the peak of the creep curve, that of the mean rail under the train.
+    """
+    mu0, speed = journey.available, journey.speed_mps
+    for _ in range(2):  # the peak is nearly proportional to mu0
+        highest, creep = peak(speed, contact(mu0))
+        mu0 = mu0 * journey.available / highest
+    rim = journey.wheel_radps * journey.radius_m
+    sliding = rim < ((1.0 - creep) * speed)[:, np.newaxis]
+    count = np.cumsum(sliding, axis=0)
+    back = round(SLID_S / PERIOD_S)
+    before = np.concatenate((np.zeros((back, count.shape[1]), count.dtype), count))[: len(count)]
+    return np.asarray(np.mean(count > before, axis=1))
+
+
+def borders(journey: Journey) -> list[Border]:
+    """Where the adhesion that the rail offers the train falls or rises by a quarter within 100 m, in order of passing.
+
+    A border begins and ends where a twentieth and all but a twentieth of the change, in logarithms, is done: a long
+    train takes its length to pass it.
+    """
+    moving = np.concatenate(([True], np.diff(journey.position_m) > 0.0))
+    place, offered, time_s = journey.position_m[moving], np.log(journey.available[moving]), journey.time_s[moving]
+    half = BORDER_M / 2
+    change = np.interp(place + half, place, offered) - np.interp(place - half, place, offered)
+    found = list[Border]()
+    for which in (change < np.log(BORDER_RATIO), change > -np.log(BORDER_RATIO)):
+        index = np.flatnonzero(which)
+        apart = np.flatnonzero(np.diff(place[index]) > BORDER_M) + 1  # nearer ones are one, roughened
+        for run in np.split(index, apart) if index.size else ():
+            around = np.flatnonzero((place >= place[run[0]] - half) & (place <= place[run[-1]] + half))
+            before, after = offered[around[[0, -1]]]
+            done = (offered[around] - before) / (after - before)
+            first, last = around[np.argmax(done > MARGIN)], around[::-1][np.argmax(done[::-1] < 1.0 - MARGIN)]
+            found.append(Border(float(time_s[first]), float(time_s[max(first, last)]), float(np.exp(after - before))))
+    return sorted(found)
