@@ -5,8 +5,9 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
+from ..wire.codecs import Rejected
 from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
 from .metadata import Metadata, read_metadata
@@ -38,6 +39,7 @@ class BagReader:
         losses = [f"{name}: {count} messages are lost" for name, count in self.lost.items()]
         self.damage = (*self._recording.damage, *losses)
         self.complete = not self.damage
+        self._undecodable: set[Record] = set()
 
     def messages(self, names: Iterable[str] | None = None) -> Iterator[Record]:
         """Yield the records in the order of (log time, arrival), of all topics or of those named.
@@ -46,6 +48,21 @@ class BagReader:
         """
         chosen = set(self.topics) if names is None else {self.resolve(name) for name in names}
         return self._recording.records(chosen.__contains__)
+
+    def decoded(self, names: Iterable[str]) -> Iterator[tuple[Record, Any]]:
+        """Yield the records of the topics named, each with its message; those that do not decode are left out."""
+        for record in self.messages(names):
+            try:
+                message = record.message
+            except Rejected:
+                self._undecodable.add(record)
+            else:
+                yield record, message
+
+    @property
+    def undecodable(self) -> dict[str, int]:
+        """Numbers of the messages that `decoded` has left out so far, by topic."""
+        return dict(Counter(record.topic for record in self._undecodable))
 
     def resolve(self, name: str) -> str | None:
         """Return the name under which a topic is recorded, or None when it is not there."""

@@ -9,8 +9,9 @@ from typing import Any, NamedTuple, Protocol
 
 from mcap.records import Message
 
+from ..wire.codecs import Reason, Rejected
 from .mcap_file import McapFile, TopicInfo
-from .types import deserialize
+from .types import UnknownTypeError, deserialize
 
 
 class Record(NamedTuple):
@@ -23,11 +24,22 @@ class Record(NamedTuple):
 
     @property
     def message(self) -> Any:
-        """The decoded message, decoded anew at each access. Raises ValueError when the bytes do not fit the type."""
+        """The decoded message, decoded anew at each access. Raises Rejected when the bytes do not fit the type."""
         try:
             return deserialize(self.cdr, self.type)
         except ValueError as error:
-            raise ValueError(f"{self.topic} at {self.log_ns} ns: {error}") from error
+            raise Rejected(Reason.UNDECODABLE, f"{self.topic} at {self.log_ns} ns: {error}") from error
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether it decodes, or is of a type that only others know."""
+        try:
+            deserialize(self.cdr, self.type)
+        except UnknownTypeError:
+            return True
+        except ValueError:
+            return False
+        return True
 
 
 class Recording(Protocol):

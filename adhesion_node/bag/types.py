@@ -3,15 +3,22 @@
 """Message classes, CDR and message definitions of ROS 2 Jazzy, without an installed ROS."""
 
 import re
+import struct
 from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ..wire.topics import Topic
+
+_UNDECODABLE = (struct.error, ValueError, IndexError, KeyError, OverflowError, MemoryError)
+"""What the decoders raise on bytes that are not what they seem."""
+
+
+class UnknownTypeError(ValueError):
+    """A message type that is not part of ROS 2 Jazzy."""
 
 
 class Definition(NamedTuple):
@@ -50,14 +57,22 @@ def encode(topic: Topic, *values: Any) -> bytes:
 
 
 def deserialize(cdr: bytes, type_name: str) -> Any:
-    """Return the message that `cdr` holds. Raises ValueError when the type is unknown or the bytes do not fit it."""
+    """Return the message that `cdr` holds; bytes behind it, which writers leave there, mean nothing.
+
+    Raises UnknownTypeError when the type is unknown, and ValueError when the bytes do not fit it.
+    """
     _require(type_name)
+    known = typestore().get_msgdef(type_name)
+    decoders = {b"\0\0": known.deserialize_cdr_be, b"\0\1": known.deserialize_cdr_le}
     try:
-        return typestore().deserialize_cdr(cdr, type_name)
-    except (SerdeError, IndexError) as error:
+        decode = decoders[bytes(cdr[:2])]
+        message, _ = decode(memoryview(cdr)[4:], 0, known.cls, typestore())
+    except _UNDECODABLE as error:
+        why = "no CDR" if isinstance(error, KeyError) else error
         raise ValueError(
-            f"message of {len(cdr)} bytes: it does not decode as {type_name} ({error}); was another type recorded?"
+            f"message of {len(cdr)} bytes: it does not decode as {type_name} ({why}); was another type recorded?"
         ) from error
+    return message
 
 
 def definition(type_name: str) -> Definition:
@@ -94,4 +109,6 @@ def is_latched(offered_qos_profiles: str) -> bool:
 
 def _require(type_name: str) -> None:
     if type_name not in typestore().fielddefs:
-        raise ValueError(f"message type = {type_name!r}: only the standard messages of ROS 2 Jazzy can be decoded")
+        raise UnknownTypeError(
+            f"message type = {type_name!r}: only the standard messages of ROS 2 Jazzy can be decoded"
+        )

@@ -63,9 +63,13 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
-            return Subject(name, "as recorded", read_run(reader, setup.line), setup.config)
-        run = estimate_run(reader, select_from(reader, options.remap), setup)
-        return Subject(name, "estimated from the recorded sensors", run, setup.config)
+            run, source = read_run(reader, setup.line), "as recorded"
+        else:
+            run = estimate_run(reader, select_from(reader, options.remap), setup)
+            source = "estimated from the recorded sensors"
+        for topic, count in reader.undecodable.items():
+            print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)
+        return Subject(name, source, run, setup.config)
 
 
 def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:

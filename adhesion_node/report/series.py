@@ -52,10 +52,9 @@ class Sample(NamedTuple):
 
 
 def read_topic(reader: BagReader, topic: Topic, line: Line = NOMINAL) -> Iterator[Sample]:
-    """Yield what is read of every message of a topic, whatever its frame."""
+    """Yield what is read of every message of a topic, whatever its frame; one that does not decode is left out."""
     read = topic._replace(frame=Frame.ANY).read
-    for record in reader.messages([topic.name]):
-        message = record.message
+    for record, message in reader.decoded([topic.name]):
         header = getattr(message, "header", None)
         t_ns = record.log_ns if header is None else stamp_ns(header)
         try:

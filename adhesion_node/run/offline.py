@@ -22,7 +22,7 @@ from .reader import Reader
 from .score import Truth, mean_relative_error_percent
 
 Recorded = tuple[str, Any, int]
-"""Our name of a message's topic, the message, its log time in ns."""
+"""Our name of a message's topic, the message or why it is refused, its log time in ns."""
 
 Output = TypeVar("Output")
 
@@ -77,7 +77,9 @@ def feed(
     reader = Reader(inputs, line)
     topics = {topic.name: topic for topic in reader.inputs}
     for name, message, _ in recorded:
-        if name not in topics:
+        if isinstance(message, Rejected):
+            pipeline.refuse(name, message.reason)
+        if isinstance(message, Rejected) or name not in topics:
             continue
         try:
             sample = reader.read(topics[name], message)
@@ -92,12 +94,16 @@ def feed(
 def _noting(truth: Truth, recorded: Iterable[Recorded]) -> Iterator[Recorded]:
     """Pass the messages on, and note what the simulator knew."""
     for name, message, log_ns in recorded:
-        if name == TRUTH_MU.name:
-            truth.mu[log_ns] = TRUTH_MU.read(message)
-        elif name == TRUTH_STATE.name:
-            state = TRUTH_STATE.read(message)
-            truth.speed_mps[state.t_ns] = state.speed_mps
-        yield name, message, log_ns
+        try:
+            if name == TRUTH_MU.name and not isinstance(message, Rejected):
+                truth.mu[log_ns] = TRUTH_MU.read(message)
+            elif name == TRUTH_STATE.name and not isinstance(message, Rejected):
+                state = TRUTH_STATE.read(message)
+                truth.speed_mps[state.t_ns] = state.speed_mps
+        except Rejected as refusal:
+            yield name, refusal, log_ns
+        else:
+            yield name, message, log_ns
 
 
 def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, Any]:
@@ -123,6 +129,10 @@ def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, A
 
 
 def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[Recorded]:
-    """Yield the recorded messages of `selection` under our names."""
+    """Yield the recorded messages of `selection` under our names; one that does not decode as refused."""
     for record in reader.messages(selection):
-        yield selection[record.topic], record.message, record.log_ns
+        try:
+            message = record.message
+        except Rejected as refusal:
+            message = refusal
+        yield selection[record.topic], message, record.log_ns

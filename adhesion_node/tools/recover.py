@@ -4,6 +4,7 @@
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,36 +18,45 @@ def main(args: Sequence[str] | None = None) -> int:
     example = "recover broken_run --output whole_run"
     parser = argparse.ArgumentParser("recover", parents=[json_option()], **help_texts(__doc__, example))
     parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory or an .mcap file")
+    text = "leave out messages that do not decode as what they say they are"
+    parser.add_argument("--drop-undecodable", action="store_true", help=text)
     parser.add_argument("--output", metavar="DIR", required=True, help="the new recording, a new directory")
     return run_tool(parser, _work, args)
 
 
-def recover(source: Path, output: Path) -> dict[str, Any]:
+def recover(source: Path, output: Path, drop_undecodable: bool = False) -> dict[str, Any]:
     """Copy every readable message, unchanged and in the order of log time, into a new recording.
 
-    Returns the summary: messages by topic, lost ones as far as the metadata tells, and a sentence for each loss.
+    With `drop_undecodable` a message whose bytes do not fit its type is left out; one of an unknown type stays.
+
+    Returns the summary: messages by topic, those left out, lost ones as far as the metadata tells, and a sentence for
+    each loss.
     Raises ValueError, and leaves nothing behind, when the source is unreadable or the output exists.
     """
     with BagReader(source) as reader:
-        writer = BagWriter(output)
+        writer, dropped = BagWriter(output), Counter[str]()
         try:
             for name, info in reader.infos.items():
                 writer.add_topic(name, info.type, latched=info.latched, known_as=info.definition)
             for record in progress(reader.messages(), "messages", sum(reader.counts.values())):
-                writer.write(record.topic, record.type, record.cdr, record.log_ns)
+                if drop_undecodable and not record.is_whole:
+                    dropped[record.topic] += 1
+                else:
+                    writer.write(record.topic, record.type, record.cdr, record.log_ns)
             writer.close()
         except BaseException:
             writer.discard()
             raise
         said = {"complete": reader.complete, "damage": list(reader.damage)}
-        return {**said, "messages": writer.counts, "lost": reader.lost}
+        return {**said, "messages": writer.counts, "undecodable": dict(dropped), "lost": reader.lost}
 
 
 def _work(options: argparse.Namespace) -> int:
-    summary = recover(Path(options.bag), Path(options.output))
+    summary = recover(Path(options.bag), Path(options.output), options.drop_undecodable)
     for loss in summary["damage"]:
         print(loss, file=sys.stderr)
     lines = [f"{sum(summary['messages'].values())} messages written to {options.output}"]
     lines += [f"{count} {name}" for name, count in summary["messages"].items()]
+    lines += [f"{count} {name} left out, they do not decode" for name, count in summary["undecodable"].items()]
     report(options.json, summary, "\n".join(lines))
     return DONE

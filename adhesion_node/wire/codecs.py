@@ -153,6 +153,7 @@ class Reason(Enum):
     NO_AXLE = "give one velocity, rad/s, for every driven axle in name"
     IMPLAUSIBLE_WHEEL_SPEED = f"velocity is in rad/s, not rpm, within +-{MAX_WHEEL_RADPS:g}"
     IMPLAUSIBLE_FORCE = f"force.x is in N, within +-{MAX_FORCE_N:g}"
+    UNDECODABLE = "leave it out of the recording, as `recover --drop-undecodable` does"
     DISABLED = "call ~/set_enabled with true to go on"
     BAD_CURVE = (
         f"give one joint '{TRAIN}', at least two points, each with one position, velocity and acceleration; "

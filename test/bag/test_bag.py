@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import cdrs
+import messages
 import numpy as np
 import pytest
 from mcap.reader import make_reader
@@ -21,7 +22,7 @@ from rosbags.rosbag2 import Reader
 
 from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize, typestore
 from adhesion_node.bag.writer import file_name
-from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, RECORDED
+from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, RECORDED, WHEEL_SPEED
 
 
 @pytest.fixture(scope="module")
@@ -87,6 +88,17 @@ def test_ros_decodes_our_serialisation() -> None:
         message = filled(topic.type, itertools.count(number))
         ours = serialize(deserialize(serialize_message(message), topic.type), topic.type)
         assert plain(deserialize_message(ours, ros_class(topic.type))) == plain(message), topic.name
+
+
+@pytest.mark.parametrize("axles", [1, 3, 12])
+def test_bytes_behind_a_message_mean_nothing(axles: int) -> None:
+    """As rclpy itself leaves them: it takes the most that the padding of names and numbers may come to."""
+    message = messages.wheel_speed(7, [float(axle) for axle in range(axles)])
+    written = bytes(serialize_message(message))
+    exact = serialize(deserialize(written, WHEEL_SPEED.type), WHEEL_SPEED.type)
+    assert len(written) > len(exact) + 3
+    for tail in (b"", b"\0", b"\xff" * 100):
+        assert plain(deserialize(exact + tail, WHEEL_SPEED.type)) == plain(message)
 
 
 def test_serialising_again_clears_what_stands_in_the_padding() -> None:

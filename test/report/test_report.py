@@ -17,7 +17,7 @@ from std_msgs.msg import Float64
 from test_offline import samples, write_run
 from test_picture import FREE, START_NS, TRUTH, S, read, record, rows
 
-from adhesion_node.bag import BagWriter
+from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core import Config
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
@@ -104,6 +104,28 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     last = run["moments"][-1]
     assert last["safe"]["x"][0] == last["nominal"]["x"][0] == pytest.approx(last["fixed"]["x"][0], abs=0.1)
     assert last["safe"]["y"][-1] == 0.0
+
+
+@pytest.mark.parametrize("results", [True, False])
+def test_messages_that_do_not_decode_are_left_out_and_told(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], results: bool
+) -> None:
+    if results:
+        record(tmp_path / "whole")
+    else:
+        write_run(tmp_path / "whole", samples(16.0, 24.0))
+    spoilt: set[str] = set()
+    with BagReader(tmp_path / "whole") as reader, BagWriter(tmp_path / "bag") as writer:
+        for one in reader.messages():
+            last = one.topic in spoilt or one.log_ns < START_NS + 5 * S
+            writer.write(one.topic, one.type, one.cdr if last else b"\0\1\0\0\xff", one.log_ns)
+            spoilt |= set() if last else {one.topic}
+    result, _ = make(tmp_path, str(tmp_path / "bag"), *QUICK)
+    assert result["runs"][0]["source"] == "as recorded" if results else "estimated from the recorded sensors"
+    told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("report: ")]
+    assert len(spoilt) > 3
+    assert set(told) <= {f"report: {topic}: 1 messages do not decode and are left out" for topic in spoilt}
+    assert len(told) >= 3
 
 
 def test_results_are_estimated_anew_on_demand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -5,14 +5,12 @@
 from __future__ import annotations
 
 import json
-from array import array
 from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import cdrs
 import messages
-import numpy as np
 import pytest
 from conftest import SpinUntil
 from messages import traction_force, wheel_speed
@@ -20,8 +18,9 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.serialization import serialize_message
 
-from adhesion_node.bag import BagWriter, serialize, typestore
+from adhesion_node.bag import BagWriter
 from adhesion_node.core.creep.config import Peak
 from adhesion_node.nodes import replay
 from adhesion_node.nodes.creep_estimator import CreepEstimator
@@ -47,21 +46,10 @@ def recorded(count: int = SAMPLES) -> list[tuple[topics.Topic, int, Any]]:
     return [*stream, (topics.TRACTION_FORCE, late, traction_force(late, 1e9)), (*stream[-1][:1], late, stream[-1][2])]
 
 
-def rebuilt(value: Any) -> Any:
-    """A message of rclpy in the types of rosbags: rclpy's own buffers may end in bytes that belong to nothing."""
-    if isinstance(value, array):
-        return np.array(value)
-    if not hasattr(value, "get_fields_and_field_types"):
-        return value
-    package = type(value).__module__.split(".")[0]
-    parts = {name: rebuilt(getattr(value, name)) for name in value.get_fields_and_field_types()}
-    return typestore().types[f"{package}/msg/{type(value).__name__}"](**parts)
-
-
 def write(folder: Path, stream: list[tuple[topics.Topic, int, Any]], *, position: bool = False) -> Path:
     with BagWriter(folder) as writer:
         for topic, t_ns, message in stream:
-            writer.write(f"/{topic.name}", topic.type, serialize(rebuilt(message), topic.type), t_ns)
+            writer.write(f"/{topic.name}", topic.type, bytes(serialize_message(message)), t_ns)
             if position and topic == topics.WHEEL_SPEED:
                 place = cdrs.position(t_ns, 8e-9 * t_ns, 0.25)
                 writer.write(f"/{topics.POSITION.name}", topics.POSITION.type, place, t_ns)

@@ -16,6 +16,7 @@ from rosbags.rosbag2 import Reader
 from test_recording_survives import file_size_limit
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
+from adhesion_node.bag.types import Definition
 from adhesion_node.bag.writer import file_name
 from adhesion_node.tools import recover
 from adhesion_node.wire.topics import BRAKING_CURVE, POSITION
@@ -64,6 +65,30 @@ def test_recovering_twice_changes_nothing(tmp_path: Path) -> None:
     summary = recover.recover(tmp_path / "one", tmp_path / "two")
     assert summary["complete"]
     assert (tmp_path / "one" / file_name(0)).read_bytes() == (tmp_path / "two" / file_name(0)).read_bytes()
+
+
+def test_what_does_not_decode_is_kept_or_left_out_on_demand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    good = [(POSITION, cdrs.position(step * S, float(step), 0.25)) for step in range(10)]
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.write("/curve", BRAKING_CURVE.type, b"\0\1\0\0", 0)
+        for step, (topic, cdr) in enumerate(good):
+            writer.write("/position", topic.type, cdr[:40] if step == 4 else cdr + bytes(8 * (step == 5)), step * S)
+        writer.add_topic("/bar", "foo_msgs/msg/Bar", known_as=Definition("ros2msg", "int32 baz"))
+        writer.write("/bar", "foo_msgs/msg/Bar", b"\0\1", 3)
+    kept = recover.recover(tmp_path / "bag", tmp_path / "kept")
+    assert (kept["messages"], kept["undecodable"]) == ({"/curve": 1, "/position": 10, "/bar": 1}, {})
+    arguments = [str(tmp_path / "bag"), "--output", str(tmp_path / "whole"), "--drop-undecodable"]
+    assert recover.main(arguments) == 0
+    assert "1 /position left out, they do not decode" in capsys.readouterr().out
+    with BagReader(tmp_path / "whole") as reader:
+        records = list(reader.messages())
+        assert [record.cdr for record in records if record.topic == "/position"][:6] == [
+            *(cdr for _, cdr in good[:4]),
+            good[5][1] + bytes(8),
+            good[6][1],
+        ]
+        assert reader.counts == {"/position": 9, "/bar": 1}
+        assert reader.complete
 
 
 def test_types_of_others_are_kept(tmp_path: Path) -> None:
