@@ -18,6 +18,10 @@ from .journey import GRAVITY, Array
 from .train import Train
 
 
+STICKING_MPS = 1e-3
+"""A train this slow stands: its wheels stick to the rail, also on a grade."""
+
+
 class Motion(NamedTuple):
     """Where R trains are: (R, 1), and how fast the rims of their wheels turn: (R, A)."""
 
@@ -44,8 +48,8 @@ def step(
     change = -step_s * (free.sum(axis=1, keepdims=True) + running_n) / mass
     force = free + stiff * change
     turned = np.where(locked, 0.0, rim + step_s * (force - brake_n) / train.wheel_kg)
-    stops = speed + change <= 0.0
-    part = np.where(speed <= 0.0, 0.0, np.where(stops, speed / np.maximum(-change, 1e-300), 1.0))
+    stops = speed + change <= STICKING_MPS
+    part = np.where(speed <= 0.0, 0.0, np.where(stops, np.minimum(speed / np.maximum(-change, 1e-300), 1.0), 1.0))
     after = np.where(stops, 0.0, speed + change)
     position = position + 0.5 * (speed + after) * part * step_s
     rim = np.where(stops, 0.0, np.maximum(turned, 0.0))
