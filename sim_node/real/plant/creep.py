@@ -21,6 +21,9 @@ KALKER_SLOPE = 120.0
 CREEPING_MPS = 0.2
 """Below this speed of the train the creep counts against this one: a quotient of two zeros is none."""
 
+SLIDING = 0.02
+"""A group slides beyond the peak of its curve, at the latest from this creep on; one that rolls has a tenth of it."""
+
 CONDITIONS = np.array([0.05, 0.08, 0.15, 0.25])
 K_A, K_S = np.array([0.3, 0.3, 0.3, 1.0]), np.array([0.1, 0.1, 0.1, 0.4])
 FALL_A, FALL_B = np.array([0.85, 0.5, 0.5, 0.4]), np.array([0.10, 0.15, 0.15, 0.60])

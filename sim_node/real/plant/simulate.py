@@ -11,15 +11,13 @@ from scipy.signal import cont2discrete, lfilter
 from . import creep, motion, protection, train, way
 from .journey import GRAVITY, PERIOD_S, Array, Journey
 from .scenarios import Scenario
+from .way import Ground
 
 STEP_S = 0.005
 STANDING_PERIODS = round(4.0 / PERIOD_S)
 """The run ends so long after the stop."""
 
 LONGEST_S = 900.0
-SLIDING_CREEP = 0.02
-"""A group slides beyond the peak of its curve, at the latest from this creep on; one that rolls has a tenth of it."""
-
 PITCH_RADPS, PITCH_DAMPING = 2.0 * np.pi * 0.9, 0.3
 """Own frequency of a body on its secondary springs."""
 
@@ -53,38 +51,10 @@ def demanded_pa(scenario: Scenario, time_s: Array | float) -> Array:
     return np.asarray(shares[np.searchsorted(starts, time_s, side="right") - 1] * scenario.nominal.full_pa)
 
 
-class _Rails:
-    """Rails and grades of R runs on one grid."""
-
-    def __init__(self, scenario: Scenario, ways: list[way.Way]) -> None:
-        self._start, self._count = ways[0].start_m, ways[0].grade.size
-        self._contact = np.concatenate([one.contact for one in ways])
-        self._grade = np.concatenate([one.grade for one in ways])
-        self._first = (np.arange(len(ways)) * self._count)[:, None]
-        self._offsets = scenario.nominal.offsets()
-        self._cleaned = scenario.rail.cleaned(scenario.nominal.groups)
-
-    def contact(self, position: Array) -> creep.Contact:
-        """Under the groups of trains whose fronts are at (R, 1)."""
-        low, share = self._at(position - self._offsets)
-        values = self._contact[low] + share[..., None] * (self._contact[low + 1] - self._contact[low])
-        mu0, *shape = np.moveaxis(values, -1, 0)
-        return creep.Contact(mu0 * self._cleaned, *shape)
-
-    def grade(self, position: Array) -> Array:
-        low, share = self._at(position)
-        return np.asarray(self._grade[low] + share * (self._grade[low + 1] - self._grade[low]))
-
-    def _at(self, place: Array) -> tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], Array]:
-        cells = (place - self._start) / way.CELL_M
-        low = np.minimum(cells.astype(np.intp), self._count - 2)
-        return low + self._first, cells - low
-
-
 def _run(scenario: Scenario, trains: train.Train, ways: list[way.Way], substeps: int) -> _Log:
     """Return the samples of all runs, stacked along a first axis of time."""
     nominal, dt, runs = scenario.nominal, PERIOD_S / substeps, len(ways)
-    rails, cylinders = _Rails(scenario, ways), protection.Cylinders(nominal, trains, dt)
+    ground, cylinders = Ground(ways, scenario.rail, scenario.nominal), protection.Cylinders(nominal, trains, dt)
     delays = nominal.offsets() / nominal.propagation_mps
     weight = trains.mass_kg * GRAVITY
     still, rolling = np.zeros((runs, 1)), np.full((runs, nominal.groups), scenario.speed_mps)
@@ -96,7 +66,7 @@ def _run(scenario: Scenario, trains: train.Train, ways: list[way.Way], substeps:
         time = (len(samples) - 1) * PERIOD_S
         if time > LONGEST_S or now.position_m.max() > scenario.way_m - 1.0:
             raise ValueError(f"scenario {scenario.name}: no stop within {scenario.way_m:g} m and {LONGEST_S:g} s")
-        rail, hill = rails.contact(now.position_m), weight * rails.grade(now.position_m)
+        rail, hill = ground.contact(now.position_m), weight * ground.grade(now.position_m)
         if nominal.slide_protection:
             control, valves = protection.command(control, now.rim_mps)
             told = [valves, *told[:-1]]
@@ -116,12 +86,12 @@ def _run(scenario: Scenario, trains: train.Train, ways: list[way.Way], substeps:
 
 def _journey(scenario: Scenario, seed: int, trains: train.Train, drawn: way.Way, logs: _Log, run: int) -> Journey:
     """Cut one run out of the samples, and add what follows from it."""
-    rails = _Rails(scenario, [drawn])
+    ground = Ground([drawn], scenario.rail, scenario.nominal)
     stop = int(np.argmax(logs.speed[:, run, 0] <= 0.0)) + STANDING_PERIODS
     position, speed, used = (values[: stop + 1, run] for values in (logs.position, logs.speed, logs.used))
     rim, cylinder = logs.rim[: stop + 1, run], logs.pressure[: stop + 1, run]
-    peak, best = creep.peak(speed, rails.contact(position))
-    beyond = speed - rim > np.minimum(best, SLIDING_CREEP) * np.maximum(speed, creep.CREEPING_MPS)
+    peak, best = creep.peak(speed, ground.contact(position))
+    beyond = speed - rim > np.minimum(best, creep.SLIDING) * np.maximum(speed, creep.CREEPING_MPS)
     time = np.asarray(np.arange(stop + 1) * PERIOD_S, dtype=np.float64)
     radius = trains.radius_m[run]
     return Journey(
@@ -130,7 +100,7 @@ def _journey(scenario: Scenario, seed: int, trains: train.Train, drawn: way.Way,
         position_m=position[:, 0],
         speed_mps=speed[:, 0],
         acceleration_mps2=np.diff(speed[:, 0], prepend=speed[0, 0]) / PERIOD_S,
-        grade=rails.grade(position)[:, 0],
+        grade=ground.grade(position)[:, 0],
         used=used[:, 0],
         available=peak.mean(axis=1),
         sliding=beyond.mean(axis=1),

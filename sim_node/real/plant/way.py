@@ -2,15 +2,17 @@
 
 """The way: mu0 of the rail and the grade, drawn along the track for one run."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from .creep import contact
+from .creep import Contact, contact
 from .journey import Array
+from .train import Nominal
 
 CELL_M = 1.0
 """Spacing of the places at which the way is drawn; between them it is straight."""
@@ -65,6 +67,35 @@ def draw(rail: Rail, grade: Grade, train_m: float, way_m: float, rng: np.random.
     height = np.concatenate([[0.0], np.cumsum(grade(place, rng)[:-1]) * CELL_M])
     mean = (height - np.interp(place - train_m, place, height)) / train_m
     return Way(float(start), np.stack(contact(mu0), axis=-1), mean)
+
+
+class Ground:
+    """The ways of R runs under the groups of their trains; places between the cells are interpolated."""
+
+    def __init__(self, ways: Sequence[Way], rail: Rail, nominal: Nominal) -> None:
+        self._start, self._count = ways[0].start_m, ways[0].grade.size
+        self._contact = np.concatenate([one.contact for one in ways])
+        self._grade = np.concatenate([one.grade for one in ways])
+        self._first = (np.arange(len(ways)) * self._count)[:, None]
+        self._offsets, self._cleaned = nominal.offsets(), rail.cleaned(nominal.groups)
+
+    def contact(self, front_m: Array) -> Contact:
+        """Return what the groups meet, (R, A), of trains whose fronts are at (R, 1)."""
+        low, share = self._at(front_m - self._offsets)
+        values = self._contact[low] + share[..., None] * (self._contact[low + 1] - self._contact[low])
+        mu0, *shape = np.moveaxis(values, -1, 0)
+        return Contact(mu0 * self._cleaned, *shape)
+
+    def grade(self, front_m: Array) -> Array:
+        """Return the mean grade under the trains, (R, 1)."""
+        low, share = self._at(front_m)
+        return np.asarray(self._grade[low] + share * (self._grade[low + 1] - self._grade[low]))
+
+    def _at(self, place_m: Array) -> tuple[NDArray[np.intp], Array]:
+        """Cells before the places, and how far behind them these are, in cells."""
+        cells = (place_m - self._start) / CELL_M
+        low = np.minimum(cells.astype(np.intp), self._count - 2)
+        return low + self._first, cells - low
 
 
 def correlated(count: int, step: float, rng: np.random.Generator) -> Array:
