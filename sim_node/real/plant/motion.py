@@ -17,7 +17,6 @@ from . import creep
 from .journey import GRAVITY, Array
 from .train import Train
 
-
 STICKING_MPS = 1e-3
 """A train this slow stands: its wheels stick to the rail, also on a grade."""
 

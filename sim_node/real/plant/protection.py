@@ -22,7 +22,7 @@ from .train import Nominal, Train
 DEAD_S = 0.07
 """From the command to the moving valve."""
 
-RELEASE_S = 0.3
+RELEASE_S = 1.0
 """Time constant of a brake that is released by the driver."""
 
 FALL_MPS2 = 0.3, 1.8

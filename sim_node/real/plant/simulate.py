@@ -47,7 +47,7 @@ def simulate(scenario: Scenario, seeds: Sequence[int], step_s: float = STEP_S) -
 
 def demanded_pa(scenario: Scenario, time_s: Array | float) -> Array:
     """Return the gauge pressure that is asked for."""
-    starts, shares = np.array([(0.0, 0.0), *scenario.demands]).T
+    starts, shares = np.array([(-np.inf, 0.0), *scenario.demands]).T
     return np.asarray(shares[np.searchsorted(starts, time_s, side="right") - 1] * scenario.nominal.full_pa)
 
 

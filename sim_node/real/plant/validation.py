@@ -5,6 +5,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .creep import CREEPING_MPS, SLIDING
 from .journey import PERIOD_S, Array, Journey
@@ -51,7 +52,7 @@ def creep(journey: Journey) -> Array:
     return np.asarray((speed - journey.wheel_radps * journey.radius_m) / np.maximum(speed, CREEPING_MPS))
 
 
-def remembered(flags: Array, seconds: float = REMEMBERED_S) -> Array:
+def remembered(flags: NDArray[np.bool_], seconds: float = REMEMBERED_S) -> NDArray[np.bool_]:
     """Return where a flag was up at some time within the last seconds; along the first axis."""
     count = np.cumsum(flags, axis=0)
     periods = round(seconds / PERIOD_S)
