@@ -30,11 +30,11 @@ def select(
 
     `recorded` holds the types by name. Replayed are `names` (after remapping), or else the sensors and the truth,
     not recorded results. Our own topics come out under their relative names, so that namespaces apply. Raises
-    ValueError when a remapped or named topic is missing, has the wrong type, or when there is neither a position nor,
-    for the creep curve, a wheel speed.
+    ValueError when a remapped or named topic is missing, has the wrong type, or when there is neither a position nor
+    a speed nor, for the creep curve, a wheel speed.
     """
     renamed = _rename(recorded, remaps)
-    enough = (*topics.POSITIONS, topics.WHEEL_SPEED)
+    enough = (*topics.POSITIONS, topics.SPEED, topics.WHEEL_SPEED)
     has_any = any(same_name(target, topic.name) for target in renamed.values() for topic in enough)
     chosen = list(_OURS) if names is None else list(names)
     selection: dict[str, str] = {}

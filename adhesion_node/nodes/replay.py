@@ -9,7 +9,7 @@ from functools import partial
 
 from ..bag import BagReader, select_from
 from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
-from ..wire.topics import POSITIONS
+from ..wire.topics import POSITIONS, TRACTION_FORCE
 
 EXAMPLES = (
     "replay my_run --offline",
@@ -67,8 +67,9 @@ def _offline(options: argparse.Namespace) -> int:
 
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
-        places = {topic.name for topic in POSITIONS}
-        wanted = options.estimator or (ADHESION if places & set(selection.values()) else CREEP)
+        names = set(selection.values())
+        has_place = any(topic.name in names for topic in POSITIONS)
+        wanted = options.estimator or (ADHESION if has_place or TRACTION_FORCE.name not in names else CREEP)
         run = offline.run if wanted == ADHESION else creep_offline.run
         return run(options, reader, selection)
 
@@ -94,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     live("--wait-for-subscribers", metavar="N", type=int, default=1, help=awaited)
     straight = parser.add_argument_group("offline").add_argument
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
-    either = "the adhesion under the brake, or the creep curve (default: by whether there is a position)"
+    either = "the adhesion under the brake, or the creep curve (default: by whether there is a position or no force)"
     straight("--estimator", choices=(ADHESION, CREEP), help=either)
     setting_options(straight)
     return parser

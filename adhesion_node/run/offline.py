@@ -15,7 +15,7 @@ from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
 from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.settings import SEED, SETTINGS, given, setup_of
-from ..wire.topics import ADHESION_INPUTS, FIX, TRUTH_MU, TRUTH_STATE, Topic
+from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE, Topic
 from .engine import EstimatorPipeline
 from .pipeline import Pipeline
 from .reader import Reader
@@ -30,7 +30,7 @@ Output = TypeVar("Output")
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
     setup, truth = setup_of(parameters_of(options)), Truth()
-    anchors = [topic.name for topic in Reader(ADHESION_INPUTS, setup.line).anchors]
+    anchors = [topic.name for topic in (*Reader(ADHESION_INPUTS, setup.line).anchors, SPEED)]
     if not set(anchors) & set(selection.values()):
         fix = f"; a {FIX.name} needs track_line" if FIX.name in selection.values() else ""
         raise ValueError(
@@ -113,6 +113,7 @@ def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, A
     result: dict[str, Any] = {
         "measurements": pipeline.measurements,
         "accepted": pipeline.accepted,
+        "ticks": pipeline.ticks,
         "dropped": pipeline.dropped,
         "windows": pipeline.windows,
         "mu_final": last and last.mu,

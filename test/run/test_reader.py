@@ -23,7 +23,16 @@ from adhesion_node.run.reader import Reader
 from adhesion_node.run.score import Truth
 from adhesion_node.wire.codecs import Line, Rejected, plain
 from adhesion_node.wire.settings import setup_of
-from adhesion_node.wire.topics import ADHESION_INPUTS, BRAKE_PRESSURE, CREEP_INPUTS, FIX, ODOMETRY, POSITION, Topic
+from adhesion_node.wire.topics import (
+    ADHESION_INPUTS,
+    BRAKE_PRESSURE,
+    CREEP_INPUTS,
+    FIX,
+    ODOMETRY,
+    POSITION,
+    SPEED,
+    Topic,
+)
 
 GEOD = Geod(ellps="WGS84")
 STEP_M = 50.0
@@ -128,6 +137,21 @@ def test_the_creep_estimator_needs_its_wheels() -> None:
     assert Reader(CREEP_INPUTS, Line()).anchors == CREEP_INPUTS[-1:]
 
 
+def test_the_offline_replay_runs_by_a_speed_alone(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        for truth, reading in samples():
+            t_ns = START_NS + reading.t_ns
+            for topic, values in ((BRAKE_PRESSURE, (reading.pressure_pa,)), (SPEED, (truth.speed_mps,))):
+                writer.write(f"/{topic.name}", topic.type, encode(topic, t_ns, values, 0.01), t_ns)
+    by_doppler = ("--set", "speed_source=doppler", "--set", "iterations=5")
+    assert replay.main([str(tmp_path / "bag"), "--offline", "--json", "-", *by_doppler]) == 0
+    result = json.loads(capfd.readouterr().out)
+    assert (result["measurements"], result["accepted"], result["dropped"]) == (0, 0, {})
+    assert result["ticks"] == len(samples()) * 0.1 / 0.5 - 1
+    assert result["windows"] > 10
+    assert result["mu_final"] > 0.0
+
+
 def write(path: Path, recorded: Iterator[Recorded], way: Sequence[tuple[float, float]]) -> None:
     with BagWriter(path) as writer:
         for index, (name, message, t_ns) in enumerate(recorded):
@@ -149,7 +173,7 @@ def test_the_offline_replay_reads_fixes(
     assert Counter(result["dropped"]) == Counter()
     assert result["digest"] == run(messages(way, FIX), track_line=track_line).digest
     assert replay.main([str(tmp_path / "bag"), "--offline"]) == 2
-    assert "holds no position or odometry, without which nothing is identified; a fix needs track_line" in (
+    assert "holds no position or odometry or speed, without which nothing is identified; a fix needs track_line" in (
         capfd.readouterr().err
     )
 
