@@ -5,12 +5,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from sim_node.real import known
-from sim_node.real.drive import Drive, drive
+from sim_node.real.drive import Drive, sense
+from sim_node.real.plant.journey import Journey
 from sim_node.real.plant.scenarios import SCENARIOS
+from sim_node.real.plant.simulate import simulate
 from sim_node.real.sensors.fitted import FITTED
+from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
 from . import point_mass
@@ -65,7 +69,13 @@ class Case(NamedTuple):
         """Drive every seed."""
         if self.scenario == point_mass.NAME:
             return point_mass.drives(seeds)
-        return drive(SCENARIOS[self.scenario], FITTED[self.fitted], tuple(seeds))
+        nominal, journeys = SCENARIOS[self.scenario].nominal, _journeys(self.scenario, tuple(seeds))
+        return tuple(Drive(journey, sense(Ride(journey, nominal), FITTED[self.fitted])) for journey in journeys)
+
+
+@lru_cache(maxsize=6)  # the cases of a scenario follow each other and differ in their sensors alone
+def _journeys(scenario: str, seeds: tuple[int, ...]) -> tuple[Journey, ...]:
+    return simulate(SCENARIOS[scenario], seeds)
 
 
 CASES = tuple(

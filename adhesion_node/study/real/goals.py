@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from .cases import AIDED, UNSOUND, Case
+from .information import soonest_s
+from .score import FOUND_SHARE
 
 
 class Goal(NamedTuple):
@@ -40,8 +42,9 @@ OF_ALL = (
 EXCESS = Goal("excess_percent", most=20.0)
 """Where the sensors are sound; where they are not, the curve of low adhesion is the right answer."""
 
-FOUND = Goal("found_s", most=1.0)
-"""On patches, with wheels, Doppler or an accelerometer."""
+FOUND_S, OF_SOONEST, PATCH_USED = 1.0, 1.2, 0.04
+"""Patches are found within the first with wheels, Doppler or an accelerometer; by positions alone within so many times
+what their information allows on a patch where so much adhesion is used."""
 
 ERRORS = {"patches": 6.0, "leaves": 4.0}
 """Greatest error, %, by the rail; on other rails by the sensors."""
@@ -54,8 +57,20 @@ def goals(case: Case) -> tuple[Goal, ...]:
     aided = case.fitted in AIDED
     error = Goal("error_percent", most=ERRORS.get(case.rail, ERROR_AIDED if aided else ERROR_OF_POSITIONS))
     excess = () if case.fitted in UNSOUND else (EXCESS,)
-    found = (FOUND,) if case.rail == "patches" and (aided or "wheels" in case.fitted) else ()
-    return error, *OF_ALL, *excess, *found
+    return error, *OF_ALL, *excess, *_found(case)
+
+
+def soonest(case: Case) -> float | None:
+    """When a patch could be found by a case's sensors, s; None: no patches, or too late to matter."""
+    return soonest_s(case.fitted, PATCH_USED, FOUND_SHARE) if case.rail == "patches" else None
+
+
+def _found(case: Case) -> tuple[Goal, ...]:
+    bound_s = soonest(case)
+    if bound_s is None:
+        return ()
+    at_once = case.fitted in AIDED or "wheels" in case.fitted
+    return (Goal("found_s", most=FOUND_S if at_once else OF_SOONEST * bound_s),)
 
 
 def missed(case: Case, row: Mapping[str, Any]) -> dict[str, float]:

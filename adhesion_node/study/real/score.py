@@ -45,7 +45,7 @@ TOLERANCE_M = 5.0
 LONG_WAY_M = 100.0
 UNSEEN_S = 2.0
 NEAR_S = 5.0
-FOUND = 0.2
+FOUND_SHARE = 0.2
 MANY_STD = 3.0
 
 
@@ -197,7 +197,7 @@ def _found_after(found: Found) -> list[float]:
             continue
         until_s = min(starts[index + 1], run["slow_s"])
         own = rows[(rows["t_s"] >= fall["start_s"]) & (rows["t_s"] < until_s)]
-        off = (_off(own, "mu") > FOUND) | own["withheld"]
+        off = (_off(own, "mu") > FOUND_SHARE) | own["withheld"]
         if not off.any():
             times.append(0.0)
             continue

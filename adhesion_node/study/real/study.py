@@ -17,7 +17,7 @@ from typing import Any
 from ..trial.running import add_running_options, running
 from ..trial.text import Column, lines
 from .cases import Case, chosen
-from .goals import missed
+from .goals import missed, soonest
 from .score import score
 from .trials import found
 
@@ -40,6 +40,7 @@ SHOWN = (
     ("3 std %", 7, ".1f", "speed_beyond_3_std", 100.0),
     ("silence", 7, ".1f", "silence_s", 1.0),
     ("found s", 7, ".1f", "found_s", 1.0),
+    ("soonest", 7, ".1f", "found_soonest_s", 1.0),
     ("withheld %", 10, ".1f", "withheld", 100.0),
 )
 """Head, width, format, figure and factor of every column."""
@@ -92,13 +93,8 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
 
 def row(case: Case, scored: Mapping[str, Any]) -> dict[str, Any]:
     """The row of a case: its figures, and by how much they miss the goals."""
-    return {
-        "case": case.name,
-        "scenario": case.scenario,
-        "fitted": case.fitted,
-        **scored,
-        "missed": missed(case, scored),
-    }
+    named = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
+    return {**named, **scored, "found_soonest_s": soonest(case), "missed": missed(case, scored)}
 
 
 def _missed_lines(table: Iterable[Mapping[str, Any]]) -> Iterator[str]:

@@ -11,6 +11,7 @@ import pytest
 
 from adhesion_node.study.real.cases import CASES
 from adhesion_node.study.real.goals import goals, missed
+from adhesion_node.study.real.information import soonest_s
 from adhesion_node.study.real.score import FIGURES, of_run, score
 from adhesion_node.study.real.trials import BORDER, ROW, RUN, Found
 from adhesion_node.study.trial.trials import DROP
@@ -187,8 +188,11 @@ def test_every_case_has_its_goals() -> None:
         by_name[name]["error_percent"].most for name in ("wet gnss", "wet gnss_doppler", "leaves gnss", "patches gnss")
     ]
     assert errors == [4.0, 2.0, 4.0, 6.0]
-    assert "found_s" in by_name["patches gnss_wheels"]
-    assert "found_s" not in by_name["patches gnss"]
+    assert by_name["patches gnss_wheels"]["found_s"].most == 1.0
+    bound_s = soonest_s("gnss", 0.04, 0.2)
+    assert bound_s is not None
+    assert by_name["patches gnss"]["found_s"].most == pytest.approx(1.2 * bound_s)
+    assert "found_s" not in by_name["wet gnss_wheels"]
     assert "excess_percent" not in by_name["wet tacho"]
 
 
