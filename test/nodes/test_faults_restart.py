@@ -22,7 +22,9 @@ from test_two_processes import PATIENCE_S, QUICK, Operator, Program
 
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
+from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import NOMINAL
 from sim_node.train.sensors import Tick
 
 
@@ -61,7 +63,8 @@ def test_a_killed_estimator_is_replaced_by_one_that_inherits_nothing(
     operator, driver = Operator(context), Node("driver", context=context)
     executor.add_node(operator)
     executor.add_node(driver)
-    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in topics.ADHESION_INPUTS}
+    inputs = Reader(topics.ADHESION_INPUTS, NOMINAL).inputs
+    outputs = {topic: qos.advertise(driver, topic, qos.SENSOR_PUBLISHER) for topic in inputs}
 
     def run_one(run: list[Tick]) -> Program:
         operator.heard.clear()

@@ -25,8 +25,9 @@ from ruamel.yaml import YAML
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record
 from adhesion_node.bag.writer import file_name
 from adhesion_node.core.intake.samples import MAX_POSITION_M
-from adhesion_node.tools import csv_rows, import_csv, recover
-from adhesion_node.tools.csv_rows import Format, Refusal, Row
+from adhesion_node.tools import csv_cells, csv_format, csv_rows, import_csv, recover
+from adhesion_node.tools.csv_format import Format
+from adhesion_node.tools.csv_rows import Refusal, Row
 from adhesion_node.wire import parameter_file
 from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
@@ -169,15 +170,23 @@ CELLS = st.sampled_from(
 ) | st.text(max_size=8)
 FORMATS = st.builds(
     Format,
-    named=st.dictionaries(st.sampled_from(csv_rows.REQUIRED + csv_rows.OPTIONAL), st.sampled_from("abt"), max_size=3),
+    named=st.dictionaries(st.sampled_from(("time", *csv_rows.OPTIONAL)), st.sampled_from("abt"), max_size=3),
     delimiter=st.sampled_from([",", ";", "\t", " "]),
-    time_unit=st.sampled_from(list(csv_rows.TIME_UNITS)),
-    position_unit=st.sampled_from(list(csv_rows.POSITION_UNITS)),
-    pressure_unit=st.sampled_from(list(csv_rows.PRESSURE_UNITS)),
+    time_unit=st.sampled_from(list(csv_cells.TIME_UNITS)),
+    position_unit=st.sampled_from(list(csv_format.POSITION_UNITS)),
+    pressure_unit=st.sampled_from(list(csv_format.PRESSURE_UNITS)),
     pressure_is_gauge=st.booleans(),
-    speed_unit=st.sampled_from(list(csv_rows.SPEED_UNITS)),
+    speed_unit=st.sampled_from(list(csv_format.SPEED_UNITS)),
+    acceleration_unit=st.sampled_from(list(csv_format.ACCELERATION_UNITS)),
+    wheel_unit=st.sampled_from(csv_format.WHEEL_UNITS),
 )
-HEADERS = st.just("time,position,variance,brake_pressure,speed") | st.text(max_size=40)
+HEADERS = st.sampled_from(
+    [
+        "time,position,variance,brake_pressure,speed",
+        "time,lat,lon,height,variance",
+        "time,speed,speed_std,acceleration,wheel_speed_1,wheel_speed_2",
+    ]
+) | st.text(max_size=40)
 LINES = st.lists(st.lists(CELLS, max_size=6).map(",".join) | st.text(max_size=40), max_size=8)
 
 
@@ -220,11 +229,12 @@ def check_rows(rows: list[Row | Refusal]) -> None:
         if isinstance(row, Refusal):
             assert row.message.startswith("log:")
             continue
-        assert last_ns < row.t_ns < csv_rows.END_OF_STAMPS_NS
+        assert last_ns < row.t_ns < csv_cells.END_OF_STAMPS_NS
         last_ns = row.t_ns
-        assert abs(row.position_m) <= MAX_POSITION_M
-        assert all(value is None or math.isfinite(value) for value in row)
-        cdrs.position(row.t_ns, row.position_m, row.variance_m2 or 1.0)
+        assert all(math.isfinite(value) for value in row.values.values())
+        assert not any(map(math.isinf, row.axles_radps))
+        assert abs(row.values.get("position", 0.0)) <= MAX_POSITION_M
+        cdrs.position(row.t_ns, row.values.get("position", 0.0), row.values.get("variance", 1.0))
 
 
 NAMES = st.sampled_from([setting.name for setting in SETTINGS])

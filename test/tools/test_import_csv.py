@@ -13,7 +13,8 @@ import pytest
 
 from adhesion_node.bag import BagReader
 from adhesion_node.core.intake.samples import PositionSample
-from adhesion_node.tools import csv_rows, import_csv
+from adhesion_node.tools import import_csv
+from adhesion_node.tools.csv_format import Format
 from adhesion_node.wire.topics import POSITION, SPEED
 
 GOOD = """\
@@ -72,7 +73,7 @@ def test_a_good_log(importing: Import) -> None:
         (300_000_000, 26.4, 0.25),
     ]
     assert [m.fluid_pressure for m in importing.messages("brake_pressure")] == [101_325.0, 511_325.0]
-    assert [tuple(SPEED.read(m)) for m in importing.messages("speed")] == [(100_000_000, 80.0), (200_000_000, 79.9)]
+    assert [tuple(SPEED.read(m)) for m in importing.messages("speed")] == [(10**8, 80.0, None), (2 * 10**8, 79.9, None)]
 
 
 def test_order_and_log_times_are_those_of_a_live_run(importing: Import) -> None:
@@ -154,8 +155,8 @@ FAULTS = [
     ("2,1,inf,0,0", "not_a_number", "FILE:3: variance = 'inf': write a finite number"),
     ("2,1,1,x,0", "not_a_number", "FILE:3: brake_pressure = 'x': write a finite number"),
     ("2,1,1,0,-", "not_a_number", "FILE:3: speed = '-': write a finite number"),
-    (",1,1,0,0", "empty", "FILE:3: time = '': every row needs a time and a position"),
-    ("2,,1,0,0", "empty", "FILE:3: position = '': every row needs a time and a position"),
+    (",1,1,0,0", "empty", "FILE:3: time = '': every row needs a time and something measured"),
+    ("2,,1,,", "empty", "FILE:3: row = '2,,1,,': every row needs a time and something measured"),
     ("1,1,1,0,0", "time_not_rising", "FILE:3: time = '1': time must rise, the last good row has 1000000000 ns"),
     ("0.5,1,1,0,0", "time_not_rising", "FILE:3: time = '0.5': time must rise"),
     (
@@ -270,7 +271,7 @@ def test_memory_does_not_grow_with_the_log(tmp_path: Path) -> None:
         log = tmp_path / f"{rows}.csv"
         log.write_text("time,position\n" + "".join(f"{row},1.0\n" for row in range(rows)))
         tracemalloc.start()
-        import_csv.convert(log, tmp_path / f"bag{rows}", csv_rows.Format(named={}))
+        import_csv.convert(log, tmp_path / f"bag{rows}", Format(named={}))
         _, most = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         return most

@@ -20,8 +20,6 @@ from . import qos
 from .diagnostics import Finding
 from .silence import Silence
 
-BY_SPEED = "no position: the train is followed by its speed alone, wherever it is on the track"
-
 
 class Listener(Protocol):
     """What a node does with what comes in."""
@@ -85,11 +83,7 @@ class Intake:
         # What happened to the watched topic stands until that is heard again: it may be why it is silent.
         self._events = {name: text for name, text in self._events.items() if name in self._watched}
         if self._silence.for_s is not None:
-            by_speed = (
-                self._reader.source is None and self.heard[topics.SPEED] > 0 and topics.POSITION in self._reader.anchors
-            )
-            text = BY_SPEED if by_speed else self._silent(self._silence.for_s)
-            found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
+            found.append(Finding(Severity.STALE, self._silent(self._silence.for_s)))
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
         clock, name = self._node.get_clock(), topics.CLOCK.name
@@ -101,8 +95,7 @@ class Intake:
     @property
     def _watched(self) -> list[str]:
         """The full names of what must not fall silent: of the anchor, before that is known of all that may be it."""
-        source = self._reader.source
-        return [self._node.resolve_topic_name(one.name) for one in ((source,) if source else self._reader.anchors)]
+        return [self._node.resolve_topic_name(topic.name) for topic in self._reader.watched]
 
     def _silent(self, for_s: float) -> str:
         names = self._watched
@@ -119,7 +112,7 @@ class Intake:
     def _receiver(self, topic: Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             self.heard[topic] += 1
-            if topic in self._reader.anchors and self._reader.source in (None, topic):
+            if topic in self._reader.watched:
                 self._silence.heard()
                 self._events.pop(self._node.resolve_topic_name(topic.name), None)
             try:
