@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Tables of what the package offers to ROS, out of its declarations: parameters by node, topics, faults."""
+"""Tables of what the package declares: parameters by node, topics, a real train's scenarios and sensors, faults."""
 
 import ast
 from collections.abc import Iterable, Iterator, Sequence
@@ -13,6 +13,9 @@ from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.codecs import Reason
 from adhesion_node.wire.topics import TOPICS, Quality
 from sim_node.faults.plan import FAULTS, NONE
+from sim_node.real.plant.scenarios import KMH, SCENARIOS
+from sim_node.real.plant.way import LEVEL
+from sim_node.real.sensors.fitted import FITTED
 
 SOURCES = Path(adhesion_node.__file__).resolve().parent.parent
 
@@ -30,6 +33,10 @@ def parts() -> dict[str, str]:
         "refusals": table(("refused message", "what helps"), ((f"`{r.name}`", _cell(r.value)) for r in Reason)),
         "outcomes": table(("sample", "what becomes of it"), ((f"`{o.name}`", _cell(o.value)) for o in Outcome)),
         "house": table(("folder", "what is in it"), _house()),
+        "real trains": table(("scenario", "train", "from, km/h", "differs from what the estimator is told"), _real()),
+        "fitted": table(
+            ("`sensors`", "the train is fitted with"), ((f"`{name}`", one.description) for name, one in FITTED.items())
+        ),
         "faults": table(("`fault`", "what happens", "lasts, s", "share", "size"), _faults()),
     }
 
@@ -75,6 +82,16 @@ def _house() -> Iterator[tuple[str, str]]:
             folder = init.parent.relative_to(SOURCES)
             purpose = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
             yield f"`{folder.as_posix()}`", purpose.partition("\n")[0]
+
+
+def _real() -> Iterator[tuple[str, ...]]:
+    """Yield the scenarios of a real train beyond its usual scatter."""
+    for name, scenario in SCENARIOS.items():
+        forced = {"mass": scenario.scatter.mass, "pads": scenario.scatter.pads}
+        differs = [f"{what} {value:+.0%}" for what, value in forced.items() if value is not None]
+        differs += ["rotating mass 8 %"] if scenario.scatter.rotating is not None else []
+        differs += ["grade"] if scenario.grade is not LEVEL and not scenario.known_grade else []
+        yield f"`{name}`", scenario.nominal.name, f"{scenario.speed_mps / KMH:.0f}", ", ".join(differs)
 
 
 def _faults() -> Iterator[tuple[str, ...]]:

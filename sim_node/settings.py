@@ -9,6 +9,8 @@ from adhesion_node.core.setting import Setting, settings_of
 from adhesion_node.wire.topics import POSITION, WHEEL_SPEED, Topic
 
 from .faults.plan import Plan
+from .real.plant.scenarios import SCENARIOS as REAL
+from .real.sensors.fitted import FITTED
 from .slip import scenario as slip_scenario
 from .slip.plant import SlipNoise
 from .train import scenario
@@ -29,8 +31,17 @@ def _run(scenarios: Iterable[str], usual: str, rate_hz: float, awaited: Topic) -
     )
 
 
+SENSORS = Setting(
+    "sensors",
+    "gnss_wheels",
+    "What a real train is fitted with",
+    choices=tuple(FITTED),
+    group="real train",
+)
+
 SIMULATOR = (
-    *_run(scenario.SCENARIOS, "tunnel_entry", 10.0, POSITION),
+    *_run((*scenario.SCENARIOS, *REAL), "tunnel_entry", 10.0, POSITION),
+    SENSORS,
     *settings_of(SensorSettings, group="sensors"),
     *settings_of(Plan, group="fault"),
 )

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.physics.train import KMH, Train
-from .findings import distances
+from .findings import distances, true_way
 from .run import FIXED_MU, Run
 from .series import Series
 
@@ -59,6 +59,7 @@ def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
     )
     distance = (
         Line(worst, "fixed", Series(at, planned.fixed)),
+        Line("true", "truth", true_way(run, target_kmh * KMH)),
         Line("safe curve, by the lower bound", "bound", Series(at, planned.longest)),
         Line("nominal curve, by the identified μ", "identified", Series(at, planned.identified)),
     )

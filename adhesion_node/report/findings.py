@@ -11,6 +11,10 @@ from ..core import Config, Regime
 from ..core.physics.train import KMH, Array, Train
 from ..run.score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
 from .run import FIXED_MU, Run, distance_to_target
+from .series import NONE, Series
+
+BRAKED_PA, RELEASED_NS = 20e3, 3_000_000_000
+"""From this pressure on the brake works; it is released once it does not for so long, longer than a dump lasts."""
 
 AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
 """Findings at the first estimate that counts as identified: speed, adhesion, braking distances."""
@@ -50,6 +54,23 @@ def distances(run: Run, target_mps: float, train: Train) -> Distances:
         identified=distance_to_target(run, run.mu.at(times), target_mps, train, run.nominal),
         longest=distance_to_target(run, run.mu_lower.at(times), target_mps, train, run.safe),
     )
+
+
+def true_way(run: Run, target_mps: float) -> Series:
+    """Way, m, that the train truly went from each moment of its last braking until it had the target speed.
+
+    Empty where the recording holds no truth or the train did not get there.
+    """
+    slow = np.flatnonzero(run.true_speed.values <= target_mps)
+    if not slow.size:
+        return NONE
+    t_ns, place = run.true_position
+    braked_ns = run.pressure.t_ns[(run.pressure.values >= BRAKED_PA) & (run.pressure.t_ns < t_ns[slow[0]])]
+    if not braked_ns.size:
+        return NONE
+    releases = np.flatnonzero(np.diff(braked_ns) > RELEASED_NS)
+    during = (t_ns >= braked_ns[releases[-1] + 1 if releases.size else 0]) & (np.arange(t_ns.size) <= slow[0])
+    return Series(t_ns[during], place[slow[0]] - place[during])
 
 
 def first_identified(run: Run) -> int | None:

@@ -2,18 +2,24 @@
 
 """One picture of a recorded run: adhesion with its bound, speed, forces, braking distances and braking curves."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
 from ..core.physics.train import CRH3, KMH, Train
 from .charts import charts
-from .run import Run, bands
+from .run import Band, Run, bands
 
 SHADES = {"COASTING": "0.85", "BRAKE_LIMITED": "#d3e5f7", "ADHESION_LIMITED": "#fff1dc"}
+TRUE_SHADES = {"COASTING": "0.6", "BRAKE_LIMITED": "#5b9bd5", "ADHESION_LIMITED": "#e69f00"}
+STRIP = 0.05
+"""Part of a chart's height in which the truth stands."""
+
 BLACK, BLUE, ORANGE, GREY = "#000000", "#0b5fa5", "#c75b00", "0.45"
 
 STYLES: dict[str, dict[str, Any]] = {
@@ -28,8 +34,11 @@ CURVES = 8
 """Braking curves drawn, evenly spread over the run."""
 
 
-def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH3) -> None:
-    """Draw the run into a PNG or a PDF, as the file's ending says, readable in black and white."""
+def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH3, truth: Sequence[Band] = ()) -> None:
+    """Draw the run into a PNG or a PDF, as the file's ending says, readable in black and white.
+
+    Behind the lines stands what the estimator said that limits the motion, above it what truly did.
+    """
     figure = Figure(figsize=(11, 12), layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(title)
@@ -39,9 +48,10 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
     for axis, chart in zip(axes, charts(run, target_kmh, train), strict=True):
         for line in chart.lines:
             axis.plot(run.seconds(line.series.t_ns), line.series.values, label=line.label, **STYLES[line.kind])
-        for band in bands(run):
-            if band.regime in SHADES:
-                axis.axvspan(band.start_s, band.end_s, color=SHADES[band.regime], lw=0, zorder=0)
+        for known, shades, part in ((bands(run), SHADES, (0.0, 1.0)), (truth, TRUE_SHADES, (1.0 - STRIP, 1.0))):
+            for band in known:
+                if band.regime in shades:
+                    axis.axvspan(band.start_s, band.end_s, *part, color=shades[band.regime], lw=0, zorder=0)
         axis.sharex(axes[0])
         axis.set(xlabel="time, s", ylabel=chart.title, ylim=chart.range)
     _draw_curves(last, run)
@@ -49,8 +59,10 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
         axis.grid(alpha=0.3)
         axis.legend(loc="best", fontsize="small")
     names = [regime.replace("_", "-").lower() for regime in SHADES]
-    shades = [Patch(color=color) for color in SHADES.values()]
-    foot.legend(shades, names, loc="center", ncols=len(names), title="what limits the motion")
+    told, true = ([Patch(color=shades[regime]) for regime in SHADES] for shades in (SHADES, TRUE_SHADES))
+    patches = list(zip(told, true, strict=True)) if truth else told
+    meaning = "what limits the motion" + (": as the estimator said, and in truth (the strip above)" if truth else "")
+    foot.legend(patches, names, loc="center", ncols=len(names), title=meaning, handler_map={tuple: HandlerTuple(None)})
     figure.savefig(path, dpi=110)
 
 

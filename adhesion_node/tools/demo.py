@@ -15,40 +15,46 @@ from itertools import count, pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rclpy.executors import SingleThreadedExecutor
 
+from sim_node.real import known
+from sim_node.real.plant.scenarios import SCENARIOS as REAL
+from sim_node.real.sensors.fitted import FITTED
+from sim_node.settings import SENSORS
 from sim_node.train.scenario import SCENARIOS
 
 from ..bag import BagReader, select
 from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
 from ..command.signals import stop_on_signals
-from ..core import Config, Estimate
+from ..core import Estimate, Regime
 from ..core.physics.train import KMH
 from ..live.__main__ import address_options
 from ..live.node import Live
 from ..report.picture import draw
-from ..report.run import read_run
+from ..report.run import Band, Run, read_run
 from ..report.series import read_status
 from ..report.table import table
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.score import Truth
+from ..wire.settings import setup_of
 from ..wire.topics import ATP_STATUS
-from .line import Pace, executor_of_line, play
+from .line import Pace, Task, executor_of_line, play
 
 EXAMPLES = (
     "demo",
     "demo --live",
     "demo --scenario low_adhesion_patch --seed 3 --output my_demo",
+    "demo --scenario leaves --sensors full",
     "demo --json - > result.json",
 )
 
 SHOWN_EVERY_S = 5.0
 """Simulated time between two lines of progress."""
 
-
-SAMPLE_S = 0.1
-"""Time between two samples of the simulator."""
+TARGET_M, STOP_M = 8250.0, 9000.0
+"""The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
 
 POLL_S = 0.05
 """Longest time until a signal is seen."""
@@ -62,9 +68,9 @@ class _Progress:
         self.started_s = 0.0
         """By the monotonic clock: before the first sample."""
 
-    def show(self, samples: int, estimate: Estimate | None) -> bool:
+    def show(self, at_s: float, estimate: Estimate | None) -> bool:
         """Print the estimate if a line is due; True: the run goes on."""
-        if not samples:
+        if not at_s:
             self.started_s = time.monotonic()
             _say(f"{'time':>7} {'speed':>10} {'mu':>7} {'at least':>9}  regime")
         if estimate is not None and estimate.t_ns >= self._due_ns:
@@ -81,7 +87,9 @@ def main(args: Sequence[str] | None = None) -> int:
     parents = [json_option(), address_options()]
     parser = argparse.ArgumentParser("demo", parents=parents, **help_texts(__doc__, *EXAMPLES))
     parser.add_argument("--live", action="store_true", help="at real time, with a page in the browser")
-    parser.add_argument("--scenario", default="tunnel_entry", choices=tuple(SCENARIOS), help="what happens")
+    parser.add_argument("--scenario", default="tunnel_entry", choices=(*SCENARIOS, *REAL), help="what happens")
+    fitted = f"of a real train, which has the scenarios from {next(iter(REAL))} on (default: {SENSORS.default})"
+    parser.add_argument("--sensors", default=SENSORS.default, choices=tuple(FITTED), help=fitted)
     parser.add_argument("--seed", type=int, default=1, help="seed of the noise (default: 1)")
     folder = "default: adhesion_demo, numbered"
     parser.add_argument("--output", type=Path, default=Path("adhesion_demo"), metavar="DIR", help=folder)
@@ -105,9 +113,9 @@ def _live(options: argparse.Namespace, executor: SingleThreadedExecutor, progres
                 executor.spin_once(timeout_sec=POLL_S)
             return not stop.requested
 
-        def pace(samples: int, estimate: Estimate | None) -> bool:
-            progress.show(samples, estimate)
-            due_s = progress.started_s + SAMPLE_S * samples
+        def pace(at_s: float, estimate: Estimate | None) -> bool:
+            progress.show(at_s, estimate)
+            due_s = progress.started_s + at_s
             return wait(lambda: time.monotonic() >= due_s)
 
         _say(f"open {page.server.url}: the train starts when the page is open; Ctrl-C ends")
@@ -124,23 +132,58 @@ def _run(
 ) -> int:
     """Play the scenario, call `ended`, evaluate the recording and report; the exit code."""
     output, started_s = _free(options.output), time.monotonic()
-    target_kmh = (SCENARIOS[options.scenario].end_speed_mps or 0.0) / KMH
-    digest = play(executor, options.scenario, target_kmh, output / "bag", options.seed, pace)
+    task = _task(options)
+    target_kmh, train = task.monitor["target_speed_kmh"], setup_of(task.estimator).config.train
+    played = play(executor, task, output / "bag", pace)
     ended()
     with BagReader(output / "bag") as reader:
-        result, run = _evaluate(reader, options.seed), read_run(reader)
-    draw(run, output / "run.png", f"{options.scenario}, seed {options.seed}", target_kmh)
-    result |= {"live_digest": digest, "live_equals_offline": digest == result["digest"]}
+        result, run = _evaluate(reader, task), read_run(reader)
+    truth = _true_bands(played.regimes, run)
+    fitted = f", {options.sensors}" if options.scenario in REAL else ""
+    draw(run, output / "run.png", f"{options.scenario}{fitted}, seed {options.seed}", target_kmh, train, truth)
+    result |= _told(truth, run)
+    result |= {"live_digest": played.digest, "live_equals_offline": played.digest == result["digest"]}
     result |= {"bag": str(output / "bag"), "picture": str(output / "run.png")}
     result["seconds"] = round(time.monotonic() - started_s, 1)
-    report(options.json, result, "\n".join(["", table(run, target_kmh), "", *_said(result)]))
+    report(options.json, result, "\n".join(["", table(run, target_kmh, train), "", *_said(result)]))
     return DONE if result["live_equals_offline"] else FAILED
+
+
+def _task(options: argparse.Namespace) -> Task:
+    """What the nodes are to do; a real train stops."""
+    simulator = {"scenario": options.scenario, "sensors": options.sensors}
+    if options.scenario in REAL:
+        real = REAL[options.scenario]
+        monitor = {"target_position_m": real.way_m, "target_speed_kmh": 0.0}
+        return Task(options.seed, simulator, monitor, known.parameters(real, FITTED[options.sensors]))
+    target_mps = SCENARIOS[options.scenario].end_speed_mps or 0.0
+    target_m = TARGET_M if target_mps else STOP_M
+    return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": target_mps / KMH})
+
+
+def _true_bands(regimes: Sequence[tuple[int, str]], run: Run) -> list[Band]:
+    """The true regimes over the time of the run."""
+    ends = [*(t_ns for t_ns, _ in regimes[1:]), int(run.true_speed.t_ns[-1])]
+    times = run.seconds(np.array([[t_ns for t_ns, _ in regimes], ends])).T
+    return [Band(start_s, end_s, regime) for (start_s, end_s), (_, regime) in zip(times.tolist(), regimes, strict=True)]
+
+
+def _told(truth: Sequence[Band], run: Run) -> dict[str, float]:
+    """When adhesion first limited the train, s from the start, and how long after that an estimate says so."""
+    limited = Regime.ADHESION_LIMITED.name
+    begun_s = next((band.start_s for band in truth if band.regime == limited), None)
+    said_s = run.seconds(run.regime.t_ns[run.regime.values == limited])
+    if begun_s is None or not (said_s >= begun_s).any():
+        return {}
+    return {"limited_from_s": begun_s, "told_after_s": float(said_s[said_s >= begun_s][0]) - begun_s}
 
 
 def _said(result: dict[str, Any]) -> Iterator[str]:
     """The result in words."""
     if "mean_relative_error_percent" in result:
         yield f"mean relative error while adhesion limits: {result['mean_relative_error_percent']:.2f} %"
+    if "told_after_s" in result:
+        yield f"adhesion limits from {result['limited_from_s']:.1f} s on, told {result['told_after_s']:.1f} s later"
     if "ms_per_window_p50" in result:
         yield f"a full window takes {result['ms_per_window_p50']:.0f} ms (median of {result['windows']} windows)"
     same = "gives the same numbers to the last bit" if result["live_equals_offline"] else "GIVES OTHER NUMBERS"
@@ -159,10 +202,10 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr)
 
 
-def _evaluate(reader: BagReader, seed: int) -> dict[str, Any]:
+def _evaluate(reader: BagReader, task: Task) -> dict[str, Any]:
     """Replay the demo's own recording offline, and sum up what the ATP monitor said."""
     selection = select(reader.topics)
-    pipeline, truth = Pipeline(Config(), seed), Truth()
+    pipeline, truth = Pipeline(setup_of(task.estimator).config, task.seed), Truth()
     replayed = offline.replay(pipeline, truth, offline.messages(reader, selection))
     levels = read_status(reader, ATP_STATUS, "level").values.tolist()
     changes = [level for previous, level in pairwise(["", *levels]) if level != previous]

@@ -7,13 +7,14 @@ depends neither on the machine's speed nor on the order in which the executor tu
 recordings.
 """
 
+import math
 import time
-from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from functools import partial
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -27,10 +28,7 @@ from ..core import Estimate
 from ..nodes.atp_monitor import AtpMonitor
 from ..nodes.estimator import Estimator
 from ..nodes.recorder import Recorder
-from ..wire.topics import BRAKING_CURVE, CLOCK, POSITION, STATE
-
-TARGET_M, STOP_M = 8250.0, 9000.0
-"""The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
+from ..wire.topics import ADHESION_INPUTS, BRAKING_CURVE, STATE
 
 PATIENCE_S = 10.0
 """Longest wait for a message between two nodes of the process."""
@@ -41,34 +39,53 @@ NEVER_S = 3600.0
 NODES = ("recorder", "estimator", "atp_monitor", "simulator", "live")
 """Their errors are shown, the rest of their log is not: who runs the line says himself how far it is."""
 
-Pace = Callable[[int, Estimate | None], bool]
-"""Called before every sample with the number of those before and the newest estimate; False ends the run."""
+Pace = Callable[[float, Estimate | None], bool]
+"""Called before every sample with its time of the run, s, and the newest estimate; False ends the run."""
 
 
-def play(executor: SingleThreadedExecutor, scenario: str, target_kmh: float, bag: Path, seed: int, pace: Pace) -> str:
-    """Run the nodes until the scenario or `pace` ends; the digest of what the estimator published.
+class Task(NamedTuple):
+    """What the nodes are to do: parameters of each by name, and the seed of simulator and estimator."""
+
+    seed: int
+    simulator: Mapping[str, Any]
+    monitor: Mapping[str, Any]
+    estimator: Mapping[str, Any] = MappingProxyType({})
+
+
+class Played(NamedTuple):
+    """What came of it."""
+
+    digest: str
+    """Of what the estimator published."""
+    regimes: list[tuple[int, str]]
+    """The true ones, and when each began, ns."""
+
+
+def play(executor: SingleThreadedExecutor, task: Task, bag: Path, pace: Pace) -> Played:
+    """Run the nodes until the scenario or `pace` ends.
 
     However it ends, by a full disk (OSError) or Ctrl-C too, the recording is complete up to there.
     """
     context = executor.context
     # First: a bad seed ends here, before anything is written.
-    simulator = Simulator(paced=False, parameter_overrides=_parameters(scenario=scenario, seed=seed), context=context)
+    happening = _parameters(**task.simulator, seed=task.seed)
+    simulator = Simulator(paced=False, parameter_overrides=happening, context=context)
     simulated = partial(_parameters, use_sim_time=True)
     recorder = Recorder(bag, by_log_time=True, parameter_overrides=simulated(), context=context)
-    identifying = simulated(seed=seed, sensor_timeout_s=NEVER_S)
+    identifying = simulated(**task.estimator, seed=task.seed, sensor_timeout_s=NEVER_S)
     estimator = Estimator(parameter_overrides=identifying, context=context)
-    target = {"target_position_m": TARGET_M if target_kmh else STOP_M, "target_speed_kmh": target_kmh}
-    supervising = simulated(**target, clock_timeout_s=NEVER_S)
+    supervising = simulated(**task.monitor, clock_timeout_s=NEVER_S)
     monitor = AtpMonitor(parameter_overrides=supervising, context=context)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)
     at_rest = partial(_at_rest, simulator, estimator, monitor, recorder)
     with closing(recorder):
-        while pace(simulator.samples, estimator.latest) and simulator.tick():
+        while math.isfinite(simulator.ahead_s) and pace(simulator.ahead_s, estimator.latest):
+            simulator.tick()
             spin_until(executor, at_rest)
         estimator.close()
         spin_until(executor, at_rest)
-    return estimator.digest
+    return Played(estimator.digest, simulator.changes)
 
 
 @contextmanager
@@ -102,9 +119,9 @@ def spin_until(executor: SingleThreadedExecutor, done: Callable[[], bool]) -> No
 
 def _at_rest(simulator: Simulator, estimator: Estimator, monitor: AtpMonitor, recorder: Recorder) -> bool:
     """Whether every node has taken what the others sent, and its time is that of the newest sample."""
-    sent = Counter({POSITION: simulator.samples, CLOCK: simulator.samples}) + estimator.published + monitor.published
+    sent = simulator.sent + estimator.published + monitor.published
     return (
-        estimator.heard[POSITION] == simulator.samples
+        all(estimator.heard[topic] == simulator.sent[topic] for topic in ADHESION_INPUTS)
         and all(monitor.heard[topic] == estimator.published[topic] for topic in (STATE, BRAKING_CURVE))
         and all(recorder.heard[topic] == count for topic, count in sent.items())
         and all(node.get_clock().now().nanoseconds == simulator.now_ns for node in (estimator, monitor, recorder))

@@ -166,7 +166,11 @@ TRUTH_STATE = Topic(
     "simulators only: position and speed as they are",
 )
 TRUTH_MU = _number(
-    "truth/mu", Role.TRUTH, results.NUMBER, "simulators only: the available adhesion; of `slip_simulator` the peak"
+    "truth/mu",
+    Role.TRUTH,
+    results.NUMBER,
+    "simulators only: the available adhesion; of a real train the one that its force *uses*, as that stops it; of "
+    "`slip_simulator` the peak",
 )
 
 MU = _number("adhesion/mu", Role.ADHESION, results.MU, "μ̂, one per window")

@@ -8,6 +8,7 @@ moves it.
 
 import math
 from abc import ABC, abstractmethod
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ from adhesion_node.core.setting import Setting
 from adhesion_node.nodes.ros.params import declare
 from adhesion_node.nodes.ros.qos import advertise
 from adhesion_node.nodes.ros.types import new
+from adhesion_node.wire.codecs import NS
 from adhesion_node.wire.topics import CLOCK, Topic
 
 MAX_BURST = 10
@@ -37,20 +39,25 @@ class RunNode(Node, ABC):
         self.finished = False
         self.samples = 0
         """Number of samples published."""
+        self.sent: Counter[Topic] = Counter()
+        """Messages published by topic."""
         self.now_ns = 0
         """Time of the newest one, as on /clock."""
         self._start_ns = round(self.values["start_time_s"] * 1e9)
+        self.changes: list[tuple[int, Any]] = []
+        """When, as on /clock, what `news` tells began to be so."""
         self._ended = False
-        self._state: Any = None
         self._monotonic = Clock(clock_type=ClockType.STEADY_TIME)
         self._begun_ns: int | None = None
 
     def begin(self, run: Iterator[tuple[Any, Any]], topics: Sequence[Topic], period_s: float, *, paced: bool) -> None:
         """Take up a run of truths, with their `t_ns`, and what was measured; begin when the last topic is subscribed.
 
-        Unless `paced` there is no timer: the node's owner asks for every sample by `tick`.
+        Its samples come about every `period_s`. Unless `paced` there is no timer: the node's owner asks for every
+        sample by `tick`.
         """
         self._run, self._period_s, self._awaited = run, period_s, topics[-1]
+        self._ahead = next(run, None)
         self._outputs = {topic: advertise(self, topic) for topic in (CLOCK, *topics)}
         if paced:
             if self.values["wait_for"]:
@@ -59,9 +66,14 @@ class RunNode(Node, ABC):
             fitting_s = period_s / factor if factor else 0.0
             self._timer = self.create_timer(max(fitting_s, SHORTEST_TIMER_S), self._on_timer, clock=self._monotonic)
 
+    @property
+    def ahead_s(self) -> float:
+        """Time of the run at which the next sample comes; infinite at the end."""
+        return math.inf if self._ahead is None else float(self._ahead[0].t_ns / NS)
+
     def tick(self) -> bool:
         """Publish the next sample; False when the scenario has ended and nothing was published."""
-        scenario, sample = f"scenario {self.values['scenario']}", next(self._run, None)
+        scenario, sample = f"scenario {self.values['scenario']}", self._ahead
         if sample is None:
             if not self._ended:
                 self._ended, self.finished = True, self.values["exit_at_end"]
@@ -70,11 +82,12 @@ class RunNode(Node, ABC):
         if not self.samples:
             self.log(f"{scenario}: started at {self._start_ns / 1e9:.1f} s")
         truth, measured = sample
-        state, news = self.news(truth)
-        if state != self._state:
-            self._state = state
-            self.log(f"{truth.t_ns / 1e9:.1f} s: {news}")
+        self._ahead = next(self._run, None)
         self.now_ns = self._start_ns + truth.t_ns
+        state, news = self.news(truth)
+        if not self.changes or state != self.changes[-1][1]:
+            self.changes.append((self.now_ns, state))
+            self.log(f"{truth.t_ns / 1e9:.1f} s: {news}")
         self.send(CLOCK, self.now_ns)
         self.publish(truth, measured)
         self.samples += 1
@@ -91,6 +104,7 @@ class RunNode(Node, ABC):
     def send(self, topic: Topic, *values: Any) -> None:
         """Publish what the topic's codec takes."""
         self._outputs[topic].publish(topic.build(new, *values))
+        self.sent[topic] += 1
 
     def log(self, text: str) -> None:
         """Tell people."""
@@ -102,22 +116,21 @@ class RunNode(Node, ABC):
             if self._outputs[self._awaited].get_subscription_count() < self.values["wait_for"]:
                 return
             self._begun_ns = now_ns
-        elapsed_ns = now_ns - self._begun_ns
-        for _ in range(due(elapsed_ns, self.values["real_time_factor"], self._period_s, self.samples)):
+        until_s = due_s(now_ns - self._begun_ns, self.values["real_time_factor"], self._period_s)
+        for _ in range(MAX_BURST):
+            if self._ahead is not None and self.ahead_s > until_s:
+                return
             if not self.tick():
                 self._timer.cancel()
                 return
 
 
-def due(elapsed_ns: int, factor: float, period_s: float, published: int) -> int:
-    """Samples to publish now, 0 to `MAX_BURST`.
+def due_s(elapsed_ns: int, factor: float, period_s: float) -> float:
+    """Time of the run up to which samples are to be published now.
 
-    Rounded to the nearest sample, so that a timer that fires a little early does not put two into the next call.
+    Half a period ahead, so that a timer that fires a little early does not put two samples into the next call.
 
-    >>> due(0, 1.0, 0.1, 0), due(99_000_000, 1.0, 0.1, 1), due(10_000_000_000, 1.0, 0.1, 5), due(0, 0.0, 0.1, 50)
-    (1, 1, 10, 10)
+    >>> due_s(0, 1.0, 0.1), due_s(10_000_000_000, 2.0, 0.1), due_s(0, 0.0, 0.1)
+    (0.05, 20.05, inf)
     """
-    if factor == 0.0:
-        return MAX_BURST
-    total = math.floor(elapsed_ns / 1e9 * factor / period_s + 0.5) + 1
-    return min(max(total - published, 0), MAX_BURST)
+    return elapsed_ns / NS * factor + 0.5 * period_s if factor else math.inf

@@ -7,10 +7,11 @@
     truth/state, truth/mu               the true train
     /clock                              time of the sample
 
-The parameter `fault` lets something go wrong; `faults` lists what.
+The parameter `fault` lets something go wrong. The scenarios of a real train have wheels, slide protection and the
+`sensors` of such trains: each message comes when it arrives, and truth/mu is the adhesion that the train uses.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from adhesion_node.core.physics.train import KMH
@@ -18,11 +19,15 @@ from adhesion_node.core.setting import make
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.wire import topics
 
-from ..faults.plan import Plan, faulty_run, period_of
+from ..faults.plan import NONE, Plan, faulty_run, period_of
+from ..real.drive import drive
+from ..real.plant.scenarios import SCENARIOS as REAL
+from ..real.run import ticks
+from ..real.sensors.fitted import FITTED
 from ..settings import SIMULATOR
 from ..train import scenario
 from ..train.plant import Truth
-from ..train.sensors import SensorMessage, SensorSettings
+from ..train.sensors import SensorMessage, SensorSettings, Tick
 from .pace import RunNode
 
 PARAMETERS = SIMULATOR
@@ -30,6 +35,7 @@ PARAMETERS = SIMULATOR
 EXAMPLES = (
     "simulator --ros-args -p scenario:=tunnel_exit -p seed:=2",
     "simulator --ros-args -p real_time_factor:=10.0 -p wait_for:=1",
+    "simulator --ros-args -p scenario:=leaves -p sensors:=full",
 )
 
 
@@ -43,13 +49,29 @@ class Simulator(RunNode):
     def __init__(self, *, paced: bool = True, **kwargs: Any) -> None:
         """Read the parameters; ValueError when one is out of range. `paced` as in `RunNode.begin`."""
         super().__init__("simulator", PARAMETERS, **kwargs)
+        self._real = self.values["scenario"] in REAL
+        run, there, period_s = self._real_run() if self._real else self._run_of_paper()
+        self.begin(run, (*topics.TRUTH, *there), period_s, paced=paced)
+
+    def _run_of_paper(self) -> tuple[Iterator[Tick], tuple[topics.Topic, ...], float]:
+        """The run, its topics and its period."""
         settings, plan = make(SensorSettings, self.values), make(Plan, self.values)
         period_s = period_of(plan, 1.0 / self.values["rate_hz"])
         happening = scenario.find(self.values["scenario"])
         run = faulty_run(plan, happening, period_s, self.values["seed"], settings)
         optional = ((topics.SPEED, settings.speed_std_mps), (topics.WHEEL_SPEED, settings.wheel_speed_std_radps))
         there = (topics.BRAKE_PRESSURE, *(topic for topic, std in optional if std > 0), topics.POSITION)
-        self.begin(run, (*topics.TRUTH, *there), period_s, paced=paced)
+        return run, there, period_s
+
+    def _real_run(self) -> tuple[Iterator[Tick], tuple[topics.Topic, ...], float]:
+        """The same of a real train; the period is that of truth and messages together."""
+        if self.values["fault"] != NONE:
+            raise ValueError(f"fault = {self.values['fault']!r}: a real train has its faults by `sensors`: give none")
+        (driven,) = drive(REAL[self.values["scenario"]], FITTED[self.values["sensors"]], [self.values["seed"]])
+        sent = {message.topic for _, message in driven.messages}
+        there = tuple(topic for topic in topics.ADHESION_INPUTS if topic in sent)
+        per_s = self.values["rate_hz"] + len(driven.messages) / float(driven.journey.time_s[-1])
+        return ticks(driven, 1.0 / self.values["rate_hz"]), there, 1.0 / per_s
 
     def news(self, truth: Truth) -> tuple[str, str]:
         """Tell the regimes."""
@@ -57,8 +79,9 @@ class Simulator(RunNode):
 
     def publish(self, truth: Truth, measured: Sequence[SensorMessage]) -> None:
         """Publish the truth, and the messages at the stamps that they bear."""
-        self.send(topics.TRUTH_STATE, self.now_ns, truth.position_m, truth.speed_mps)
-        self.send(topics.TRUTH_MU, truth.mu)
+        if not (self._real and measured):
+            self.send(topics.TRUTH_STATE, self.now_ns, truth.position_m, truth.speed_mps)
+            self.send(topics.TRUTH_MU, truth.mu)
         for one in measured:
             t_ns = max(self.now_ns - truth.t_ns + one.t_ns, 0)
             self.send(one.topic, t_ns, one.values, one.variance, one.frame)

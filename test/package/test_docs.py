@@ -32,6 +32,8 @@ from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.report.__main__ import main as report
 from adhesion_node.study.__main__ import main as study
 from sim_node.nodes import simulator, slip_simulator
+from sim_node.real.plant.scenarios import SCENARIOS as REAL
+from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.scenario import SCENARIOS
 
 DOC = ROOT / "doc"
@@ -127,7 +129,7 @@ def test_the_contents_name_every_page_and_picture() -> None:
 def test_every_program_and_every_scenario_is_named() -> None:
     named = set(re.findall(r"`(\w+)`", text_of(ROOT / "README.md")))
     assert console_scripts().keys() <= named
-    assert set(SCENARIOS) <= set(re.findall(r"^\| `(\w+)` \|", text_of(DOC / "demo.md"), re.MULTILINE))
+    assert {*SCENARIOS, *REAL, *FITTED} <= set(re.findall(r"^\| `(\w+)` \|", text_of(DOC / "demo.md"), re.MULTILINE))
 
 
 def test_every_measured_file_says_how_it_was_made() -> None:

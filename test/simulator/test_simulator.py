@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections import defaultdict
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -21,8 +22,12 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH
-from sim_node.nodes.pace import MAX_BURST, due
+from sim_node.nodes import simulator
+from sim_node.nodes.pace import MAX_BURST, due_s
 from sim_node.nodes.simulator import Simulator
+from sim_node.real.drive import START_S, drive
+from sim_node.real.plant.scenarios import SCENARIOS as REAL
+from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.run import run
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings
@@ -130,6 +135,48 @@ def test_adhesion_drops_as_published_when_the_brake_comes_on(context: Context, s
     _drive(_simulator(context, scenario="tunnel_entry"))
     mu = [m.data for m in _by_topic(sent)["/truth/mu"]]
     assert mu[199:201] == pytest.approx([0.1432, 0.0726], abs=1.5e-4)
+
+
+SHORT = replace(REAL["tram_wet"], speed_mps=8.0, demands=((1.0, 1.0),))
+"""A tram that stops from 29 km/h: 11 s."""
+
+
+def test_a_real_train_sends_what_its_drive_holds_in_order_of_arrival(
+    context: Context, sent: Sent, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulator, "REAL", {"tram_wet": SHORT})
+    node = _simulator(context, scenario="tram_wet", sensors="one_cylinder_wheels", seed=3, start_time_s=500.0)
+    _drive(node)
+    (driven,) = drive(SHORT, FITTED["one_cylinder_wheels"], [3])
+    sensors = ("/position", "/brake_pressure", "/wheel_speed")
+    stamps = [(topic, _nanoseconds(m.header.stamp)) for topic, m in sent if topic in sensors]
+    expected = [(f"/{m.topic.name}", m.t_ns - round((START_S - 500.0) * 1e9)) for _, m in driven.messages]
+    assert stamps == expected[: len(stamps)]
+    assert len(stamps) > 250
+    lists = _by_topic(sent)
+    clocks = [_nanoseconds(m.clock) * 1e-9 for m in lists["/clock"]]
+    assert clocks == sorted(clocks)
+    assert len(clocks) == len(stamps) + len(lists["/truth/mu"]) == len(stamps) + len(lists["/truth/state"])
+    used = [m.data for m in lists["/truth/mu"]]
+    assert used == [driven.journey.used[5 * k] for k in range(len(used))]
+    assert [state for _, state in node.changes][-1] == "COASTING"  # it stands
+
+
+def test_a_real_train_keeps_the_pace_of_its_clock(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(simulator, "REAL", {"tram_wet": SHORT})
+    node = _simulator(context, paced=True, scenario="tram_wet", sensors="gnss", real_time_factor=20.0)
+    executor.add_node(node)
+    begun = time.monotonic()
+    spin_until(executor, lambda: node.finished)
+    lasted_s = (node.now_ns - 1000 * 10**9) / 20e9
+    assert time.monotonic() - begun > 0.95 * lasted_s
+
+
+def test_a_real_train_takes_no_fault_of_the_paper(context: Context) -> None:
+    with pytest.raises(ValueError, match="fault = 'late': a real train has its faults by `sensors`: give none"):
+        _simulator(context, scenario="leaves", fault="late")
 
 
 def test_same_seed_same_messages_another_seed_others(context: Context, sent: Sent) -> None:
@@ -269,16 +316,15 @@ def test_a_late_timer_catches_up_in_bounded_bursts(late_s: float) -> None:
     published = 0
     for call in range(200):
         elapsed_s = call * 0.1 + (late_s if call >= 20 else 0.0)
-        count = due(round(elapsed_s * 1e9), 1.0, 0.1, published)
-        assert 0 <= count <= MAX_BURST
-        published += count
+        until_s = due_s(round(elapsed_s * 1e9), 1.0, 0.1)
+        published += sum(0.1 * k <= until_s for k in range(published, published + MAX_BURST))
     assert published == pytest.approx(200 + late_s / 0.1, abs=0.51)
 
 
 @pytest.mark.parametrize("jitter_s", [-0.04, 0.04])
 def test_a_jittering_timer_still_publishes_one_sample_per_call(jitter_s: float) -> None:
-    counts = [due(round((k * 0.1 + jitter_s * (k % 2)) * 1e9), 1.0, 0.1, k) for k in range(50)]
-    assert counts == [1] * 50
+    until_s = [due_s(round((k * 0.1 + jitter_s * (k % 2)) * 1e9), 1.0, 0.1) for k in range(50)]
+    assert all(0.1 * k <= until < 0.1 * (k + 1) for k, until in enumerate(until_s))
 
 
 @pytest.mark.parametrize(

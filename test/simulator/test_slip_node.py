@@ -52,7 +52,7 @@ def test_a_sample_is_published_in_order_with_one_stamp(context: Context, sent: S
     expected = list(zip(range(3), slip.run(find("creep_dry"), 0.01, 3), strict=False))
     for index, (truth, measured) in expected:
         t_ns = 12_500_000_000 + index * 10_000_000
-        assert SPEED.read(lists["/speed"][index]) == (t_ns, measured.speed_mps)
+        assert SPEED.read(lists["/speed"][index]) == (t_ns, measured.speed_mps, pytest.approx(0.003**2))
         assert TRACTION_FORCE.read(lists["/traction_force"][index]) == (t_ns, measured.force_n)
         assert WHEEL_SPEED.read(lists["/wheel_speed"][index]) == (t_ns, measured.wheel_radps)
         assert lists["/truth/mu"][index].data == truth.mu_max

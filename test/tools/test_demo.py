@@ -26,11 +26,14 @@ from adhesion_node.nodes import replay
 from adhesion_node.tools import demo, line
 from adhesion_node.tools.line import executor_of_line
 from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH
+from sim_node.nodes import simulator
+from sim_node.real.plant.scenarios import SCENARIOS as REAL
 from sim_node.train import scenario
 from sim_node.train.scenario import SCENARIOS, Brake, Rail
 
 CRUISE_S, END_S = 4.0, 9.0
 SAMPLES = 91
+TASK = line.Task(1, {"scenario": "tunnel_entry"}, {"target_position_m": 8000.0, "target_speed_kmh": 100.0})
 
 
 @pytest.fixture(autouse=True)
@@ -95,21 +98,40 @@ def _check_bag(path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("sensors", ["gnss_wheels", "full"])
+def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_known_when(
+    sensors: str,
+    run_demo: Callable[..., dict[str, Any]],
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    short = replace(REAL["metro_leaves"], speed_mps=12.0, demands=((4.0, 1.0),))
+    for module in (simulator, demo):
+        monkeypatch.setattr(module, "REAL", {"metro_leaves": short})
+    result = run_demo("--scenario", "metro_leaves", "--sensors", sensors)
+    out, _ = capfd.readouterr()
+    assert result["live_equals_offline"] is True
+    assert result["measurements"] > 200
+    assert 4.0 < result["limited_from_s"] < 7.0
+    assert f"adhesion limits from {result['limited_from_s']:.1f} s on, told {result['told_after_s']:.1f} s later" in out
+    assert imread(result["picture"]).shape[:2] == (1320, 1210)
+
+
 def test_equal_runs_leave_equal_bytes_however_busy_the_machine_is(tmp_path: Path) -> None:
     """The second run is held up for longer than any watchdog waits: 2 s."""
     bags = [tmp_path / "one", tmp_path / "two"]
     for bag, busy_s in zip(bags, (0.0, 2.5), strict=True):
         with executor_of_line() as executor:
-            line.play(executor, "tunnel_entry", 100.0, bag, 1, partial(_hold_up, executor, busy_s))
+            line.play(executor, TASK, bag, partial(_hold_up, executor, busy_s))
     first, second = [{file.name: file.read_bytes() for file in bag.iterdir()} for bag in bags]
     assert _statuses(bags[0]) == _statuses(bags[1])
     assert first == second
 
 
-def _hold_up(executor: SingleThreadedExecutor, busy_s: float, samples: int, _: Estimate | None) -> bool:
+def _hold_up(executor: SingleThreadedExecutor, busy_s: float, at_s: float, _: Estimate | None) -> bool:
     """At one sample let everything but the simulator go on for so long."""
     until = time.monotonic() + busy_s
-    while samples == 61 and time.monotonic() < until:
+    while at_s == 6.1 and time.monotonic() < until:
         executor.spin_once(timeout_sec=0.1)
     return True
 
