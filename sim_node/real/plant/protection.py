@@ -113,20 +113,17 @@ class Cylinders:
     def __init__(self, nominal: Nominal, train: Train, step_s: float) -> None:
         self.pressure_pa = np.zeros(np.broadcast_shapes(train.dump_s.shape, train.build_up_s.shape))
         self.supply_pa = self.pressure_pa
-        self._fill = nominal.full_pa / train.build_up_s * PERIOD_S
+        self._fill = nominal.full_pa / train.build_up_s * step_s
         self._empty = np.exp(-step_s / train.dump_s)
         self._rise = train.rise_pa_per_s * step_s
-        self._released = -np.expm1(-PERIOD_S / RELEASE_S)
+        self._released = -np.expm1(-step_s / RELEASE_S)
 
-    def feed(self, demanded_pa: Array) -> None:
-        """Let the pressure before the valves follow what has reached the groups for one period; shape (A,)."""
+    def step(self, demanded_pa: Array, valves: Valves) -> Array:
+        """Move the pressures by one step and return them; the demand is what has reached the groups, shape (A,)."""
         missing = demanded_pa - self.supply_pa
         self.supply_pa = self.supply_pa + np.where(
             missing > 0.0, np.minimum(missing, self._fill), missing * self._released
         )
-
-    def step(self, valves: Valves) -> Array:
-        """Move the pressures by one step under these positions of the valves, and return them."""
         pressure = self.pressure_pa
         applied = np.minimum(self.supply_pa, pressure + self._rise)
         held = np.minimum(pressure, self.supply_pa)

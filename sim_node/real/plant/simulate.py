@@ -70,10 +70,10 @@ def _run(scenario: Scenario, trains: train.Train, ways: list[way.Way], substeps:
         if nominal.slide_protection:
             control, valves = protection.command(control, now.rim_mps)
             told = [valves, *told[:-1]]
-        cylinders.feed(demanded_pa(scenario, time - delays))
+        asked = demanded_pa(scenario, time - delays)
         impulse = still
         for lag in lags:
-            brake = train.brake_n(trains, cylinders.step(told[lag]), now.rim_mps)
+            brake = train.brake_n(trains, cylinders.step(asked, told[lag]), now.rim_mps)
             running = train.resistance_n(nominal, trains, now.speed_mps) + hill
             if time < scenario.demands[0][0]:  # traction keeps the speed
                 running = still
