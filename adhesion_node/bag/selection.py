@@ -31,7 +31,7 @@ def select(
     `recorded` holds the types by name. Replayed are `names` (after remapping), or else the sensors and the truth,
     not recorded results. Our own topics come out under their relative names, so that namespaces apply. Raises
     ValueError when a remapped or named topic is missing, has the wrong type, or when there is neither a position nor
-    a speed of the train or its wheels.
+    a speed nor, for the creep curve, a wheel speed.
     """
     renamed = _rename(recorded, remaps)
     enough = (*topics.POSITIONS, topics.SPEED, topics.WHEEL_SPEED)

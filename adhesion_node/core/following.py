@@ -11,7 +11,7 @@ from .belief.window import WindowSample
 from .config import Config
 from .estimate import Estimate, blind_estimate, estimate_of, judge
 from .intake.outcome import Event, Outcome, counted
-from .intake.plausibility import is_kmh
+from .intake.plausibility import in_mps, is_kmh
 from .intake.samples import MAX_VARIANCE_M2, Measurement
 from .methods.protocol import Verdict
 from .state import State
@@ -29,11 +29,12 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         if repeated.is_stuck(measurement):
             return _unseen(config, state, measurement)
         state = state._replace(repeated=repeated, unseen=0)
-    if measurement.speed_mps is not None and seen is not None and is_kmh(measurement.speed_mps, seen.speed_mps):
-        detail = f"speed x = {measurement.speed_mps:g} at {seen.speed_mps:.3g} m/s"
-        speeds = tuple(each for each in measurement.speeds if not is_kmh(each.speed_mps, seen.speed_mps))
-        state = state.told(Event(Outcome.SPEED_IN_KMH, detail))
-        measurement = measurement._replace(speed_mps=None, speeds=speeds)
+    pace = state.pace.after(measurement)
+    measurement, refused = in_mps(measurement, (pace.speed_mps, math.nan if seen is None else seen.speed_mps))
+    state = state._replace(pace=pace).told(*refused)
+    if refused and state.belief is not None and is_kmh(float(state.belief.mean[1]), pace.speed_mps):
+        detail = f"speed x = {float(state.belief.mean[1]):.3g}, positions at {pace.speed_mps:.3g} m/s"
+        state, seen = state.forgotten()._replace(pace=pace).told(Event(Outcome.RESET, detail)), None
     if state.newest is None or state.belief is None:
         return _accept(config, state, measurement, _met(config, measurement), 0.0)
     dt_s = (measurement.t_ns - state.newest.t_ns) * 1e-9
@@ -46,7 +47,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         detail = f"position x = {measurement.position_m:.12g}, innovation {innovation:.3g} standard deviations"
         if state.outliers + 1 < config.max_outliers:
             return state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail)), None
-        state = state.forgotten()._replace(seen=seen, repeated=repeated)
+        state = state.forgotten()._replace(seen=seen, repeated=repeated, pace=pace)
         state = state.told(Event(Outcome.RESET, detail))
         return _accept(config, state, measurement, _met(config, measurement), 0.0)
     belief = tracker.correct(belief, measurement, _speed_variance(config, measurement))
@@ -87,11 +88,11 @@ def _accept(
     if window is not None:
         window = state.method.extend(window, sample)
     state = state._replace(
-        counts=counted(state.counts, Event(Outcome.ACCEPTED)),
+        counts=counted(state.counts, Event(Outcome.ACCEPTED if measurement.has_position else Outcome.TICK)),
         newest=measurement,
         belief=belief,
         window=window,
-        outliers=0,
+        outliers=0 if measurement.has_position else state.outliers,
         since_estimate=state.since_estimate + 1,
     )
     if brake == 0.0 or belief.mean[1] < config.slowest_mps:

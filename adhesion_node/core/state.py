@@ -12,7 +12,7 @@ from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge
 from .intake.outcome import NO_COUNTS, Event, Outcome, counted
 from .intake.pairing import Gate, Inbox
-from .intake.plausibility import Repeated
+from .intake.plausibility import Pace, Repeated
 from .intake.samples import Measurement
 from .methods.protocol import AnyMethod, MethodWindow
 
@@ -43,6 +43,7 @@ class State(NamedTuple):
     seen: Estimate | None = None
     """The last estimate that positions have borne out."""
     repeated: Repeated[Estimate] = Repeated(math.nan, 0, None)
+    pace: Pace = Pace()
     unseen: int = 0
     """Measurements in a row of a position sensor that is stuck."""
 
@@ -62,5 +63,5 @@ class State(NamedTuple):
 
     def forgotten(self) -> State:
         """All but the counts, what still waits, and the number of windows, which keeps the random streams apart."""
-        seed, gate, method, counts, events, inbox, *_ = self
-        return State(seed, gate, method, counts, events, inbox, knowledge=Knowledge(windows=self.knowledge.windows))
+        knowledge = Knowledge(windows=self.knowledge.windows)
+        return State(*self[:6], knowledge=knowledge)

@@ -68,6 +68,7 @@ def _values(pipeline: Pipeline) -> dict[str, str]:
     counts = {
         "measurements": str(pipeline.measurements),
         "accepted": str(pipeline.accepted),
+        "ticks": str(pipeline.ticks),
         "resets": str(pipeline.resets),
         "windows": str(pipeline.windows),
     }

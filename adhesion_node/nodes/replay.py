@@ -9,7 +9,7 @@ from functools import partial
 
 from ..bag import BagReader, select_from
 from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
-from ..wire.topics import POSITIONS, SPEED, TRACTION_FORCE
+from ..wire.topics import POSITIONS, TRACTION_FORCE
 
 EXAMPLES = (
     "replay my_run --offline",
@@ -67,16 +67,11 @@ def _offline(options: argparse.Namespace) -> int:
 
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
-        wanted = options.estimator or _estimator_for(set(selection.values()))
+        names = set(selection.values())
+        has_place = any(topic.name in names for topic in POSITIONS)
+        wanted = options.estimator or (ADHESION if has_place or TRACTION_FORCE.name not in names else CREEP)
         run = offline.run if wanted == ADHESION else creep_offline.run
         return run(options, reader, selection)
-
-
-def _estimator_for(there: set[str]) -> str:
-    """Which estimator the topics of a recording are for: a position for the one, a pull without one for the other."""
-    if there & {topic.name for topic in POSITIONS} or (SPEED.name in there and TRACTION_FORCE.name not in there):
-        return ADHESION
-    return CREEP
 
 
 def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]:
@@ -100,7 +95,7 @@ def _parser() -> argparse.ArgumentParser:
     live("--wait-for-subscribers", metavar="N", type=int, default=1, help=awaited)
     straight = parser.add_argument_group("offline").add_argument
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
-    either = "the adhesion under the brake, or the creep curve (default: by what is there)"
+    either = "the adhesion under the brake, or the creep curve (default: by whether there is a position or no force)"
     straight("--estimator", choices=(ADHESION, CREEP), help=either)
     setting_options(straight)
     return parser

@@ -15,7 +15,7 @@ from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
 from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.settings import SEED, SETTINGS, given, setup_of
-from ..wire.topics import ADHESION_INPUTS, FIX, TRUTH_MU, TRUTH_STATE, Topic
+from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE, Topic
 from .engine import EstimatorPipeline
 from .pipeline import Pipeline
 from .reader import Reader
@@ -30,10 +30,12 @@ Output = TypeVar("Output")
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
     setup, truth = setup_of(parameters_of(options)), Truth()
-    enough = [topic.name for topic in Reader(ADHESION_INPUTS, setup.line).enough]
-    if not set(enough) & set(selection.values()):
-        remedy = f"; a {FIX.name} needs track_line" if FIX.name in selection.values() else ""
-        raise ValueError(f"bag = {reader.path}: without {' or '.join(enough)} nothing is identified{remedy}")
+    anchors = [topic.name for topic in (*Reader(ADHESION_INPUTS, setup.line).anchors, SPEED)]
+    if not set(anchors) & set(selection.values()):
+        fix = f"; a {FIX.name} needs track_line" if FIX.name in selection.values() else ""
+        raise ValueError(
+            f"bag = {reader.path}: holds no {' or '.join(anchors)}, without which nothing is identified{fix}"
+        )
     pipeline = Pipeline(setup.config, setup.seed)
     replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.line)
     result = summary(pipeline, replayed, truth)
@@ -111,6 +113,7 @@ def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, A
     result: dict[str, Any] = {
         "measurements": pipeline.measurements,
         "accepted": pipeline.accepted,
+        "ticks": pipeline.ticks,
         "dropped": pipeline.dropped,
         "windows": pipeline.windows,
         "mu_final": last and last.mu,

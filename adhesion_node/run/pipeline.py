@@ -6,7 +6,7 @@ import struct
 from functools import partial
 from typing import final
 
-from ..core import Config, Estimate, Prediction, State, estimator, predict
+from ..core import Config, Estimate, Outcome, Prediction, State, estimator, predict
 from ..core.physics.braking import BrakingCurve
 from ..wire.topics import POSITIONS
 from .engine import EstimatorPipeline, Verbs
@@ -30,6 +30,11 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     def _output(self, estimate: Estimate) -> Prediction:
         self.windows += estimate.window > 0
         return predict(self.config, estimate)
+
+    @property
+    def ticks(self) -> int:
+        """Times without a position at which the other sensors were used."""
+        return self._counts()[Outcome.TICK.name]
 
     @property
     def tally(self) -> str:

@@ -7,11 +7,11 @@ from typing import Any
 
 from ..core import Sample
 from ..wire.codecs import Line, Reason, Rejected
-from ..wire.topics import FIX, POSITIONS, SPEED, Topic
+from ..wire.topics import FIX, POSITIONS, Topic
 
 
 class Reader:
-    """Reads messages of `inputs`; `anchors` are those of them to which all others belong, the best one first.
+    """Reads messages of `inputs`; `anchors` are those of them without which there is no estimate, the best one first.
 
     Two sensors of the position never agree to the metre, and going to and fro between them would look like steps of
     the train. So one of the anchors counts alone: the first in order of those that have been heard. `position_source`
@@ -23,15 +23,8 @@ class Reader:
         self.line = line
         self.anchors = tuple(possible) or (inputs[-1],)
         self.inputs = tuple(topic for topic in inputs if topic in possible or topic not in POSITIONS)
-        self.enough = (*self.anchors, SPEED) if possible else self.anchors
-        """One of these there must be: a speed alone gives estimates, too."""
         self.source: Topic | None = None
         """The anchor that counts; None before one was heard."""
-
-    @property
-    def watched(self) -> tuple[Topic, ...]:
-        """What must not fall silent, all of it at once."""
-        return (self.source,) if self.source else self.enough
 
     def read(self, topic: Topic, message: Any) -> Sample:
         """Read a message of one of the inputs; raises Rejected."""

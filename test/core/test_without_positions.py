@@ -11,7 +11,15 @@ import numpy as np
 import pytest
 from oracles import ride, specific_resistance
 
-from adhesion_node.core import Config, Measurement, Outcome, PositionSample, PressureSample, Sample, SpeedSample
+from adhesion_node.core import (
+    Config,
+    Measurement,
+    PositionSample,
+    PressureSample,
+    Sample,
+    SpeedSample,
+    WheelSample,
+)
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
 
@@ -138,7 +146,7 @@ def test_a_measurement_without_a_position_is_valid_and_its_place_says_nothing(ch
         position, variance = (0.0, math.inf) if k % 2 else (3.0 * k, 1.0)
         pipeline.push(Measurement(k * S // 10, position, variance)._replace(**changes if k % 2 else {}))
     assert pipeline.dropped == {}
-    assert pipeline.state.counts[Outcome.ACCEPTED] == 20
+    assert (pipeline.accepted, pipeline.ticks) == (10, 10)
     assert pipeline.last is not None
     assert math.isfinite(pipeline.last.position_m)
 
@@ -146,3 +154,67 @@ def test_a_measurement_without_a_position_is_valid_and_its_place_says_nothing(ch
 @pytest.mark.parametrize("bad", [{"speeds": (SpeedSample(0, math.nan),)}, {"speeds": (SpeedSample(0, 9.0, 0.0),)}])
 def test_a_sample_beside_it_that_is_none_makes_it_invalid(bad: dict[str, Any]) -> None:
     assert not Measurement(0, 0.0, math.inf)._replace(**bad).is_valid()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_order_of_arrival_changes_a_bit_through_outages(method: str) -> None:
+    """Positions of 1 Hz with an outage of 6 s, speeds with one of 4 s, each sensor late by less than the wait."""
+    rng, digests = np.random.default_rng(11), set()
+    config = Config(method=method, speed_source="doppler", iterations=3)
+    for turn in range(6):
+        late_s = dict(
+            zip((PressureSample, SpeedSample, PositionSample), rng.uniform(0, 0.19 * (turn > 0), 3), strict=True)
+        )
+        samples = [
+            each
+            for each in stream(lambda k: k % 10 == 0 and not 100 <= k < 160, 0.01)
+            if not (isinstance(each, SpeedSample) and 14 * S <= each.t_ns < 18 * S)
+        ]
+        samples.sort(key=lambda each: each.t_ns * 1e-9 + late_s[type(each)])
+        pipeline, _ = replayed(config, samples)
+        digests.add(pipeline.digest)
+        assert pipeline.dropped == {}
+        assert pipeline.ticks >= 25
+    assert len(digests) == 1
+
+
+@pytest.mark.parametrize("dropped", [(0, 1), (2, 3), (0, 1, 2, 3)])
+def test_a_bogie_that_drops_out_for_73_s_silences_nothing(dropped: tuple[int, ...]) -> None:
+    pipeline, estimates = Pipeline(Config(iterations=3), 1), 0
+    for k in range(1000):
+        t_ns = k * S // 10
+        axles = tuple(math.nan if axle in dropped and 100 <= k < 830 else 30.0 / 0.46 for axle in range(4))
+        samples: list[Sample] = [
+            PressureSample(t_ns, 0.0),
+            WheelSample(t_ns, axles),
+            PositionSample(t_ns, 3.0 * k, 0.25),
+        ]
+        for sample in samples:
+            estimates += len(pipeline.push(sample))
+    assert estimates >= 198
+    assert pipeline.accepted >= 997
+    assert pipeline.dropped == ({"INVALID": 730} if len(dropped) == 4 else {})
+    assert pipeline.state.newest is not None
+    assert len(pipeline.state.newest.wheels[-1].speeds_radps) == 4
+
+
+@pytest.mark.parametrize("source", ["axle", "doppler"])
+@pytest.mark.parametrize("mps", [20.0, 50.0])
+@pytest.mark.parametrize(("first", "every"), [(0, 1), (50, 1), (50, 10)])
+def test_a_speed_in_kmh_from_the_beginning_is_found_by_the_positions(
+    source: str, mps: float, first: int, every: int
+) -> None:
+    """The estimate began with it; there was one reset after the other, and no speed without them."""
+    pipeline, predictions = Pipeline(Config(speed_source=source, iterations=3), 1), list[Prediction]()
+    rng = np.random.default_rng(2)
+    for k in range(400):
+        t_ns, position_m = k * S // 10, mps * k / 10 + 0.5 * float(rng.standard_normal())
+        samples: list[Sample] = [PressureSample(t_ns, 0.0), SpeedSample(t_ns, 3.6 * mps)]
+        if k >= first and k % every == 0:
+            samples.append(PositionSample(t_ns, position_m, 0.25))
+        predictions += [each for sample in samples for each in pipeline.push(sample)]
+    assert pipeline.resets <= 1
+    assert pipeline.dropped["SPEED_IN_KMH"] > 50
+    late = [each.estimate for each in predictions if each.estimate.t_ns > 12 * S]
+    assert len(late) > 25
+    assert all(abs(each.speed_mps - mps) < 1.5 for each in late)

@@ -39,7 +39,17 @@ FAST = {"method": "particle_em", "step": 10, "iterations": 3, "particles": 10}
 FAST_CONFIG = setup_of(FAST).config
 FAST_SETTINGS = [f"--set={name}={value}" for name, value in FAST.items()]
 
-KEYS = {"measurements", "accepted", "dropped", "windows", "mu_final", "mu_lower_final", "regime_final", "digest"}
+KEYS = {
+    "measurements",
+    "accepted",
+    "ticks",
+    "dropped",
+    "windows",
+    "mu_final",
+    "mu_lower_final",
+    "regime_final",
+    "digest",
+}
 """Of the result, as other programs rely on; with the truth also `ERROR`."""
 
 ERROR = "mean_relative_error_percent"

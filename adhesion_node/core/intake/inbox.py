@@ -73,6 +73,7 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     if refused is not None:
         of_others = Outcome.REPEATED if refused is Outcome.DUPLICATE else refused
         return Pushed(inbox, events=(Event(of_others, _named(sample)),))
+    overtaken = () if inbox.late[0] else _overtaken(gate, inbox, sample)
     in_order, stream = not stream.has_reached(sample.t_ns), stream.added(sample)
     first_ns = stream.samples[0].t_ns  # what comes out of order may belong to a time that is about to begin anew
     if in_order and inbox.released_ns is not None:
@@ -80,7 +81,18 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     stream = stream.since(first_ns)
     now_ns = _newest(inbox.now_ns, sample)
     inbox = inbox._replace(now_ns=now_ns).with_stream(type(sample), stream.delayed(now_ns - sample.t_ns))
-    return Pushed(*release(gate, inbox, inbox.anchors.excess))
+    return _with(overtaken, Pushed(*release(gate, inbox, inbox.anchors.excess)))
+
+
+def _overtaken(gate: Gate, inbox: Inbox, sample: Any) -> tuple[Event, ...]:
+    """What becomes of a sample that no anchor or tick can be given any more; a time that begins anew may still."""
+    sources = [source for source in gate.sources if source.kind is type(sample)]
+    if inbox.released_ns is None or not sources or not all(source.each for source in sources):
+        return ()
+    spent_ns = inbox.stream(type(sample)).spent_ns
+    spent = spent_ns is not None and sample.t_ns <= spent_ns
+    too_old = sample.t_ns < inbox.released_ns - max(source.age_ns for source in sources)
+    return (Event(Outcome.OVERTAKEN, _named(sample)),) if spent or too_old else ()
 
 
 def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:

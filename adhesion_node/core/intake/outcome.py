@@ -12,9 +12,11 @@ class Outcome(Enum):
     """What an estimator did with a sample; the value says it in words, with the remedy."""
 
     ACCEPTED = "accepted"
+    TICK = "no position at its time: the other sensors are used without one"
     LATE = "older than the newest one by more than max_lag_s: dropped; raise it, or is there a second publisher?"
     DUPLICATE = "a second measurement with the same stamp: dropped; does the publisher's clock stand still?"
     REPEATED = "a second sample of another sensor with the same stamp: dropped"
+    OVERTAKEN = "came when all of its time had been used: dropped; is its clock right? Else raise pressure_wait_s"
     STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
     TOO_OFTEN = "publish at most 200 messages a second: no more are used"
     INVALID = "not finite, no positive variance or physically impossible: dropped"
@@ -30,10 +32,10 @@ class Outcome(Enum):
     RESET = "stamp or position jumped: the estimation starts anew"
 
 
-DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "CHANGED", "RESET"))
+DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "TICK", "CHANGED", "RESET"))
 """Outcomes of a sample that is not used."""
 
-QUIET = ("ACCEPTED", "REPEATED", "OUTLIER", "SLOW", "IDLE", "CHANGED")
+QUIET = ("ACCEPTED", "TICK", "REPEATED", "OUTLIER", "SLOW", "IDLE", "CHANGED")
 """Names of those that an operator need not hear of beyond their counts: they are part of good days."""
 
 NO_COUNTS: Mapping[Outcome, int] = MappingProxyType(dict.fromkeys(Outcome, 0))

@@ -5,8 +5,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
+from .outcome import Event, Outcome
 from .samples import Measurement
 
 STUCK_STEPS, LEAST_STUCK_M, MOST_STUCK_M = 2.0, 2.0, 10.0
@@ -18,6 +20,9 @@ STRONGEST_MPS2 = 3.0
 
 KMH_PER_MPS, KMH_BAND, KMH_FROM_MPS = 3.6, 0.15, 5.0
 """A speed within this share of 3.6 times the estimate is one in km/h; told from this speed on."""
+
+PACE_NS = 2_000_000_000
+"""Positions tell a speed over so long at least: those of a metre to a metre and a half per second."""
 
 
 class Motion(Protocol):
@@ -74,6 +79,42 @@ def least_way(speed_mps: float, elapsed_s: float) -> float:
     """
     braking_s = min(elapsed_s, speed_mps / STRONGEST_MPS2)
     return speed_mps * braking_s - STRONGEST_MPS2 * braking_s**2 / 2
+
+
+class Pace(NamedTuple):
+    """How fast the positions go by themselves, over the last span of them: a speed in km/h deceives an estimate."""
+
+    since_ns: int | None = None
+    position_m: float = 0.0
+    speed_mps: float = math.nan
+
+    def after(self, measurement: Measurement) -> Pace:
+        """Note the next position, if there is one."""
+        if not measurement.has_position:
+            return self
+        t_ns, position_m, _ = measurement[:3]
+        if self.since_ns is None or t_ns < self.since_ns:
+            return Pace(t_ns, position_m)
+        elapsed_ns = t_ns - self.since_ns
+        if elapsed_ns < PACE_NS:
+            return self
+        return Pace(t_ns, position_m, abs(position_m - self.position_m) / (elapsed_ns * 1e-9))
+
+
+def in_mps(measurement: Measurement, known_mps: Iterable[float]) -> tuple[Measurement, tuple[Event, ...]]:
+    """Without the speeds that are km/h of one of the train's known speeds (NaN: is not), and what is to be told."""
+    known = [speed for speed in known_mps if speed >= KMH_FROM_MPS]
+
+    def is_wrong(speed_mps: float | None) -> bool:
+        return speed_mps is not None and any(is_kmh(speed_mps, each) for each in known)
+
+    newest_mps = measurement.speed_mps
+    wrong = [each for each in (*(sample.speed_mps for sample in measurement.speeds), newest_mps) if is_wrong(each)]
+    if not wrong:
+        return measurement, ()
+    speeds = tuple(sample for sample in measurement.speeds if not is_wrong(sample.speed_mps))
+    event = Event(Outcome.SPEED_IN_KMH, f"speed x = {wrong[-1]:g} at {min(known):.3g} m/s")
+    return measurement._replace(speed_mps=None if is_wrong(newest_mps) else newest_mps, speeds=speeds), (event,)
 
 
 def is_kmh(speed_mps: float, known_mps: float) -> bool:

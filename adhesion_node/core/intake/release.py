@@ -48,6 +48,8 @@ def _turn(gate: Gate, inbox: Inbox, waiting: tuple[Any, ...], forced: bool, unti
     anchor = waiting[0]
     begins = _begins(gate, inbox, anchor.t_ns)
     at_turn = inbox._replace(begun_ns=anchor.t_ns) if begins else inbox
+    if gate.tick_ns and _is_past(gate, inbox, anchor.t_ns):
+        return anchor
     if not _is_last(gate, inbox, anchor.t_ns):
         return None
     if isinstance(anchor, Measurement):  # complete as it is
@@ -131,7 +133,12 @@ def _is_due(gate: Gate, inbox: Inbox, tick_ns: int, near_ns: int) -> bool:
     """Whether no anchor can be expected that would take a tick's place, nor a sample of its time."""
     if _is_last(gate, inbox, tick_ns + near_ns) and not _lacks(gate, inbox, tick_ns):
         return True
+    return _is_past(gate, inbox, tick_ns + near_ns)
+
+
+def _is_past(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
+    """Whether by the stamps of all sensors nothing more can be expected of a time: as late as any of them has been."""
     late = (stream.lag_ns for stream in inbox.others.values() if stream.lag_ns <= gate.far_ns)
     wait_ns = gate.max_lag_ns + max((source.wait_ns for source in gate.sources), default=0)
     wait_ns = max(wait_ns, inbox.anchors.lag_ns, *late)
-    return inbox.now_ns is not None and inbox.now_ns >= tick_ns + near_ns + wait_ns
+    return inbox.now_ns is not None and inbox.now_ns >= t_ns + wait_ns

@@ -20,6 +20,8 @@ from . import qos
 from .diagnostics import Finding
 from .silence import Silence
 
+BY_SPEED = "no position: the train is followed by its speed alone, wherever it is on the track"
+
 
 class Listener(Protocol):
     """What a node does with what comes in."""
@@ -83,7 +85,11 @@ class Intake:
         # What happened to the watched topic stands until that is heard again: it may be why it is silent.
         self._events = {name: text for name, text in self._events.items() if name in self._watched}
         if self._silence.for_s is not None:
-            found.append(Finding(Severity.STALE, self._silent(self._silence.for_s)))
+            by_speed = (
+                self._reader.source is None and self.heard[topics.SPEED] > 0 and topics.POSITION in self._reader.anchors
+            )
+            text = BY_SPEED if by_speed else self._silent(self._silence.for_s)
+            found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
         clock, name = self._node.get_clock(), topics.CLOCK.name
@@ -95,7 +101,8 @@ class Intake:
     @property
     def _watched(self) -> list[str]:
         """The full names of what must not fall silent: of the anchor, before that is known of all that may be it."""
-        return [self._node.resolve_topic_name(topic.name) for topic in self._reader.watched]
+        source = self._reader.source
+        return [self._node.resolve_topic_name(one.name) for one in ((source,) if source else self._reader.anchors)]
 
     def _silent(self, for_s: float) -> str:
         names = self._watched
@@ -112,7 +119,7 @@ class Intake:
     def _receiver(self, topic: Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             self.heard[topic] += 1
-            if topic in self._reader.watched:
+            if topic in self._reader.anchors and self._reader.source in (None, topic):
                 self._silence.heard()
                 self._events.pop(self._node.resolve_topic_name(topic.name), None)
             try:

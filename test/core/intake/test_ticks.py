@@ -189,7 +189,7 @@ def test_a_buffered_history_at_the_start_silences_nothing(held: str, rate_hz: fl
     came = run(sensors, 60.0)
     assert came.positions >= (60.0 - held_s) * rate_hz - 2
     assert came.positions + came.outcomes.count(Outcome.LATE) == 60 * rate_hz
-    assert set(came.outcomes) <= {Outcome.LATE, Outcome.RESET}
+    assert set(came.outcomes) <= {Outcome.LATE, Outcome.RESET, Outcome.OVERTAKEN}
     assert came.longest_silence_s(60.0) <= max(held_s, 1.0)
 
 
@@ -211,4 +211,4 @@ def test_stamps_off_by_a_second_for_long_silence_nothing(name: str, ahead_s: flo
         came.positions + len([each for each in came.outcomes if each in (Outcome.LATE, Outcome.DUPLICATE)])
         == 100 * rate_hz
     )
-    assert set(came.outcomes) <= {Outcome.LATE, Outcome.DUPLICATE, Outcome.REPEATED}
+    assert set(came.outcomes) <= {Outcome.LATE, Outcome.DUPLICATE, Outcome.REPEATED, Outcome.OVERTAKEN}
