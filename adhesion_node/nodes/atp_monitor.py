@@ -84,7 +84,7 @@ class AtpMonitor(Node):
         self.heard[topics.STATE] += 1
         try:
             state = topics.STATE.read(message)
-            self._course = self._course.after(self._config, state)
+            self._course = self._course.after(state)
             complaint = self._course.complaint(self._config)
             self._state = Unavailable(complaint) if complaint else state
         except Rejected as refusal:

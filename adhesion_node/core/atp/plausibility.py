@@ -30,9 +30,9 @@ class Course(NamedTuple):
 
     states: tuple[TrainState, ...] = ()
 
-    def after(self, config: SupervisionConfig, state: TrainState) -> Course:
+    def after(self, state: TrainState) -> Course:
         """Take the next state in; a gap, or a time that does not go on, begins anew."""
-        if not self.states or not 0 < state.t_ns - self.states[-1].t_ns <= config.valid_for_s * NS_PER_S:
+        if not self.states or not 0 < state.t_ns - self.states[-1].t_ns <= COURSE_S * NS_PER_S:
             return Course((state,))
         kept = self.states
         if len(kept) > 1 and kept[-1].t_ns - kept[-2].t_ns < SPACING_S * NS_PER_S:

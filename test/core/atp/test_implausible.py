@@ -100,7 +100,7 @@ def complaints(place: Callable[[float], float], speed: Callable[[float], float],
     course, said = Course(), []
     for step in range(120):
         t = step / 2
-        course = course.after(CONFIG, TrainState(step * SECOND_NS // 2, place(t), speed(t), 0.2, std_mps))
+        course = course.after(TrainState(step * SECOND_NS // 2, place(t), speed(t), 0.2, std_mps))
         said.append(course.complaint(CONFIG))
     return said
 
@@ -143,11 +143,19 @@ def test_a_train_that_runs_back_or_against_its_speed_is_never_believed_again(
     assert all(said[latest:])
 
 
+def test_states_that_come_seldom_are_held_together_too() -> None:
+    """Each would expire before the next one comes: between, and with each of them, there must be no all-clear."""
+    course = Course()
+    for step in range(20):
+        course = course.after(TrainState(5 * step * SECOND_NS, -415.0 * step, 0.0, 0.2, 0.1))
+        assert ("the train runs back" in course.complaint(CONFIG)) == (step >= 2)
+
+
 def test_a_course_is_bounded_and_begins_anew_after_a_gap_or_a_jump_of_time() -> None:
     course = Course()
     for step in range(5000):
-        course = course.after(CONFIG, TrainState(step * SECOND_NS // 100, 0.5 * step, 50.0))
+        course = course.after(TrainState(step * SECOND_NS // 100, 0.5 * step, 50.0))
     assert COURSE_S / 0.5 <= len(course.states) <= COURSE_S / 0.4 + 2
     newest = course.states[-1].t_ns
-    for t_ns in (newest + 3 * SECOND_NS, newest, newest - 100 * SECOND_NS):
-        assert len(course.after(CONFIG, TrainState(t_ns, -1e6, 0.0)).states) == 1
+    for t_ns in (newest + 11 * SECOND_NS, newest, newest - 100 * SECOND_NS):
+        assert len(course.after(TrainState(t_ns, -1e6, 0.0)).states) == 1
