@@ -61,12 +61,12 @@ def goals(case: Case) -> tuple[Goal, ...]:
 
 
 def soonest(case: Case) -> float | None:
-    """When a patch could be found by a case's sensors, s; None: no patches, or too late to matter."""
-    return soonest_s(case.fitted, PATCH_USED, FOUND_SHARE) if case.rail == "patches" else None
+    """When the sensors of a case could find a patch at best, s; None: too late to matter."""
+    return soonest_s(case.fitted, PATCH_USED, FOUND_SHARE)
 
 
 def _found(case: Case) -> tuple[Goal, ...]:
-    bound_s = soonest(case)
+    bound_s = soonest(case) if case.rail == "patches" else None
     if bound_s is None:
         return ()
     at_once = case.fitted in AIDED or "wheels" in case.fitted

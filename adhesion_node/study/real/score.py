@@ -13,7 +13,8 @@ where at least half of the axle groups slid within the last 3 s, the *brake* whe
 - safe: the safe curve, and 5 m, are not shorter than the way that truly remained; where there is no curve nobody
   relies on one. Left out: what came before a fall of the rail by a quarter within 100 m, which lay ahead unseen, or
   within 2 s behind it; `safe_behind` leaves out the fall and the 2 s alone, `safe_everywhere` nothing;
-- shortfall and excess of the curve over remaining ways above 100 m, %, where `safe` counts;
+- shortfall and excess of the curve over remaining ways above 100 m, %: where `safe` counts, and for the excess also
+  behind the last rise of the rail, which is as unseen;
 - regimes: where adhesion limits, the shares that claim each; where the brake does, the share that claims that adhesion
   limits; `regime_wrong` where either claims the other, among both. COASTING claims nothing;
 - false changes: told while the rail had no border within 5 s, per hour;
@@ -103,7 +104,7 @@ def score(found: Found) -> dict[str, Any]:
 
 def of_run(found: Found) -> dict[str, float | None]:
     """Figures of one run."""
-    (run,), rows, falls = found.runs, found.rows, found.borders[found.borders["ratio"] < 1.0]
+    (run,), rows = found.runs, found.rows
     moving = rows["true_speed_mps"] > SLOWEST_MPS
     braked = rows[(rows["t_s"] >= run["built_s"]) & (rows["t_s"] < run["slow_s"]) & moving]
     limits, brake_limits = braked["slid"] >= LIMITS_FROM, braked["slid"] < BRAKE_BELOW
@@ -121,7 +122,7 @@ def of_run(found: Found) -> dict[str, float | None]:
         "coverage95": statistic(np.mean, np.abs(counted["mu"] - counted["used"]) <= TWO_SIDED_95 * counted["std"]),
         "bound_kept": statistic(np.mean, kept),
         "bound_kept_limited": statistic(np.mean, kept[limits]),
-        **_curves(braked, falls[falls["start_s"] < run["slow_s"]]),
+        **_curves(braked, found.borders[found.borders["start_s"] < run["slow_s"]]),
         **{
             f"limited_called_{regime.name.lower()}": statistic(np.mean, braked["regime"][limits] == regime.name)
             for regime in Regime
@@ -148,21 +149,23 @@ def _known(values: Array) -> Array:
     return values[~np.isnan(values)]
 
 
-def _curves(braked: Rows, falls: NDArray[np.void]) -> dict[str, float | None]:
+def _curves(braked: Rows, borders: NDArray[np.void]) -> dict[str, float | None]:
     """Figures of the safe curves."""
     t_s, length, way = braked["t_s"], braked["safe_m"], braked["remaining_m"]
+    falls = borders[borders["ratio"] < 1.0]
     behind = np.zeros(t_s.size, np.bool_)
     for fall in falls:
         behind |= (t_s >= fall["start_s"]) & (t_s < fall["end_s"] + UNSEEN_S)
-    seen = t_s >= np.max(falls["end_s"] + UNSEEN_S, initial=-np.inf)
+    seen, all_seen = (t_s >= np.max(some["end_s"] + UNSEEN_S, initial=-np.inf) for some in (falls, borders))
     holds = ~(length + TOLERANCE_M < way)  # true where there is no curve
-    longer = _known((length / np.maximum(way, TOLERANCE_M) - 1.0)[seen & (way > LONG_WAY_M)])
+    longer = 100.0 * (length / np.maximum(way, TOLERANCE_M) - 1.0)
+    long = way > LONG_WAY_M
     return {
         "safe": statistic(np.mean, holds[seen]),
         "safe_behind": statistic(np.mean, holds[~behind]),
         "safe_everywhere": statistic(np.mean, holds),
-        "shortfall_percent": statistic(lambda more: 100.0 * max(-np.min(more), 0.0), longer),
-        "excess_percent": statistic(lambda more: 100.0 * np.mean(more), longer),
+        "shortfall_percent": statistic(lambda more: max(-np.min(more), 0.0), _known(longer[seen & long])),
+        "excess_percent": statistic(np.mean, _known(longer[all_seen & long])),
         "no_safe_curve": statistic(np.mean, np.isnan(length)),
     }
 

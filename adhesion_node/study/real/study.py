@@ -14,10 +14,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..trial.running import add_running_options, running
 from ..trial.text import Column, lines
 from .cases import Case, chosen
-from .goals import missed, soonest
+from .goals import goals, missed, soonest
 from .score import score
 from .trials import found
 
@@ -92,9 +94,14 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
 
 
 def row(case: Case, scored: Mapping[str, Any]) -> dict[str, Any]:
-    """The row of a case: its figures, and by how much they miss the goals."""
+    """The row of a case: its figures, its goals, and by how much they are missed."""
+    ranges = {
+        goal.figure: [limit if np.isfinite(limit) else None for limit in (goal.least, goal.most)]
+        for goal in goals(case)
+    }
     named = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
-    return {**named, **scored, "found_soonest_s": soonest(case), "missed": missed(case, scored)}
+    bound = {"found_soonest_s": soonest(case)}
+    return {**named, **scored, **bound, "goals": ranges, "missed": missed(case, scored)}
 
 
 def _missed_lines(table: Iterable[Mapping[str, Any]]) -> Iterator[str]:

@@ -118,6 +118,15 @@ def test_before_an_unseen_fall_and_2_s_behind_it_nobody_can_know() -> None:
     assert one["safe_everywhere"] == pytest.approx(1 - 21 / COUNTED)
 
 
+def test_a_way_that_a_rise_makes_shorter_is_no_excess() -> None:
+    long = found(
+        borders=((20.0, 20.0, 0.5), (30.0, 31.0, 2.0)),
+        safe_m=lambda t: (60.0 - t) ** 2 / 2 * np.select([t < 22, t < 33], [0.5, 3.0], 1.1),
+    )
+    one = of_run(long)
+    assert (one["excess_percent"], one["shortfall_percent"]) == pytest.approx((10.0, 0.0))
+
+
 def test_regimes_are_wrong_where_they_claim_the_other_one() -> None:
     claimed = found(
         slid=lambda t: np.select([t < 20, t < 30], [0.0, 0.3], 1.0),
