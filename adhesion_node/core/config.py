@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 from functools import partial
 
+from .bank import BANK, SUMMARY
 from .methods import METHODS
 from .physics.adhesion import LAWS, SpeedLaw
 from .physics.motion import Motion
@@ -34,8 +35,8 @@ class Config:
     track: Track = LEVEL
     method: str = _method(
         "rail_condition",
-        "; ".join(f"{name}: {method.summary}" for name, method in METHODS.items()),
-        choices=tuple(METHODS),
+        "; ".join((f"{BANK}: {SUMMARY}", *(f"{name}: {method.summary}" for name, method in METHODS.items()))),
+        choices=(BANK, *METHODS),
     )
     law: str = _method(
         "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))
@@ -105,6 +106,9 @@ class Config:
     tolerance: float = _method(1e-6, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
     start_mu: float = _method(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
     confidence: float = _method(0.95, "One-sided confidence of the lower bound", low=0.5, high=0.9999)
+    curve_confidence: float = _method(
+        0.99, "Probability that the way to the standstill is not longer than the safe curve", low=0.5, high=0.9999
+    )
     position_noise_m: float = _motion(
         0.02, "Process noise of the position, standard deviation over 0.1 s", "m", 1e-6, 100.0
     )
@@ -160,6 +164,8 @@ class Config:
         "What brake_pressure tells: the pressure of one cylinder, the mean of all, or what is demanded of them",
         choices=("cylinder", "mean", "demanded"),
     )
+    estimate_s: float = _method(0.5, "Time between two estimates of the bank", "s", 0.0, 60.0)
+    brake_build_up_s: float = _brake(2.0, "Time in which the brake follows what is demanded of it", "s", 0.01, 60.0)
     assumed_pressure_pa: float = _brake(
         410e3, "Brake-cylinder pressure (gauge) taken where none is measured", "Pa", 0.0, 2e6
     )
@@ -170,6 +176,13 @@ class Config:
         0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
     )
     pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
+    brake_drift: float = _unsure(
+        0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
+    )
+    brake_ahead_std: float = _unsure(
+        0.03, "By how much the brake's force may differ over the speeds still ahead, relative", "", 0.0, 1.0
+    )
+    speed_scale_std: float = _unsure(0.005, "Standard deviation of the scale of measured speeds", "", 0.0, 0.5)
     grade_std: float = _unsure(
         0.0, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
@@ -178,6 +191,9 @@ class Config:
     rotating_mass_std: float = _unsure(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
     low_adhesion: str = _method(
         "snow", "Adhesion law to fall back to where nothing is known", choices=tuple(sorted(LAWS))
+    )
+    lowest_mu: float = _rail(
+        0.02, "Adhesion that is counted on where nothing is known; less is rare even on leaves", low=0.0, high=1.0
     )
     undecided_share: float = _rail(
         0.5, "Share of unknown_std above which a window has seen too little to tell what limits", low=0.0, high=10.0

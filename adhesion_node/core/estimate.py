@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
+from .bank import BANK
+from .bank.verdict import Ahead
 from .belief import tracker
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail, age, ignorance
@@ -43,6 +46,8 @@ class Estimate(NamedTuple):
     shape: SpeedLaw | None = None
     withheld: bool = False
     """Nothing is known of mu, not even by its age: it is the low-adhesion law's."""
+    ahead: Ahead | None = None
+    """What a safe curve may count on; None: `mu_lower`."""
 
 
 class Knowledge(NamedTuple):
@@ -63,7 +68,8 @@ class Knowledge(NamedTuple):
 
     def aged(self, config: Config, t_ns: int, belief: Gaussian) -> Rail:
         """The rail as it was known, aged to `t_ns` and the belief of (s, v); ignorance before the first window."""
-        nothing = ignorance(float(config.low_law(belief.mean[1])), config.unknown_std)
+        lowest = config.lowest_mu if config.method == BANK else math.inf
+        nothing = ignorance(float(config.low_law(belief.mean[1])), config.unknown_std, lowest)
         if self.rail is None:
             return nothing
         elapsed = (t_ns - self.t_ns) * 1e-9 / config.memory_s

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator
 
 from .config import Config
 from .estimate import Estimate
-from .following import follow, last_window
+from .following import follow, last_estimate
 from .intake import inbox as gate
 from .intake.outcome import Event, Outcome
 from .intake.pairing import Gate, Inbox, Matched, Source, Tick
@@ -34,7 +34,7 @@ def init(config: Config, seed: int) -> State:
     """State before the first measurement. Raises ValueError for a negative seed."""
     if seed < 0:
         raise ValueError(f"seed = {seed}: give an integer of at least 0")
-    return State(seed, gate_of(config), METHODS[config.method])
+    return State(seed, gate_of(config), METHODS.get(config.method))
 
 
 def gate_of(config: Config) -> Gate:
@@ -86,7 +86,7 @@ def settle(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
 def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
     state, estimates = _passed(config, state._replace(events=()), gate.drain(state.gate, state.inbox))
-    state, last = last_window(config, state)
+    state, last = last_estimate(config, state)
     return state, estimates + last
 
 
@@ -107,7 +107,7 @@ def _passed(config: Config, state: State, pushed: gate.Pushed) -> tuple[State, t
     before: tuple[Estimate, ...] = ()
     if any(event.outcome is Outcome.RESET for event in pushed.events):
         state, before = _take_all(config, state, pushed.ended)
-        state, last = last_window(config, state)
+        state, last = last_estimate(config, state)
         state, before = state.forgotten(), before + last
     state = state._replace(inbox=pushed.inbox).told(*pushed.events)
     state, estimates = _take_all(config, state, pushed.matched)

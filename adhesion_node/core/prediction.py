@@ -37,7 +37,9 @@ def predict(config: Config, estimate: Estimate) -> Prediction:
     cautious = replace(config.train, rigging_efficiency=max(config.train.rigging_efficiency * weakest, 1e-3))
     return Prediction(
         estimate,
-        _curve(cautious, estimate.speed_mps, estimate.mu_lower, resistance),
+        _curve(cautious, estimate.speed_mps, estimate.mu_lower, resistance)
+        if estimate.ahead is None
+        else _curve(config.train, estimate.speed_mps, estimate.ahead, resistance),
         None if estimate.withheld else _curve(config.train, estimate.speed_mps, _expected(estimate), resistance),
     )
 

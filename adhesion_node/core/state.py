@@ -8,6 +8,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from .bank.following import Memory
+from .bank.layout import SPEED
 from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge
 from .intake.outcome import NO_COUNTS, Event, Outcome, counted
@@ -22,8 +24,8 @@ class State(NamedTuple):
 
     seed: int
     gate: Gate
-    method: AnyMethod
-    """How the adhesion is identified; another value may be put here."""
+    method: AnyMethod | None
+    """How the adhesion is identified in a window; another value may be put here. None: by the bank."""
     counts: Mapping[Outcome, int] = NO_COUNTS
     events: tuple[Event, ...] = ()
     """What the sample that came last brought about, other than that samples were accepted."""
@@ -35,6 +37,8 @@ class State(NamedTuple):
     """Of (s, v) at the newest accepted measurement, from the tracker."""
     window: MethodWindow | None = None
     """The present braking; None while coasting or while the speed is not known."""
+    memory: Memory | None = None
+    """The bank's, where that identifies the adhesion."""
     knowledge: Knowledge = Knowledge()
     outliers: int = 0
     """Outliers in a row."""
@@ -56,6 +60,13 @@ class State(NamedTuple):
     def stuck(self) -> bool:
         """Whether the position sensor repeats itself while the train moves."""
         return self.unseen > 0
+
+    @property
+    def followed_mps(self) -> float:
+        """Speed that the train is believed to have, m/s; NaN where nothing is."""
+        if self.memory is not None:
+            return float(self.memory.bank.moments()[0][SPEED])
+        return math.nan if self.belief is None else float(self.belief.mean[1])
 
     def told(self, *events: Event) -> State:
         """The state after events, which are counted."""

@@ -23,9 +23,9 @@ class Rail(NamedTuple):
     lower: float
 
 
-def ignorance(low: float, std: float) -> Rail:
-    """Nothing is known: the low-adhesion law's value `low` with standard deviation `std`."""
-    return Rail(low, std, low)
+def ignorance(low: float, std: float, lowest: float = math.inf) -> Rail:
+    """Nothing is known: the low-adhesion law's value `low` with standard deviation `std`, but at least `lowest`."""
+    return Rail(low, std, min(low, lowest))
 
 
 def age(rail: Rail, nothing: Rail, elapsed: float) -> Rail:

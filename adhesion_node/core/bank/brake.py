@@ -1,0 +1,83 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What the brake does, by what is measured of it: pressure that the slide protection dumps is no released brake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..intake.samples import PressureSample
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+S = 1_000_000_000
+
+DUMP_PA, DUMP_SHARE, DUMP_NS = 60e3, 0.15, S // 2
+"""A fall of the pressure by so much, and by so much of what it was, within this time: no driver releases so fast."""
+
+HELD_NS = 4 * S
+"""So long behind a dump the brake counts as demanded as before."""
+
+EMPTY_NS = 3 * S // 2
+"""A cylinder that has been empty so long was released."""
+
+SLID_NS = 2 * S
+"""So long behind a dump axles have slid of late."""
+
+RISING_SHARE, RISING_NS = 0.1, S
+"""Of the full pressure within this time, is a brake that is being applied harder."""
+
+
+class BrakeSeen(NamedTuple):
+    """What is known of the brake; pressures are gauge."""
+
+    recent: tuple[PressureSample, ...] = ()
+    """Pressures of the last second."""
+    demanded_pa: float = 0.0
+    applied_pa: float = 0.0
+    """What the cylinders press with, on the mean, as far as is known."""
+    dumped_ns: int | None = None
+    """When the slide protection dumped last."""
+    full_ns: int = 0
+    """When the cylinder was last not empty."""
+
+    def after(self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None) -> BrakeSeen:
+        """Take in pressures, by their stamps, and what the handle or valve demands, if that is known."""
+        brake = self
+        for sample in pressures:
+            brake = brake._pressed(config, sample, demand_pa)
+        return brake
+
+    def _pressed(self, config: Config, sample: PressureSample, demand_pa: float | None) -> BrakeSeen:
+        t_ns, pressure = sample
+        recent = (*(each for each in self.recent if t_ns - RISING_NS <= each.t_ns < t_ns), sample)
+        empty = pressure < max(config.brake_threshold_pa, 1.0)
+        full_ns = self.full_ns if empty else t_ns
+        if config.pressure_kind == "demanded":
+            before_s = (t_ns - self.recent[-1].t_ns) / S if self.recent else 0.0
+            most = before_s * config.train.full_pressure_pa / config.brake_build_up_s
+            applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
+            return BrakeSeen(recent, pressure, applied, None, full_ns)
+        peak = max(_since(recent, t_ns - DUMP_NS))
+        dumped_ns = t_ns if peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak) else self.dumped_ns
+        dumping = dumped_ns is not None and t_ns - dumped_ns < HELD_NS and t_ns - full_ns < EMPTY_NS
+        demanded = demand_pa
+        if demanded is None:
+            demanded = max(self.demanded_pa, pressure) if dumping else pressure
+        elsewhere = config.pressure_kind == "cylinder" and dumping
+        return BrakeSeen(recent, demanded, demanded if elsewhere else pressure, dumped_ns if dumping else None, full_ns)
+
+    def has_slid(self, now_ns: int) -> bool:
+        """Whether the slide protection has been at work of late."""
+        return self.dumped_ns is not None and now_ns - self.dumped_ns < SLID_NS
+
+    @property
+    def rising(self) -> bool:
+        """Whether the brake is being applied harder."""
+        return len(self.recent) > 1 and self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa
+
+
+def _since(samples: Iterable[PressureSample], from_ns: int) -> list[float]:
+    return [each.pressure_pa for each in samples if each.t_ns >= from_ns]

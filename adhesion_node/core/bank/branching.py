@@ -1,0 +1,180 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""How hypotheses come and go: a braking opens and closes, the rail or the limit may have changed, the unlikely end.
+
+Hypotheses are never blended into each other while they differ: a rail that is smooth stays known as smooth. What may
+have changed is a new hypothesis beside the old one (multiple hypotheses, as in tracking), and evidence decides.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.special import ndtr
+
+from ..physics.train import Array
+from .kinds import FREE, FREE_STD, HELD, KINDS, SLIDES, SLIDING
+from .layout import BRAKE, MU, ROUGH, SPEED, Bank, joined
+from .motion import Braking, laws_of, resistance, use
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+LEAST, MOST = 1e-4, 40
+"""Probability below which a hypothesis ends, and how many there may be."""
+
+WIDE, SPLIT, SPLIT_STD = 0.3, (-1.1, -0.35, 0.35, 1.1), 0.45
+"""Adhesion known worse than to this share is divided into Gaussians so many standard deviations off its mean, each with
+this share of its standard deviation."""
+
+STRONG = 0.03
+"""Probability from which a hypothesis has others spring from it."""
+
+CHANGE_STD = 0.05
+"""By how much the adhesion may have changed, standard deviation."""
+
+CHANGE_S, BEND_S = 600.0, 60.0
+"""A rail changes abruptly once in that time, and how its adhesion depends on speed."""
+
+RISING_S, STEADY_S, REACHED_S = 5.0, 60.0, 2.0
+"""In such times axles begin to slide while the brake is applied harder, and while it is not; and adhesion that the
+brake no longer reaches lets them roll."""
+
+ALIKE, ALIKE_STD = 0.3, 1.4
+"""Hypotheses of one label say the same where speed and adhesion differ by less than this part of their standard
+deviations, and these by less than this factor."""
+
+
+def opened(config: Config, bank: Bank, mu: float, std: float, now_s: float) -> Bank:
+    """A braking begins on a rail that is known so: every law, every kind.
+
+    What is known badly is divided into parts that are narrow enough for each to know when its axles begin to slide.
+    """
+    split = std > WIDE * mu
+    parts = [bank.with_fresh(MU, mu, std).labelled(HELD, 0, now_s, math.log(KINDS[HELD].prior))]
+    for law, (_, probability) in enumerate(laws_of(config)):
+        for kind in SLIDING:
+            for step in SPLIT if split else (0.0,):
+                prior = KINDS[kind].prior * probability / (len(SPLIT) if split else 1)
+                if prior > 0.0:
+                    part = bank.with_fresh(MU, max(mu + step * std, 0.01), std * (SPLIT_STD if split else 1.0))
+                    part = part.with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
+                    parts.append(part.labelled(kind, law, now_s, math.log(prior)))
+    return joined(parts).normalised()
+
+
+def closed(bank: Bank) -> Bank:
+    """A braking ends: what it taught of train and sensors stays, one hypothesis for each way that positions err."""
+    parts = []
+    for noise in np.unique(bank.noise):
+        part = bank.part(bank.noise == noise)
+        mean, covariance = part.moments()
+        weight = np.array([np.logaddexp.reduce(part.log_weight)])
+        one = Bank(mean[None], covariance[None], weight, *(np.array([each]) for each in (noise, 0, FREE, 0.0, 0.0)))
+        parts.append(one.with_fresh(MU, 0.0, FREE_STD).with_fresh(ROUGH, 0.0, 0.0))
+    return joined(parts).normalised()
+
+
+def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed_s: float) -> Bank:
+    """With what may have become different within the last `elapsed_s`."""
+    strong = bank.weight > STRONG
+    children = [bank]
+    sliding, held = bank.part(strong & SLIDES[bank.kind]), bank.part(strong & (bank.kind == HELD))
+    if sliding.log_weight.size:
+        children += _changed(config, sliding, now_s, elapsed_s)
+        if braking.told <= 0.0:
+            children += _rolling(sliding, braking, now_s, elapsed_s)
+    if held.log_weight.size and braking.told >= 0.0:
+        children += _begun_to_slide(config, held, braking, now_s, elapsed_s)
+    return joined(children).normalised()
+
+
+def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> list[Bank]:
+    """The rail has changed, and maybe how its adhesion depends on speed; or that alone."""
+    covariance = sliding.covariance.copy()
+    covariance[:, MU, MU] += CHANGE_STD**2
+    now = np.full(sliding.log_weight.size, now_s)
+    other = sliding._replace(covariance=covariance, changed_s=now)
+    children = []
+    for law, (_, probability) in enumerate(laws_of(config)):
+        if probability > 0.0:
+            laws = np.full(now.size, law)
+            weight = sliding.log_weight + math.log(probability * elapsed_s)
+            children.append(other._replace(log_weight=weight - math.log(CHANGE_S), law=laws, born_s=now))
+            bent = sliding._replace(log_weight=weight - math.log(BEND_S), law=laws, born_s=now)
+            children.append(bent.part(sliding.law != law))
+    return children
+
+
+def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
+    """Adhesion has become more than the brake uses: likelier the nearer it was."""
+    found = []
+    for noise in np.unique(sliding.noise):
+        alike = sliding.part(sliding.noise == noise)
+        one = alike.part(np.array([np.argmax(alike.log_weight)]))
+        most = float(one.mean[0, BRAKE]) * braking.applied
+        spread = math.hypot(math.sqrt(one.covariance[0, MU, MU]), math.sqrt(one.covariance[0, BRAKE, BRAKE]) * most)
+        near = float(ndtr((one.mean[0, MU] - 0.98 * most) / max(spread, 1e-6)))
+        prior = elapsed_s * (1.0 / CHANGE_S + near / REACHED_S)
+        total = np.logaddexp.reduce(alike.log_weight) - one.log_weight
+        found.append(one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0))))
+    return found
+
+
+def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
+    """Adhesion has become less than the brake needs: mostly a little less."""
+    needed = use(config, held, braking, resistance(config, held)).value
+    rate = elapsed_s / (RISING_S if braking.rising else STEADY_S)
+    share = sum(KINDS[kind].prior for kind in SLIDING)
+    slipping = held.with_fresh(MU, 0.9 * needed, 0.2 * needed + 0.003)
+    return [
+        slipping.with_fresh(ROUGH, 0.0, KINDS[kind].roughness).labelled(
+            kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share)
+        )
+        for law, (_, probability) in enumerate(laws_of(config))
+        for kind in SLIDING
+        if probability > 0.0
+    ]
+
+
+def pruned(bank: Bank) -> Bank:
+    """Without the unlikely, and with what says the same said once."""
+    bank = _united(bank.part(bank.log_weight > math.log(LEAST)).normalised())
+    if bank.log_weight.size > MOST:
+        bank = bank.part(np.sort(np.argsort(-bank.log_weight, kind="stable")[:MOST]))
+    return bank.normalised()
+
+
+def _united(bank: Bank) -> Bank:
+    """Unite hypotheses of one label that say the same, the likelier one first."""
+    order = np.argsort(-bank.log_weight, kind="stable")
+    bank = bank.part(order)
+    same = (bank.noise[:, None] == bank.noise) & (bank.law[:, None] == bank.law) & (bank.kind[:, None] == bank.kind)
+    for component in (MU, SPEED):
+        std = np.sqrt(bank.covariance[:, component, component])
+        mean = bank.mean[:, component]
+        ratio = std / std[:, None]
+        same &= np.abs(mean - mean[:, None]) < ALIKE * std[:, None] + 1e-9
+        same &= (ratio < ALIKE_STD) & (ratio > 1.0 / ALIKE_STD)
+    gone = np.zeros(order.size, dtype=np.bool_)
+    mean, covariance, log_weight = bank.mean.copy(), bank.covariance.copy(), bank.log_weight.copy()
+    for index in range(order.size):
+        if gone[index]:
+            continue
+        group = same[index] & ~gone
+        group[:index] = False
+        if np.count_nonzero(group) > 1:
+            part = bank.part(group)
+            mean[index], covariance[index] = part.moments()
+            log_weight[index] = np.logaddexp.reduce(part.log_weight)
+            group[index] = False
+            gone |= group
+    return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight).part(~gone)
+
+
+def unlikely_kept(bank: Bank, least: float) -> Bank:
+    """With no hypothesis so unlikely that it could not come back."""
+    floor: Array = np.maximum(bank.normalised().log_weight, math.log(least))
+    return bank._replace(log_weight=floor).normalised()

@@ -1,0 +1,234 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""One measurement in its turn: the bank is moved on from sample to sample of all sensors, and takes each in."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..belief.rail import Rail
+from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
+from .brake import BrakeSeen
+from .branching import branched, closed, opened, pruned, unlikely_kept
+from .kinds import FREE, FREE_STD, NOISES, SLIDES
+from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
+from .motion import Braking, moved, slow_variance, white_variance
+from .seeing import acceleration_seen, corrected, not_slower, position_seen, speed_seen
+from .wheels import WheelsSeen, told
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+S = 1_000_000_000
+
+BRANCH_S = 0.5
+"""How often it is asked whether rail or limit have changed."""
+
+STEP_S = 0.2
+"""Longest step in time."""
+
+SPEED_ERROR_MPS = 0.03
+"""Of any measured speed, beside what its message tells."""
+
+CERTAIN = 0.97
+"""Probability from which a change of the rail is told."""
+
+WHEEL_SHARE = 0.008
+"""Error of the fastest rim's speed, relative."""
+
+UNLIKELY = 1e-3
+"""Probability below which a way that positions err is left out of a braking."""
+
+FORGOTTEN = 1e-5
+"""Least probability of how positions err while no brake is applied: sensors change."""
+
+PITCH_MEAN, PITCH_STD, BIAS_STD = 0.08, 0.08, 0.005
+"""Of an accelerometer: 0.3 to 1 degree under a full brake, 0.05 m/s^2."""
+
+
+class Memory(NamedTuple):
+    """What the bank remembers."""
+
+    bank: Bank
+    t_ns: int
+    declared_m: float
+    """Standard deviation that the last position declared."""
+    brake: BrakeSeen = BrakeSeen()
+    wheels: WheelsSeen = WheelsSeen()
+    braking: Braking = Braking(0.0)
+    since_s: float = 0.0
+    """Since it was last asked what has changed."""
+    known: Rail = Rail(0.0, 1.0, 0.0)
+    """The rail as it was known when the braking began."""
+    told_s: float = 0.0
+    """When the rail changed last, as far as it was told."""
+    changes: int = 0
+    """Changes of the rail told."""
+    seen: int = 0
+    """Measurements of the present braking; 0 while there is none."""
+
+    @property
+    def braked(self) -> bool:
+        """Whether a braking is open."""
+        return self.seen > 0
+
+
+def met(config: Config, measurement: Measurement) -> Memory:
+    """A train just met: its position is known, if it was measured, of its speed only how large it may be."""
+    count = len(NOISES)
+    declared = math.sqrt(measurement.variance_m2) if measurement.has_position else 1.0
+    mean = np.zeros((count, SIZE))
+    mean[:, POSITION] = measurement.position_m if measurement.has_position else 0.0
+    mean[:, SPEED], mean[:, BRAKE], mean[:, PITCH] = config.unknown_speed_mps, 1.0, PITCH_MEAN
+    priors = np.log([noise.prior for noise in NOISES])
+    labels = np.arange(count), np.zeros(count, np.intp), np.full(count, FREE), np.zeros(count), np.zeros(count)
+    bank = Bank(mean, np.zeros((count, SIZE, SIZE)), priors, *labels)
+    slow, white = slow_variance(bank, declared), white_variance(bank, declared)
+    variances = {
+        POSITION: white + slow if measurement.has_position else MAX_VARIANCE_M2,
+        SPEED: config.unknown_speed_mps**2,
+        MU: FREE_STD**2,
+        BRAKE: config.brake_error**2,
+        GRADE: config.grade_std**2,
+        OFFSET: slow,
+        BIAS: BIAS_STD**2,
+        PITCH: PITCH_STD**2,
+        SCALE: config.speed_scale_std**2,
+    }
+    for component, variance in variances.items():
+        bank.covariance[:, component, component] = variance
+    if measurement.has_position:
+        bank.covariance[:, POSITION, OFFSET] = bank.covariance[:, OFFSET, POSITION] = -slow
+    memory = Memory(bank.normalised(), measurement.t_ns - 1, declared)
+    return followed(config, memory, measurement._replace(variance_m2=math.inf), Rail(0.0, 1.0, 0.0))
+
+
+def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rail) -> Memory:
+    """The train followed up to a measurement, which is taken in; `rail` is known where a braking opens."""
+    pressures, speeds = _pressures(measurement), _speeds(config, measurement)
+    before_ns = memory.t_ns
+    for until_ns in _steps(before_ns, measurement.t_ns, (each.t_ns for each in speeds)):
+        memory = _moved(config, memory, until_ns)
+        since_ns, before_ns = before_ns, until_ns
+        now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
+        memory = memory._replace(bank=_felt(config, memory, now))
+        for speed in speeds:
+            if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
+                variance = config.speed_std_mps**2 if speed.variance is None else speed.variance
+                seen = speed_seen(memory.bank, speed.speed_mps, variance + SPEED_ERROR_MPS**2)
+                memory = memory._replace(bank=corrected(memory.bank, seen).normalised())
+        brake = memory.brake.after(
+            config, (each for each in pressures if since_ns < each.t_ns <= until_ns), measurement.demand_pa
+        )
+        memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
+    if measurement.has_position:
+        declared = math.sqrt(measurement.variance_m2)
+        seen = position_seen(memory.bank, measurement.position_m, declared)
+        memory = memory._replace(bank=corrected(memory.bank, seen).normalised(), declared_m=declared)
+    return _judged(config, _with_wheels(config, memory, measurement), rail)
+
+
+def apart(config: Config, memory: Memory, measurement: Measurement) -> float:
+    """Deviation of the measured position from what was foreseen, in standard deviations, by the hypothesis nearest."""
+    bank = _moved(config, memory, measurement.t_ns).bank
+    seen = position_seen(bank, measurement.position_m, math.sqrt(measurement.variance_m2))
+    return float(seen.apart(bank).min())
+
+
+def _steps(from_ns: int, to_ns: int, stamps: Iterable[int]) -> Iterator[int]:
+    """Ends of the steps up to a time: where speeds were measured, and no step too long."""
+    for until_ns in (*sorted({each for each in stamps if from_ns < each < to_ns}), to_ns):
+        count = max(math.ceil((until_ns - from_ns) / (STEP_S * S)), 1)
+        for index in range(1, count + 1):
+            yield from_ns + (until_ns - from_ns) * index // count
+        from_ns = until_ns
+
+
+def _moved(config: Config, memory: Memory, until_ns: int) -> Memory:
+    dt_s = (until_ns - memory.t_ns) / S
+    if dt_s <= 0.0:
+        return memory
+    bank = moved(config, memory.bank, dt_s, memory.braking, memory.declared_m)
+    return memory._replace(bank=bank, t_ns=until_ns, since_s=memory.since_s + dt_s)
+
+
+def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample]) -> Bank:
+    """Take in the mean of accelerations."""
+    if not felt:
+        return memory.bank
+    mean = sum(each.acceleration_mps2 for each in felt) / len(felt)
+    variances = [config.imu_std_mps2**2 if each.variance is None else each.variance for each in felt]
+    variance = sum(variances) / len(felt) ** 2
+    return corrected(memory.bank, acceleration_seen(config, memory.bank, mean, variance, memory.braking)).normalised()
+
+
+def _pressures(measurement: Measurement) -> tuple[PressureSample, ...]:
+    """Pressures since the measurement before; the demand, where none is measured."""
+    newest = measurement.demand_pa if measurement.brake_pressure_pa is None else measurement.brake_pressure_pa
+    return measurement.pressures or (() if newest is None else (PressureSample(measurement.t_ns, newest),))
+
+
+def _speeds(config: Config, measurement: Measurement) -> tuple[SpeedSample, ...]:
+    """Speeds since the measurement before."""
+    alone = measurement.speed_mps
+    return measurement.speeds or (() if alone is None else (SpeedSample(measurement.t_ns, alone),))
+
+
+def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> Braking:
+    """What the brake does from now on."""
+    share = memory.wheels.share(now_ns)
+    applied = config.train.specific_brake(brake.applied_pa)
+    return Braking(applied, 1.0 if share is None else share, brake.rising, told(share, brake.has_slid(now_ns)))
+
+
+def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
+    if not measurement.wheels:
+        return memory
+    mean, covariance = memory.bank.moments()
+    std, wheels = math.sqrt(covariance[SPEED, SPEED]), memory.wheels
+    bank = memory.bank
+    for sample in measurement.wheels:
+        wheels = wheels.after(config, sample, float(mean[SPEED]), std, memory.brake.demanded_pa > 0.0)
+    rim = wheels.fastest(config, measurement.wheels[-1])
+    if rim is not None and memory.braked and rim > config.slowest_mps:
+        error = WHEEL_SHARE * rim
+        bank = not_slower(bank, rim - error, error).normalised()
+    return memory._replace(wheels=wheels, bank=bank)
+
+
+def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
+    """Open or close a braking, ask what has changed, weigh what wheels and slide protection tell."""
+    bank, now_s = memory.bank, memory.t_ns / S
+    speed = float(bank.weight @ bank.mean[:, SPEED])
+    pressed = memory.brake.demanded_pa >= max(config.brake_threshold_pa, 1.0)
+    braked = pressed and speed >= config.slowest_mps
+    if braked and not memory.braked:
+        likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
+        return memory._replace(
+            bank=opened(config, likely, rail.mu, rail.std, now_s), since_s=0.0, seen=1, told_s=0.0, known=rail
+        )
+    if memory.braked and not braked:
+        return memory._replace(bank=closed(bank), seen=0)
+    if not memory.braked:
+        return memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
+    if memory.since_s >= BRANCH_S - 1e-6:
+        odds = memory.since_s * memory.braking.told
+        bank = bank._replace(log_weight=bank.log_weight + odds * SLIDES[bank.kind]).normalised()
+        bank = branched(config, bank, memory.braking, now_s, memory.since_s)
+        memory = memory._replace(since_s=0.0)
+    return _with_changes(memory._replace(bank=pruned(bank), seen=memory.seen + 1))
+
+
+def _with_changes(memory: Memory) -> Memory:
+    """Tell a change of the rail once it is certain."""
+    bank = memory.bank
+    later = bank.changed_s > memory.told_s + 1e-6
+    likely = float(bank.weight @ later)
+    if likely < CERTAIN:
+        return memory
+    when = float((bank.weight * later) @ bank.changed_s) / likely
+    return memory._replace(told_s=max(when, float(bank.changed_s[later].max())), changes=memory.changes + 1)

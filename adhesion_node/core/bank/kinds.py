@@ -1,0 +1,74 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What may limit the motion, how smooth the rail may be, and how positions may err: the labels of hypotheses."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Kind(NamedTuple):
+    """What limits the motion, and how steady it is."""
+
+    name: str
+    slides: bool
+    """Whether the adhesion limits."""
+    drift: float
+    """Of the adhesion at one speed, relative standard deviation over 1 s."""
+    roughness: float
+    """Of the rail over `ROUGHNESS_M`, relative standard deviation."""
+    restlessness_mps: float
+    """Standard deviation that unknown decelerations give the speed over 1 s."""
+    ripple: float
+    """Of the adhesion used about what the sensors can follow, as the slide protection works in turns; relative."""
+    prior: float
+    """Probability when a braking begins."""
+
+
+KINDS = (
+    Kind("free", False, 0.0, 0.0, 0.02, 0.0, 1.0),
+    Kind("brake", False, 0.0, 0.0, 0.03, 0.0, 0.55),
+    Kind("smooth", True, 0.001, 0.0, 0.018, 0.0, 0.15),
+    Kind("even", True, 0.003, 0.03, 0.035, 0.03, 0.15),
+    Kind("rough", True, 0.005, 0.07, 0.05, 0.04, 0.1),
+    Kind("restless", True, 0.02, 0.15, 0.07, 0.05, 0.05),
+)
+FREE, HELD = 0, 1
+SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
+
+SLIDES = np.array([kind.slides for kind in KINDS])
+DRIFT = np.array([kind.drift for kind in KINDS])
+ROUGHNESS = np.array([kind.roughness for kind in KINDS])
+RIPPLE = np.array([kind.ripple for kind in KINDS])
+RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
+
+ROUGHNESS_M, GRADE_M = 100.0, 1500.0
+"""Correlation lengths of the roughness and of a grade that no profile tells."""
+
+FREE_STD, FREE_S = 0.06, 5.0
+"""Net deceleration over g of a train that no brake holds, and how long it lasts: traction is unknown."""
+
+
+class Noise(NamedTuple):
+    """How measured positions err: a white part and a slow one, by the standard deviation that they declare."""
+
+    white: float
+    """White part over the declared one."""
+    least_white_m: float
+    slow: float
+    """Slow part over the declared one."""
+    least_slow_m: float
+    lasts_s: float
+    """Correlation time of the slow part."""
+    prior: float
+
+
+NOISES = (
+    Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
+    Noise(0.1, 0.05, 1.0, 1.0, 30.0, 0.2),
+    Noise(0.05, 0.05, 1.0, 1.0, 200.0, 0.2),
+    Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
+)
+LASTS = np.array([noise.lasts_s for noise in NOISES])
+WHITE = np.array([(noise.white, noise.least_white_m) for noise in NOISES])
+SLOW = np.array([(noise.slow, noise.least_slow_m) for noise in NOISES])

@@ -1,0 +1,90 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What the bank believes: under each hypothesis a Gaussian over train, rail and sensors, and its probability."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..physics.train import Array
+
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, PITCH, SCALE = range(10)
+"""Components of the state: position s, m; speed v, m/s; adhesion mu of the rail at that speed, or in free motion the
+net deceleration over g; roughness of the rail here, relative; true over expected brake force; grade that the profile
+leaves open, with the error of the resistance; slow error of the positions, m; bias of the accelerometer over g; its
+pitch per deceleration over g; scale error of the speeds."""
+
+SIZE = 10
+EACH = np.arange(SIZE)
+
+
+class Bank(NamedTuple):
+    """Beliefs under H hypotheses. The arrays are not changed in place once a bank is made."""
+
+    mean: Array
+    """Shape (H, SIZE)."""
+    covariance: Array
+    """Shape (H, SIZE, SIZE)."""
+    log_weight: Array
+    """Logarithms of the probabilities, shape (H,) as the following."""
+    noise: Indices
+    """How the positions err: index into `NOISES`."""
+    law: Indices
+    """How adhesion depends on speed: index into the laws of the configuration."""
+    kind: Indices
+    """What limits the motion: index into `KINDS`."""
+    born_s: Array
+    """When the hypothesis says that this began."""
+    changed_s: Array
+    """When it says that the rail changed last."""
+
+    @property
+    def weight(self) -> Array:
+        """Probabilities."""
+        result: Array = np.exp(self.log_weight)
+        return result
+
+    def normalised(self) -> Bank:
+        """With probabilities that sum to 1."""
+        return self._replace(log_weight=self.log_weight - np.logaddexp.reduce(self.log_weight))
+
+    def part(self, chosen: Mask | Indices) -> Bank:
+        """A copy of the chosen hypotheses, with the weights that they have."""
+        return Bank._make(column[chosen] for column in self)
+
+    def moments(self) -> tuple[Array, Array]:
+        """Mean and covariance over all hypotheses, shapes (SIZE,) and (SIZE, SIZE)."""
+        weight = np.exp(self.log_weight - np.logaddexp.reduce(self.log_weight))
+        mean = weight @ self.mean
+        apart = self.mean - mean
+        return mean, np.einsum("h,hij->ij", weight, self.covariance) + (apart.T * weight) @ apart
+
+    def with_fresh(self, component: int, mean: float | Array, std: float | Array) -> Bank:
+        """With a component that is known anew, apart from all others."""
+        means, covariance = self.mean.copy(), self.covariance.copy()
+        means[:, component] = mean
+        covariance[:, component, :] = covariance[:, :, component] = 0.0
+        covariance[:, component, component] = np.square(std)
+        return self._replace(mean=means, covariance=covariance)
+
+    def labelled(self, kind: int, law: int, born_s: float, log_prior: float | Array) -> Bank:
+        """As hypotheses of another label, their weights times a prior probability."""
+        size = self.log_weight.size
+        return self._replace(
+            log_weight=self.log_weight + log_prior,
+            law=np.full(size, law),
+            kind=np.full(size, kind),
+            born_s=np.full(size, born_s),
+        )
+
+
+def joined(banks: Iterable[Bank]) -> Bank:
+    """All hypotheses of the banks."""
+    return Bank._make(np.concatenate(columns) for columns in zip(*banks, strict=True))

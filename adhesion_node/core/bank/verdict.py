@@ -1,0 +1,153 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What the bank's hypotheses say together: what limits, the adhesion that is used, what may be counted on ahead."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from ..belief.gaussian import Gaussian
+from ..belief.rail import Rail
+from ..belief.regime import Regime
+from ..physics.train import GRAVITY, Array
+from . import kinds
+from .following import Memory, S
+from .layout import GRADE, MU, ROUGH, SPEED, Bank
+from .motion import Braking, laws_of, resistance, use
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+
+SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
+"""Parts of the present speed at which adhesion is foreseen."""
+
+BISECTIONS = 30
+
+BORNE_OUT_S, BORNE_OUT = 2.0, 0.1
+"""A change of the rail counts for the way ahead after so long, or once it is so probable."""
+
+
+class Ahead(NamedTuple):
+    """Adhesion, less what an unknown grade may take away, that the way to a standstill does not fall below."""
+
+    speed_mps: tuple[float, ...]
+    """Rising from 0 to the present speed."""
+    mu: tuple[float, ...]
+
+    def __call__(self, speed_mps: Array) -> Array:
+        """Adhesion at speeds, element by element."""
+        return np.asarray(np.interp(speed_mps, self.speed_mps, self.mu))
+
+    def at_least(self, mu: float) -> Ahead:
+        """No less than this."""
+        return self._replace(mu=tuple(max(each, mu) for each in self.mu))
+
+
+def constant(mu: float) -> Ahead:
+    """The same at any speed."""
+    return Ahead((0.0,), (max(mu, 0.0),))
+
+
+class Findings(NamedTuple):
+    """What is made of a bank."""
+
+    regime: Regime
+    rail: Rail
+    belief: Gaussian
+    """Of (s, v)."""
+    ahead: Ahead
+
+
+def found(config: Config, memory: Memory, before: Rail) -> Findings:
+    """Judge the bank; `before` is the rail as it was known, aged to now."""
+    bank = memory.bank
+    mean, covariance = bank.moments()
+    belief = Gaussian(mean[:2], covariance[:2, :2])
+    if not memory.braked:
+        return Findings(Regime.COASTING, before, belief, constant(before.lower))
+    used = use(config, bank, memory.braking, resistance(config, bank))
+    missed = 1.0 - config.confidence
+    wanted = (0.025, missed, 0.5, 0.975)
+    std = np.hypot(used.std(bank), kinds.RIPPLE[bank.kind] * used.value)
+    low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
+    rail = Rail(max(middle, 0.0), (high - low) / 3.92, min(max(bound, 0.0), max(middle, 0.0)))
+    ahead = counted_on(config, _borne_out(memory), 1.0 - config.curve_confidence, memory.braking)
+    if rail.std > config.undecided_share * config.unknown_std:
+        least = min(before.lower, memory.known.lower)
+        doubtful = rail._replace(lower=min(max(rail.lower, least), rail.mu))
+        return Findings(Regime.COASTING, doubtful, belief, ahead.at_least(least))
+    if _slides(memory, float(bank.weight @ used.slides)):
+        return Findings(Regime.ADHESION_LIMITED, rail, belief, ahead)
+    at_least = rail._replace(lower=min(max(memory.known.lower, rail.lower), rail.mu))
+    return Findings(Regime.BRAKE_LIMITED, at_least, belief, ahead)
+
+
+def _slides(memory: Memory, probability: float) -> bool:
+    """Whether adhesion limits: the wheels know best."""
+    share = memory.wheels.share(memory.t_ns)
+    if share is None or 0.05 <= share < 0.5:
+        return probability > 0.5
+    return share >= 0.5
+
+
+def _borne_out(memory: Memory) -> Bank:
+    """Without what has only just come to mind: that the rail may have changed this moment is always possible."""
+    bank = memory.bank
+    old = (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) | (bank.weight > BORNE_OUT)
+    return bank.part(old).normalised() if old.any() else bank
+
+
+def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> Ahead:
+    """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill.
+
+    What is known of roughness and grade here fades along the way, and the way takes the mean of them.
+    """
+    mean, used = bank.mean, use(config, bank, braking, resistance(config, bank))
+    sliding = used.slides
+    speed, resisting = np.maximum(mean[:, SPEED], 1.0), resistance(config, bank)
+    slowing = GRAVITY * np.maximum(used.value + resisting + mean[:, GRADE], 0.005)
+    way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
+    rough_kept, rough_added = _mean_ahead(way_m, kinds.ROUGHNESS_M)
+    grade_kept, grade_added = _mean_ahead(way_m, kinds.GRADE_M)
+    slope = used.slope.copy()
+    slope[:, ROUGH] *= rough_kept
+    slope[:, GRADE] = grade_kept
+    adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
+    roughness = kinds.ROUGHNESS[bank.kind] ** 2 * rough_added + kinds.DRIFT[bank.kind] ** 2 * time_s / 3.0
+    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + config.grade_std**2 * grade_added
+    variance += np.where(sliding, mean[:, MU] ** 2 * roughness, (config.brake_ahead_std * used.value) ** 2)
+    speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
+    by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
+    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0)
+    foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
+    low = quantiles(bank.weight, foreseen, np.sqrt(np.maximum(variance, 1e-12)) * rising, (missed,))[:, 0]
+    return Ahead(tuple(speeds.tolist()), tuple(np.maximum(low, 0.0).tolist()))
+
+
+def _mean_ahead(way_m: Array, length_m: float) -> tuple[Array, Array]:
+    """Of what fades over a length: what stays of it in the mean over a way, and what share of its variance is added."""
+    relative = way_m / length_m
+    kept = -np.expm1(-relative) / relative
+    spread = 2.0 / relative * (1.0 - kept)
+    return kept, np.maximum(spread - kept**2, 0.0)
+
+
+def quantiles(weights: Array, means: Array, stds: Array, probabilities: Sequence[float]) -> Array:
+    """Quantiles of mixtures of Gaussians by bisection.
+
+    `weights` has the shape (H,), `means` and `stds` (..., H); the result (..., P) for P probabilities.
+    """
+    wanted = np.array(probabilities)
+    size = (*means.shape[:-1], wanted.size)
+    low = np.broadcast_to((means - 8.0 * stds).min(axis=-1, keepdims=True), size)
+    high = np.broadcast_to((means + 8.0 * stds).max(axis=-1, keepdims=True), size)
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (low + high)
+        below = ndtr((middle[..., None] - means[..., None, :]) / stds[..., None, :]) @ weights < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))

@@ -1,0 +1,93 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What the wheels tell: which axles slide, each against its own radius, which is learnt while no brake is applied."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..intake.samples import WheelSample
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+S = 1_000_000_000
+
+SLID_NS, FRESH_NS = 3 * S, S
+"""An axle counts as sliding so long, as its protection lets it roll in between; so long may wheels not be heard."""
+
+LEARNT = 0.05
+"""Share of a new sample in what is learnt of a radius."""
+
+LEAST_LEARNT = 20
+"""Samples from which a radius is good for a speed."""
+
+UNLEARNT = 0.03
+"""Error of the radius of a wheel of which nothing was learnt: wear."""
+
+LEARNING_MPS, LEARNING_SHARE = 5.0, 0.02
+"""Radii are learnt from this speed on, where it is known to this share."""
+
+
+class WheelsSeen(NamedTuple):
+    """What is known of the axles."""
+
+    radius: tuple[float, ...] = ()
+    """True over expected radius of each."""
+    learnt: int = 0
+    """Samples from which they were learnt."""
+    slid_ns: tuple[int | None, ...] = ()
+    """When each was last seen to slide."""
+    heard_ns: int | None = None
+
+    def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
+        """Take in the speeds of all axles while the train's is known so."""
+        count = len(sample.speeds_radps)
+        wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, 0, (None,) * count)
+        rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
+        if speed_mps < LEARNING_MPS:
+            return wheels._replace(heard_ns=sample.t_ns)
+        if not braked:
+            return wheels._learning(rims, speed_mps, std_mps)._replace(heard_ns=sample.t_ns)
+        least = config.sliding_creep + 3.0 * std_mps / speed_mps + (0.0 if wheels.learnt else UNLEARNT)
+        slid = tuple(
+            sample.t_ns if 1.0 - radius * rim / speed_mps > least else before  # never true of NaN
+            for radius, rim, before in zip(wheels.radius, rims, wheels.slid_ns, strict=True)
+        )
+        return wheels._replace(slid_ns=slid, heard_ns=sample.t_ns)
+
+    def _learning(self, rims: list[float], speed_mps: float, std_mps: float) -> WheelsSeen:
+        if std_mps > LEARNING_SHARE * speed_mps:
+            return self
+        part = max(LEARNT, 1.0 / (self.learnt + 1))
+        radius = tuple(
+            before + part * (speed_mps / rim - before) if rim > 0.0 else before  # never true of NaN
+            for before, rim in zip(self.radius, rims, strict=True)
+        )
+        return self._replace(radius=radius, learnt=self.learnt + 1)
+
+    def fastest(self, config: Config, sample: WheelSample) -> float | None:
+        """Speed of the fastest rim, m/s; None while nothing was learnt of the radii."""
+        if self.learnt < LEAST_LEARNT or len(self.radius) != len(sample.speeds_radps):
+            return None
+        rims = (radius * each for radius, each in zip(self.radius, sample.speeds_radps, strict=True))
+        return max((rim for rim in rims if not math.isnan(rim)), default=0.0) * config.train.wheel_radius_m
+
+    def share(self, now_ns: int) -> float | None:
+        """Share of the axles that have slid of late; None where the wheels are not heard."""
+        if self.heard_ns is None or now_ns - self.heard_ns > FRESH_NS:
+            return None
+        slid = sum(each is not None and now_ns - each < SLID_NS for each in self.slid_ns)
+        return slid / max(len(self.slid_ns), 1)
+
+
+def told(share: float | None, dumping: bool) -> float:
+    """Log odds per second by which axles are known to slide: wheels say it, else the dumps of the slide protection.
+
+    >>> told(0.8, False), told(0.0, False), told(None, True), told(None, False)
+    (4.0, -4.0, 4.0, 0.0)
+    """
+    if share is None:
+        return 4.0 if dumping else 0.0
+    return 4.0 if share >= 0.25 else -4.0 if share < 0.05 else math.copysign(0.0, 1.0)

@@ -1,0 +1,79 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What one measurement does where the bank identifies the adhesion: it joins the belief; estimates come by time."""
+
+import math
+
+import numpy as np
+
+from .bank import following as bank
+from .bank.verdict import Findings, found
+from .belief.gaussian import Gaussian
+from .config import Config
+from .estimate import Estimate, estimate_of
+from .intake.outcome import Event, Outcome, counted
+from .intake.samples import Measurement
+from .methods.protocol import Fit, Verdict
+from .state import State
+
+
+def follow_banked(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
+    """Follow the train with a good measurement."""
+    memory, newest = state.memory, state.newest
+    if memory is None or newest is None:
+        return _accepted(config, state, measurement, bank.met(config, measurement))
+    if measurement.has_position:
+        apart = bank.apart(config, memory, measurement)
+        if apart > config.gate_sigma:
+            detail = f"position x = {measurement.position_m:.12g}, innovation {apart:.3g} standard deviations"
+            if state.outliers + 1 < config.max_outliers:
+                return state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail)), None
+            anew = state.forgotten()._replace(seen=state.seen, repeated=state.repeated, pace=state.pace)
+            anew = anew.told(Event(Outcome.RESET, detail))
+            return _accepted(config, anew, measurement, bank.met(config, measurement))
+    mean, _ = memory.bank.moments()
+    belief = Gaussian(mean[:2], np.zeros((2, 2)))
+    rail = state.knowledge.aged(config, measurement.t_ns, belief)
+    return _accepted(config, state, measurement, bank.followed(config, memory, measurement, rail))
+
+
+def _accepted(
+    config: Config, state: State, measurement: Measurement, memory: bank.Memory
+) -> tuple[State, Estimate | None]:
+    state = state._replace(
+        counts=counted(state.counts, Event(Outcome.ACCEPTED if measurement.has_position else Outcome.TICK)),
+        newest=measurement,
+        memory=memory,
+        outliers=0 if measurement.has_position else state.outliers,
+        since_estimate=state.since_estimate + 1,
+    )
+    since_s = math.inf if state.seen is None else (measurement.t_ns - state.seen.t_ns) * 1e-9
+    if since_s < config.estimate_s - 1e-3 or state.since_estimate < 2:
+        return state, None
+    return _told(config, state)
+
+
+def _told(config: Config, state: State) -> tuple[State, Estimate]:
+    newest, memory, knowledge = state.newest, state.memory, state.knowledge
+    assert newest is not None  # an estimate follows an accepted measurement
+    assert memory is not None
+    mean, covariance = memory.bank.moments()
+    belief = Gaussian(mean[:2], covariance[:2, :2])
+    findings = found(config, memory, knowledge.aged(config, newest.t_ns, belief))
+    verdict = _verdict(memory, findings)._replace(changed=memory.changes > knowledge.changes)
+    knowledge = knowledge.after(newest.t_ns, verdict)
+    estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(ahead=findings.ahead)
+    return state._replace(knowledge=knowledge, since_estimate=0, seen=estimate), estimate
+
+
+def _verdict(memory: bank.Memory, findings: Findings) -> Verdict:
+    fit = Fit(window=memory.seen, iterations=int(memory.braked), ess=float(1.0 / np.sum(memory.bank.weight**2)))
+    return Verdict(findings.regime, findings.rail, findings.belief, None, fit=fit)
+
+
+def last_banked(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
+    """What is known at the end of the data, or of a time."""
+    if state.memory is None or not state.since_estimate:
+        return state, ()
+    state, estimate = _told(config, state)
+    return state, (estimate,)
