@@ -6,7 +6,9 @@
 
 u = r omega is the rim's speed, m = J/r^2, R the running resistance with that of the grade. A rolling wheel is stiff
 (the slower the train the more), so every step takes F + (dF/dw)(dv - du) for F and solves for all du and dv at once:
-the matrix is an arrowhead. No sum runs across the trains, so none depends on those beside it.
+the matrix is an arrowhead. A wheel that regains the train's speed within a step would shoot over it, as the slope where
+it slides is not that where it rolls: it gets that of the chord, F/w. No sum runs across the trains, so none depends on
+those beside it.
 """
 
 from typing import NamedTuple
@@ -38,8 +40,13 @@ def step(
     """
     position, speed, rim = motion
     load = train.mass_kg * GRAVITY / rim.shape[1]
-    mu, slope = creep.adhesion(speed - rim, speed, rail)
+    sliding = speed - rim
+    mu, slope = creep.adhesion(sliding, speed, rail)
     force, slope = load * mu, load * slope
+    turning = step_s * (force - brake_n) / (train.wheel_kg + step_s * slope)
+    slope = np.where(
+        turning * np.sign(sliding) > np.abs(sliding), force / np.where(sliding == 0.0, 1.0, sliding), slope
+    )
     locked = (rim <= 0.0) & (force < brake_n)
     share = np.where(locked, 1.0, train.wheel_kg / (train.wheel_kg + step_s * slope))
     free, stiff = share * force + (1.0 - share) * brake_n, share * slope

@@ -49,8 +49,8 @@ class Scenario:
     way_m: float = 12e3
 
 
-def _dry(level: float = 0.30) -> Rail:
-    return Rail(steady(level), level_std=0.10)
+def _dry(level: float = 0.30, level_std: float = 0.10) -> Rail:
+    return Rail(steady(level), level_std=level_std)
 
 
 def _wet(level: float = 0.115) -> Rail:
@@ -76,7 +76,7 @@ SCENARIOS: Mapping[str, Scenario] = {
         _UNIT,
         replace(_UNIT, name="dry_pads_weak", scatter=Scatter(pads=-0.15)),
         replace(_UNIT, name="dry_mass_over", scatter=Scatter(mass=0.2)),
-        replace(_UNIT, name="dry_fast", nominal=HIGH_SPEED, speed_mps=300 * KMH),
+        replace(_UNIT, name="dry_fast", nominal=HIGH_SPEED, speed_mps=300 * KMH, rail=_dry(0.38, 0.05)),
         _WET,
         replace(_WET, name="wet_fast", nominal=HIGH_SPEED, speed_mps=250 * KMH),
         replace(_WET, name="wet_mass_over", scatter=Scatter(mass=0.2)),

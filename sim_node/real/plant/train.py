@@ -77,9 +77,9 @@ class Train(NamedTuple):
     """Rotating mass of a group, J/r^2."""
     radius_m: Array
     pad_n_per_pa: Array
-    """Brake force at the rim by cylinder pressure, at 0 speed where `fade` is 0."""
+    """Brake force at the rim by cylinder pressure, at half of `FADE_MPS`."""
     fade: Array
-    """Friction of the pads between 0 and 30 m/s grows by this share, and as much more above."""
+    """Friction of the pads grows by this share from 0 m/s to `FADE_MPS`, and no more above."""
     dump_s: Array
     """Time constant of the emptying cylinder."""
     rise_pa_per_s: Array
@@ -88,7 +88,7 @@ class Train(NamedTuple):
 
 
 FADE_MPS = 30.0
-"""The pads' friction is as the papers say, save for `Train.pad_n_per_pa`, at half this speed."""
+"""Speed up to which the pads' friction changes."""
 
 
 def draw(nominal: Nominal, scatter: Scatter, rng: np.random.Generator) -> Train:
@@ -133,7 +133,7 @@ def stack(trains: list[Train]) -> Train:
 
 def brake_n(train: Train, cylinder_pa: Array, speed_mps: Array) -> Array:
     """Return the brake force of the groups at their rims while the wheels turn."""
-    return train.pad_n_per_pa * (1.0 + train.fade * (speed_mps / FADE_MPS - 0.5)) * cylinder_pa
+    return train.pad_n_per_pa * (1.0 + train.fade * (np.minimum(speed_mps / FADE_MPS, 1.0) - 0.5)) * cylinder_pa
 
 
 def resistance_n(nominal: Nominal, train: Train, speed_mps: Array) -> Array:
