@@ -4,7 +4,7 @@
 
 ::
 
-    position, brake_pressure, speed, adhesion/*, atp/status, /diagnostics, truth/mu  ->  a page in the browser
+    position, fix, odometry, brake_pressure, speed, adhesion/*, atp/status, /diagnostics, truth/mu  ->  a page
 """
 
 import time
@@ -37,6 +37,9 @@ class Live(Node):
         self.view = View()
         for topic, take in self._inputs().items():
             qos.subscribe(self, topic, self._receiver(topic, take))
+        for topic in topics.POSITIONS:  # one as good as the other; where the train is the estimator says
+            if topic is not topics.POSITION:
+                qos.subscribe(self, topic, lambda _: self.view.heard(topics.POSITION, time.monotonic()))
         try:
             from .server import Server
         except ModuleNotFoundError as error:

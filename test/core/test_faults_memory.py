@@ -68,7 +68,7 @@ def unusable(pairs: Iterator[Pair]) -> Iterator[tuple[Sent, ...]]:
     for pressure, position in pairs:
         t_ns = pressure.t_ns
         bad = position._replace(t_ns=t_ns + S // 20, variance_m2=-1.0)
-        yield messages.position(t_ns, np.nan, 0.5), messages.position(t_ns, 1.0, 0.0), pressure, position, bad
+        yield messages.position(t_ns, np.nan, 0.5), messages.position(t_ns, 1.0, 1e5), pressure, position, bad
         yield (messages.brake_pressure(t_ns, np.inf, 0.0),)
 
 

@@ -31,6 +31,7 @@ from adhesion_node.core.physics.train import CRH3
 from adhesion_node.live.__main__ import main
 from adhesion_node.live.node import Live
 from adhesion_node.nodes.ros import qos
+from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
 pytest.importorskip("aiohttp", reason="the extra `live` is not installed")
@@ -116,6 +117,18 @@ def test_a_message_that_cannot_be_shown_is_said_and_shown_nowhere(
     spin_until(executor, lambda: live.view.parts(0.0)["inputs"][3]["state"] == "refused")
     assert "position x = nan" in live.view.parts(0.0)["inputs"][3]["why"]
     assert live.view.parts(0.0)["train"] is None
+
+
+@pytest.mark.parametrize("topic", [topics.FIX, topics.ODOMETRY], ids=lambda topic: topic.name)
+def test_every_source_of_the_position_is_heard(
+    live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil, topic: topics.Topic
+) -> None:
+    node = Node("receiver", context=context)
+    executor.add_node(node)
+    publisher = qos.advertise(node, topic, qos.SENSOR_PUBLISHER)
+    spin_until(executor, publisher.get_subscription_count)
+    publisher.publish(topic.build(new, 5 * S, (47.0, 8.0, 400.0), 1.0))
+    spin_until(executor, lambda: live.view.parts(time.monotonic())["inputs"][0]["state"] == "good")
 
 
 def test_only_what_changed_is_sent_again(live: Live) -> None:

@@ -141,6 +141,8 @@ def test_fixes_on_a_track_line_are_positions(
     line.hear_all()
     dropped = {key: value for key, value in line.values().items() if key.startswith("dropped.")}
     assert dropped == {"dropped.OFF_TRACK": "20", "dropped.OTHER_SOURCE": "1"}
+    assert line.values()["position_source"] == "fix"
+    assert "odometry" not in line.heard[topics.DIAGNOSTICS][-1].status[0].message, "a second source is no fault"
 
 
 def test_other_measurements_give_another_digest() -> None:

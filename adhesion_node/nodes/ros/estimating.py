@@ -123,7 +123,9 @@ class EstimatingNode(Node, Generic[P]):
         for suspect in self.pipeline.state.inbox.suspects:
             text = f"{type(suspect).__name__} of {suspect.t_ns * 1e-9:.12g} s is set aside until a second stamp agrees"
             found.append(Finding(Severity.WARN, text))
-        message = status_message(self._reported_ns, self._entry, found, self._kind.values(self.pipeline))
+        source = self._reader.source
+        chosen = {"position_source": source.name} if source in topics.POSITIONS else {}
+        message = status_message(self._reported_ns, self._entry, found, self._kind.values(self.pipeline) | chosen)
         self._send(topics.DIAGNOSTICS, message)
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:

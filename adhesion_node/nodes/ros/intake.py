@@ -126,7 +126,8 @@ class Intake:
                 sample = self._sample(topic, message)
             except Rejected as refusal:
                 self._listener.refuse(topic, refusal)
-                self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
+                if refusal.reason != Reason.OTHER_SOURCE.name:  # nothing is wrong: it is counted
+                    self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
             else:
                 self._newest_ns = sample.t_ns
                 for event in self._listener.take(sample):
