@@ -138,6 +138,7 @@ def test_fixes_on_a_track_line_are_positions(
     line.send(topics.ODOMETRY, topics.ODOMETRY.build(types.new, 3 * S, (0.0,), 1.0))
     line.estimator.close()
     assert line.estimator.latest.position_m == pytest.approx(11_117.0 + 19 * 2.5, abs=5.0)
+    line.estimator.report()
     line.hear_all()
     dropped = {key: value for key, value in line.values().items() if key.startswith("dropped.")}
     assert dropped == {"dropped.OFF_TRACK": "20", "dropped.OTHER_SOURCE": "1"}
