@@ -88,7 +88,7 @@ def _real() -> Iterator[tuple[str, ...]]:
     """Yield the scenarios of a real train beyond its usual scatter."""
     for name, scenario in SCENARIOS.items():
         forced = {"mass": scenario.scatter.mass, "pads": scenario.scatter.pads}
-        differs = [f"{what} {value:+.0%}" for what, value in forced.items() if value is not None]
+        differs = [f"{what} {value:+.0%}" for what, value in forced.items() if value]
         differs += ["rotating mass 8 %"] if scenario.scatter.rotating is not None else []
         differs += ["grade"] if scenario.grade is not LEVEL and not scenario.known_grade else []
         yield f"`{name}`", scenario.nominal.name, f"{scenario.speed_mps / KMH:.0f}", ", ".join(differs)

@@ -13,13 +13,17 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from itertools import count, pairwise
 from pathlib import Path
+from shutil import copytree
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 from rclpy.executors import SingleThreadedExecutor
+from scipy.ndimage import uniform_filter1d
 
 from sim_node.real import known
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
+from sim_node.real.sensors import centre_line
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.settings import SENSORS
 from sim_node.train.scenario import SCENARIOS
@@ -38,6 +42,7 @@ from ..report.table import table
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.score import Truth
+from ..wire.codecs import NS
 from ..wire.settings import setup_of
 from ..wire.topics import ATP_STATUS
 from .line import Pace, Task, executor_of_line, play
@@ -52,6 +57,12 @@ EXAMPLES = (
 
 SHOWN_EVERY_S = 5.0
 """Simulated time between two lines of progress."""
+
+TRACK_LINE = "track.geojson"
+"""File with the centre line of a real train's track, where it is fitted with `fix`."""
+
+TARGET_MPS2 = 0.3
+"""A real train's target to stop at: as far as this deceleration takes, or half of what its full brake should give."""
 
 TARGET_M, STOP_M = 8250.0, 9000.0
 """The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
@@ -132,16 +143,19 @@ def _run(
 ) -> int:
     """Play the scenario, call `ended`, evaluate the recording and report; the exit code."""
     output, started_s = _free(options.output), time.monotonic()
-    task = _task(options)
-    target_kmh, train = task.monitor["target_speed_kmh"], setup_of(task.estimator).config.train
-    played = play(executor, task, output / "bag", pace)
-    ended()
-    with BagReader(output / "bag") as reader:
-        result, run = _evaluate(reader, task), read_run(reader)
+    with TemporaryDirectory() as folder:  # a run that cannot begin leaves nothing behind
+        task = _task(options, Path(folder) / TRACK_LINE)
+        target_kmh, train = task.monitor["target_speed_kmh"], setup_of(task.estimator).config.train
+        played = play(executor, task, output / "bag", pace)
+        ended()
+        with BagReader(output / "bag") as reader:
+            result, run = _evaluate(reader, task), read_run(reader)
+        copytree(folder, output, dirs_exist_ok=True)
     truth = _true_bands(played.regimes, run)
     fitted = f", {options.sensors}" if options.scenario in REAL else ""
     draw(run, output / "run.png", f"{options.scenario}{fitted}, seed {options.seed}", target_kmh, train, truth)
-    result |= _told(truth, run)
+    if options.scenario in REAL:
+        result |= _found(truth, run)
     result |= {"live_digest": played.digest, "live_equals_offline": played.digest == result["digest"]}
     result |= {"bag": str(output / "bag"), "picture": str(output / "run.png")}
     result["seconds"] = round(time.monotonic() - started_s, 1)
@@ -149,13 +163,18 @@ def _run(
     return DONE if result["live_equals_offline"] else FAILED
 
 
-def _task(options: argparse.Namespace) -> Task:
-    """What the nodes are to do; a real train stops."""
+def _task(options: argparse.Namespace, line: Path) -> Task:
+    """What the nodes are to do; a real train stops. Where it is fitted with `fix`, the file `line` is written."""
     simulator = {"scenario": options.scenario, "sensors": options.sensors}
     if options.scenario in REAL:
         real = REAL[options.scenario]
-        monitor = {"target_position_m": real.way_m, "target_speed_kmh": 0.0}
-        return Task(options.seed, simulator, monitor, known.parameters(real, FITTED[options.sensors]))
+        stopping_m = real.speed_mps**2 / 2 / min(TARGET_MPS2, real.nominal.deceleration_mps2 / 2)
+        target_m = real.speed_mps * real.demands[-1][0] + stopping_m
+        estimator = known.parameters(real, FITTED[options.sensors])
+        if "fix" in FITTED[options.sensors].sensors:
+            line.write_text(centre_line.geojson(), encoding="utf-8")
+            estimator |= {"track_line": str(line), "track_start_m": centre_line.BEGINS_M}
+        return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": 0.0}, estimator)
     target_mps = SCENARIOS[options.scenario].end_speed_mps or 0.0
     target_m = TARGET_M if target_mps else STOP_M
     return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": target_mps / KMH})
@@ -168,14 +187,28 @@ def _true_bands(regimes: Sequence[tuple[int, str]], run: Run) -> list[Band]:
     return [Band(start_s, end_s, regime) for (start_s, end_s), (_, regime) in zip(times.tolist(), regimes, strict=True)]
 
 
-def _told(truth: Sequence[Band], run: Run) -> dict[str, float]:
-    """When adhesion first limited the train, s from the start, and how long after that an estimate says so."""
+def _found(truth: Sequence[Band], run: Run) -> dict[str, float]:
+    """When adhesion first limited the train, s, how long after that an estimate says so, and the error from then on.
+
+    The error is that of mu against the mean over 1 s of the adhesion used, while adhesion limits in truth.
+    """
     limited = Regime.ADHESION_LIMITED.name
-    begun_s = next((band.start_s for band in truth if band.regime == limited), None)
+    bands = [band for band in truth if band.regime == limited]
     said_s = run.seconds(run.regime.t_ns[run.regime.values == limited])
-    if begun_s is None or not (said_s >= begun_s).any():
+    said_s = said_s[said_s >= bands[0].start_s] if bands else said_s[:0]
+    if not said_s.size:
         return {}
-    return {"limited_from_s": begun_s, "told_after_s": float(said_s[said_s >= begun_s][0]) - begun_s}
+    steps = round(NS / float(np.median(np.diff(run.true_mu.t_ns))))
+    used = run.true_mu.map(lambda mu: uniform_filter1d(mu, steps)).at(run.mu.t_ns)
+    at_s = run.seconds(run.mu.t_ns)
+    counts = (at_s >= said_s[0]) & np.any([(at_s > band.start_s) & (at_s < band.end_s) for band in bands], axis=0)
+    error = float(np.mean(np.abs(run.mu.values[counts] / used[counts] - 1.0)))
+    begun_s = bands[0].start_s
+    return {
+        "limited_from_s": begun_s,
+        "told_after_s": float(said_s[0]) - begun_s,
+        "mean_relative_error_percent": 100.0 * error,
+    }
 
 
 def _said(result: dict[str, Any]) -> Iterator[str]:
@@ -205,8 +238,9 @@ def _say(text: str) -> None:
 def _evaluate(reader: BagReader, task: Task) -> dict[str, Any]:
     """Replay the demo's own recording offline, and sum up what the ATP monitor said."""
     selection = select(reader.topics)
-    pipeline, truth = Pipeline(setup_of(task.estimator).config, task.seed), Truth()
-    replayed = offline.replay(pipeline, truth, offline.messages(reader, selection))
+    setup, truth = setup_of(task.estimator), Truth()
+    pipeline = Pipeline(setup.config, task.seed)
+    replayed = offline.replay(pipeline, truth, offline.messages(reader, selection), setup.line)
     levels = read_status(reader, ATP_STATUS, "level").values.tolist()
     changes = [level for previous, level in pairwise(["", *levels]) if level != previous]
     return {**offline.summary(pipeline, replayed, truth), "atp": " > ".join(changes)}

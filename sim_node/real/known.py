@@ -32,9 +32,13 @@ def train(scenario: Scenario) -> Train:
 
 
 def parameters(scenario: Scenario, fitted: Fitted) -> dict[str, Any]:
-    """Return the estimator's parameters by name: train, known grades, and what its sensors are."""
+    """Return the estimator's parameters by name: train, known grades, and what its sensors are.
+
+    A fitted `fix` needs a file with the track's line beside them.
+    """
     grades = "; ".join(f"grade {one.start_m} {one.end_m} {one.rise_m}" for one in _grades(scenario))
-    return {f"train.{name}": value for name, value in asdict(train(scenario)).items()} | {"track": grades} | fitted.told
+    own = {f"train.{name}": value for name, value in asdict(train(scenario)).items()}
+    return own | {"assumed_pressure_pa": scenario.nominal.full_pa, "track": grades, **fitted.told}
 
 
 def track(scenario: Scenario) -> Track:

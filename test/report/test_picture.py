@@ -23,8 +23,9 @@ from adhesion_node.bag.types import serialize
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.physics.train import Train
 from adhesion_node.report import picture
-from adhesion_node.report.findings import distances
-from adhesion_node.report.run import Run, distance_to_target, read_run
+from adhesion_node.report.findings import distances, true_way
+from adhesion_node.report.run import Band, Run, distance_to_target, read_run
+from adhesion_node.report.series import NONE
 from adhesion_node.report.table import ROWS, table
 from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,
@@ -129,6 +130,30 @@ def test_the_truth_is_drawn_where_there_is_one(tmp_path: Path) -> None:
         picture.draw(read(record(tmp_path / name, *left_out)), path, "a run", 100.0)
         black.append(pixels_of(path, picture.BLACK))
     assert black[0] > black[1] + 500
+
+
+def test_what_truly_limited_stands_above_what_the_estimator_said(recorded: Run, tmp_path: Path) -> None:
+    path, truth = tmp_path / "run.png", [Band(0.0, 3.0, "BRAKE_LIMITED"), Band(3.0, 19.0, "ADHESION_LIMITED")]
+    picture.draw(recorded, path, "a run", 100.0, truth=truth)
+    strips = [pixels_of(path, picture.TRUE_SHADES[regime]) for regime in ("BRAKE_LIMITED", "ADHESION_LIMITED")]
+    assert strips[0] > 1000
+    assert strips[1] / strips[0] == pytest.approx(16.0 / 3.0, rel=0.3)
+
+
+def test_the_true_way_to_the_target_begins_where_the_last_braking_does(recorded: Run) -> None:
+    way = true_way(recorded, 50.0)  # reached after 15 s
+    assert way.t_ns.tolist() == [START_NS + second * S for second in range(16)]
+    assert way.values.tolist() == [975.0 - (80.0 * second - second**2) for second in range(16)]
+    released = np.array([second < 3 or 6 <= second < 10 or second == 12 for second in range(20)])
+    pressure = recorded.pressure._replace(values=np.where(released, 0.0, 410e3))
+    assert true_way(recorded._replace(pressure=pressure), 50.0).t_ns[0] == START_NS + 10 * S  # a dump is no release
+    for none in (recorded._replace(true_speed=NONE), recorded._replace(pressure=NONE), read_only_fast(recorded)):
+        assert not true_way(none, 50.0).t_ns.size
+
+
+def read_only_fast(run: Run) -> Run:
+    """The same run, cut before it is slow."""
+    return run._replace(true_speed=run.true_speed.map(lambda speed: speed + 100.0))
 
 
 def test_a_single_estimate_is_drawn(tmp_path: Path) -> None:

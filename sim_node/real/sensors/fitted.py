@@ -10,7 +10,7 @@ from typing import NamedTuple
 from adhesion_node.wire.topics import BRAKE_DEMAND, BRAKE_PRESSURE, SPEED
 
 from .imu import Imu
-from .position import Gnss, TachoPosition
+from .position import Gnss, GnssFix, TachoPosition
 from .pressure import CYLINDER, DEMANDED, MEAN, Pressure
 from .sensor import Sensor
 from .speed import DOPPLER, RADAR, TachoSpeed
@@ -55,6 +55,7 @@ def _pressure(of: str) -> dict[str, Mounted]:
 
 
 _WHITE = {"position": Mounted(Gnss(0.0, white_std_m=0.5), _BUS, "receiver")}
+_FIX = {"fix": Mounted(GnssFix(Gnss()), _RECEIVER, "receiver")}
 _TACHO = {"tacho": Mounted(TachoPosition(), _BUS, "tacho")}
 _DOPPLER = {"speed doppler": Mounted(DOPPLER, _RECEIVER, "receiver")}
 _RADAR = {"speed radar": Mounted(RADAR, _BUS, "radar")}
@@ -83,6 +84,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("gnss_1hz", "one fix in a second", _gnss(timing=replace(_RECEIVER, rate_hz=1.0)), _DEMANDED),
             ("gnss_late", "fixes 0.3 to 0.4 s late, the first 4 s at once", _gnss(timing=_LATE), _DEMANDED),
             ("gnss_stamps", "stamps off by 1 s for minutes", _gnss(timing=_STAMPS), _DEMANDED),
+            ("fix", "latitude and longitude on a track line, and the wheels", _FIX, _DEMANDED, _WHEELS),
             ("radar", "satellites and a radar", _gnss(), _DEMANDED, _RADAR),
             ("axle_speed", "satellites and the speed of an axle that slides", _gnss(), _DEMANDED, _AXLE),
             ("doppler_only", "the receiver's speed, no position", _DOPPLER, _DEMANDED),

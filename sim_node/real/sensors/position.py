@@ -15,9 +15,10 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from adhesion_node.core.setting import check_settings, setting
-from adhesion_node.wire.topics import POSITION, Topic
+from adhesion_node.wire.topics import FIX, POSITION, Topic
 
 from ..plant.journey import Array
+from .centre_line import places
 from .sensor import Measured, Ride, one, wander
 
 
@@ -41,9 +42,28 @@ class Gnss:
 
     def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
         """Measure the position, m."""
+        true = ride.at(time_s, ride.journey.position_m)
+        return one(true + self.errors(time_s, rng), (self.declared * self.std_m) ** 2)
+
+    def errors(self, time_s: Array, rng: np.random.Generator) -> Array:
+        """Draw the errors in one direction, m."""
         slow = wander(time_s, self.correlated_std_m, self.correlation_s, rng)
-        error = slow + self.white_std_m * rng.standard_normal(time_s.size)
-        return one(ride.at(time_s, ride.journey.position_m) + error, (self.declared * self.std_m) ** 2)
+        return slow + self.white_std_m * rng.standard_normal(time_s.size)
+
+
+@dataclass(frozen=True, slots=True)
+class GnssFix:
+    """The same receiver's latitude and longitude on the made-up track; it errs along it and beside it alike."""
+
+    topic: ClassVar[Topic] = FIX
+    gnss: Gnss
+
+    def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
+        """Measure latitude and longitude, degrees, and no height."""
+        along = self.gnss.measure(ride, time_s, rng)
+        beside = self.gnss.errors(time_s, rng)
+        latitude, longitude = places(along.values[:, 0], beside)
+        return Measured(np.column_stack([latitude, longitude, np.full_like(beside, np.nan)]), along.variance)
 
 
 @dataclass(frozen=True, slots=True)

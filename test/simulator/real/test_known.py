@@ -27,6 +27,7 @@ def test_parameters_make_the_same_train_and_track(name: str) -> None:
     assert setup.config.train == known.train(SCENARIOS[name])
     assert setup.config.track == known.track(SCENARIOS[name])
     assert setup.config.speed_source == "doppler"
+    assert setup.config.assumed_pressure_pa == SCENARIOS[name].nominal.full_pa
 
 
 def test_a_known_grade_has_its_slope() -> None:

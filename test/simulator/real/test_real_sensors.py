@@ -2,14 +2,18 @@
 
 """Every sensor of the real train against its own settings."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from rides import BRAKING_MPS2, CRUISE_S, GRADE, GROUPS, NOMINAL, PITCH_RAD, RADIUS_M, SLID, SPEED_MPS, ride
 
 from adhesion_node.core.physics.train import Array
+from adhesion_node.wire.track_file import read_track_line
 from sim_node.real.plant.journey import GRAVITY
+from sim_node.real.sensors.centre_line import BEGINS_M, geojson
 from sim_node.real.sensors.imu import Imu, specific_force
-from sim_node.real.sensors.position import Gnss, TachoPosition
+from sim_node.real.sensors.position import Gnss, GnssFix, TachoPosition
 from sim_node.real.sensors.pressure import CYLINDER, DEMANDED, MEAN, Pressure
 from sim_node.real.sensors.sensor import Sensor, wander
 from sim_node.real.sensors.speed import DOPPLER, RADAR, Speedometer, TachoSpeed
@@ -158,8 +162,23 @@ def test_an_accelerometer_errs_by_its_bias_that_walks_its_mounting_and_its_noise
 
 
 def test_every_sensor_repeats_itself_and_differs_by_seed() -> None:
-    sensors = (Gnss(), TachoPosition(), DOPPLER, RADAR, TachoSpeed(), Pressure(), Wheels(), Imu())
+    sensors = (Gnss(), GnssFix(Gnss()), TachoPosition(), DOPPLER, RADAR, TachoSpeed(), Pressure(), Wheels(), Imu())
     for sensor in sensors:
         first, again, other = (sensor.measure(RIDE, TIMES, _rng(seed)).values for seed in (1, 1, 2))
-        assert (first == again).all()
-        assert (first != other).any()
+        assert np.array_equal(first, again, equal_nan=True)
+        assert (first != other)[np.isfinite(first)].any()
+
+
+def test_fixes_lie_on_the_line_of_the_file_and_err_along_and_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "track.geojson").write_text(geojson())
+    line = read_track_line(str(tmp_path / "track.geojson"), BEGINS_M)
+    true = _true(RIDE.journey.position_m)
+    exact = GnssFix(Gnss(0.0, white_std_m=0.0)).measure(RIDE, TIMES, _rng())
+    found = [line.place(latitude, longitude, 1.0, 25.0) for latitude, longitude, _ in exact.values[::20]]
+    assert [place.along_m for place in found] == pytest.approx(true[::20], abs=0.05)
+    assert max(place.cross_m for place in found) < 0.01
+    shown = GnssFix(Gnss(2.0, 5.0, 0.1)).measure(RIDE, TIMES, _rng())
+    found = [line.place(latitude, longitude, 1.0, 25.0) for latitude, longitude, _ in shown.values[::5]]
+    assert np.std([place.along_m for place in found] - true[::5]) == pytest.approx(2.0, rel=0.3)
+    assert np.sqrt(np.mean([place.cross_m**2 for place in found])) == pytest.approx(2.0, rel=0.3)
+    assert shown.variance == pytest.approx(np.full(TIMES.size, 2.0**2 + 0.1**2))
