@@ -5,7 +5,8 @@
 An anchor waits until every other sensor that is there has come as far as its stamp, at most `wait_ns` by the anchors'
 own stamps, and until late anchors could have come. A tick stands `tick_ns` after what was released before, or a
 multiple of that where nothing has been measured in between. It waits until neither an anchor nor another sample of
-its time can be expected: as long as they were late so far, and never less than an anchor would wait for them.
+its time can be expected: as long as they were late so far, and never less than an anchor would wait for them. The very
+first one waits for the first anchor, which a network may hold back.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from collections.abc import Iterable
 from types import MappingProxyType
 from typing import Any
 
-from .pairing import Gate, Inbox, Matched, Source, Tick, each_of, is_present, value_of
+from .pairing import PRESENT_NS, Gate, Inbox, Matched, Source, Tick, each_of, is_present, value_of
 from .samples import Measurement
 
 NEAR_TICK = 5
@@ -140,5 +141,6 @@ def _is_past(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
     """Whether by the stamps of all sensors nothing more can be expected of a time: as late as any of them has been."""
     late = (stream.lag_ns for stream in inbox.others.values() if stream.lag_ns <= gate.far_ns)
     wait_ns = gate.max_lag_ns + max((source.wait_ns for source in gate.sources), default=0)
-    wait_ns = max(wait_ns, inbox.anchors.lag_ns, *late)
+    unheard_ns = PRESENT_NS if inbox.released_ns is None and inbox.anchors.newest_ns is None else 0
+    wait_ns = max(wait_ns, unheard_ns, inbox.anchors.lag_ns, *late)
     return inbox.now_ns is not None and inbox.now_ns >= t_ns + wait_ns
