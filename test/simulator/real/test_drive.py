@@ -12,6 +12,7 @@ from adhesion_node.wire.codecs import plain
 from adhesion_node.wire.topics import POSITION, SPEED, WHEEL_SPEED
 from sim_node.real.drive import START_S, sense
 from sim_node.real.sensors.fitted import FITTED
+from sim_node.real.sensors.position import Gnss
 from sim_node.train.sensors import SensorMessage
 
 RIDE = ride(cruise_s=20.0)
@@ -56,6 +57,17 @@ def test_a_late_receiver_sends_its_history_first_and_then_each_fix_late() -> Non
     assert [arrival_s for arrival_s, _ in sent[:35]] == [START_S + 4.0] * 35
     late = [arrival_s - stamp_s for arrival_s, stamp_s in sent[50:]]
     assert 0.3 <= min(late) < max(late) < 0.41
+
+
+def test_the_recorded_receivers_differ_as_two_on_a_train_did() -> None:
+    gnss = FITTED["gnss_recorded"].sensors["position"].sensor
+    assert isinstance(gnss, Gnss)
+    times = np.arange(0.0, 7200.0, 0.2)
+    errors = [[gnss.errors(times, np.random.default_rng([k, side])) for side in (0, 1)] for k in range(40)]
+    differences = np.diff(errors, axis=1)[:, 0]
+    over_60_s = differences[:, 300:] - differences[:, :-300]
+    assert differences.std() == pytest.approx(5.7, rel=0.1)
+    assert over_60_s.std() == pytest.approx(1.45, rel=0.05)
 
 
 def test_outages_leave_gaps_of_seconds() -> None:
