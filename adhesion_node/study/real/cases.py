@@ -5,18 +5,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from sim_node.real import known
 from sim_node.real.drive import Drive, sense
 from sim_node.real.plant.journey import Journey
 from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.plant.simulate import simulate
+from sim_node.real.sensors import centre_line
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
+from ...wire.codecs import NOMINAL, Line
+from ...wire.track_line import TrackLine, line_of
 from . import point_mass
 from .truth import USED_S
 
@@ -58,6 +63,11 @@ class Case(NamedTuple):
         return Config(train, known.track(scenario), assumed_pressure_pa=train.full_pressure_pa, **told)
 
     @property
+    def line(self) -> Line:
+        """What its reader knows of the line: where fixes are projected, the track's centre line."""
+        return Line(track=_centre_line()) if "fix" in FITTED[self.fitted].sensors else NOMINAL
+
+    @property
     def built_after_s(self) -> float:
         """Time from the full demand until the brake has built up everywhere, and the mean of used is all behind it."""
         if self.scenario == point_mass.NAME:
@@ -73,6 +83,12 @@ class Case(NamedTuple):
         return tuple(Drive(journey, sense(Ride(journey, nominal), FITTED[self.fitted])) for journey in journeys)
 
 
+@cache
+def _centre_line() -> TrackLine:
+    along_m = np.arange(centre_line.BEGINS_M, centre_line.ENDS_M, centre_line.STEP_M)
+    return line_of("the made-up track", *centre_line.places(along_m, 0.0 * along_m), None, centre_line.BEGINS_M)
+
+
 @lru_cache(maxsize=6)  # the cases of a scenario follow each other and differ in their sensors alone
 def _journeys(scenario: str, seeds: tuple[int, ...]) -> tuple[Journey, ...]:
     return simulate(SCENARIOS[scenario], seeds)
@@ -83,7 +99,7 @@ CASES = tuple(
     for scenario, sets in (
         (point_mass.NAME, "white"),
         ("wet", "white gnss gnss_wheels gnss_doppler gnss_imu radar doppler_only tacho axle_speed"),
-        ("wet", "gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
+        ("wet", "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
         ("wet_mass_over", "white gnss_wheels"),
         ("wet_pads_weak", "gnss_wheels"),
         ("wet_fast", "gnss_doppler"),
@@ -98,12 +114,12 @@ CASES = tuple(
         ("dry_fast", "gnss_wheels"),
         ("undulating_dry", "gnss_wheels"),
         ("sequence_dry", "gnss_doppler"),
-        ("leaves", "white gnss gnss_wheels gnss_imu gnss_outages one_cylinder one_cylinder_wheels"),
+        ("leaves", "white gnss gnss_recorded gnss_wheels gnss_imu gnss_outages one_cylinder one_cylinder_wheels"),
         ("leaves", "mean_cylinder mean_cylinder_wheels mean_cylinder_demand wheel_dropouts no_pressure full"),
         ("leaves_severe", "gnss_doppler"),
         ("downhill_leaves", "gnss_wheels"),
         ("salisbury", "gnss_doppler"),
-        ("patches", "gnss gnss_wheels full"),
+        ("patches", "gnss gnss_recorded gnss_wheels full"),
         ("patch_fall", "gnss_doppler"),
         ("metro_dry", "gnss_wheels"),
         ("metro_wet", "gnss_wheels"),

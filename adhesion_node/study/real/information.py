@@ -14,7 +14,7 @@ import numpy as np
 
 from sim_node.real.sensors.fitted import FITTED, Mounted
 from sim_node.real.sensors.imu import Imu
-from sim_node.real.sensors.position import Gnss
+from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
 
 from ...core.physics.train import GRAVITY, Array
@@ -45,7 +45,8 @@ def deceleration_std(parts: list[Array]) -> float:
 
 def _information(mounted: Mounted, after_s: float) -> Array | None:
     """Information about place, speed, deceleration before the step and its change; None: says nothing of them."""
-    sensor, t = mounted.sensor, np.arange(-BEFORE_S, after_s, 1.0 / mounted.timing.rate_hz)
+    sensor = mounted.sensor.gnss if isinstance(mounted.sensor, GnssFix) else mounted.sensor
+    t = np.arange(-BEFORE_S, after_s, 1.0 / mounted.timing.rate_hz)
     late, one = np.maximum(t, 0.0), np.ones_like(t)
     apart = np.abs(t[:, np.newaxis] - t)
     if isinstance(sensor, Gnss):

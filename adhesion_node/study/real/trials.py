@@ -16,6 +16,7 @@ from sim_node.real.drive import START_S, Drive
 from ...core import Config
 from ...core.physics.train import GRAVITY, Array
 from ...run.pipeline import Pipeline
+from ...wire.codecs import NOMINAL, Line
 from ...wire.topics import POSITION
 from ..trial.estimators import LaneResult, through
 from ..trial.running import Arrays, Running, run_all
@@ -74,9 +75,9 @@ class RealTrials(NamedTuple):
     def compute(self) -> Arrays:
         """Drive and estimate every seed."""
         started = time.perf_counter()
-        config = self.case.config
+        config, line = self.case.config, self.case.line
         drives = self.case.drives(range(self.first_seed, self.first_seed + self.seeds))
-        parts = [arrays(drive, config, self.case.built_after_s) for drive in drives]
+        parts = [arrays(drive, config, self.case.built_after_s, line) for drive in drives]
         together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         return {**together, "seconds": np.array([time.perf_counter() - started])}
 
@@ -116,10 +117,12 @@ def found(cases: Iterable[Case], first_seed: int, seeds: int, where: Running) ->
     }
 
 
-def arrays(drive: Drive, config: Config, built_after_s: float) -> Arrays:
+def arrays(drive: Drive, config: Config, built_after_s: float, line: Line = NOMINAL) -> Arrays:
     """Arrays of `ROW`, `RUN`, `BORDER` and `DROP` of one drive; the brake needs `built_after_s` to build up."""
     journey, seed = drive.journey, drive.journey.seed
-    result = through(Pipeline(config, seed), (Sent(at_s, (received(message),)) for at_s, message in drive.messages))
+    result = through(
+        Pipeline(config, seed), (Sent(at_s, (received(message, line),)) for at_s, message in drive.messages)
+    )
     braked = journey.time_s >= journey.full_from_s
     slow = journey.time_s[braked & (journey.speed_mps <= SLOWEST_MPS)]
     full_s, end_s = journey.full_from_s, float(journey.time_s[-1])

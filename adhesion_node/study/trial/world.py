@@ -17,7 +17,7 @@ from sim_node.train.sensors import SensorMessage, SensorSettings, Tick
 from ...core import Config, Measurement, Sample
 from ...core.estimator import paired
 from ...core.physics.train import Array
-from ...wire.codecs import Rejected, plain
+from ...wire.codecs import NOMINAL, Line, Rejected, plain
 
 PERIOD_S = 0.1
 """Of every published figure."""
@@ -99,10 +99,10 @@ def simulate(world: World, seed: int) -> SimulatedRun:
     return SimulatedRun(world, seed, tuple(sent), tuple(paired(Config(), samples)), born)
 
 
-def received(message: SensorMessage) -> Sample | Refusal:
+def received(message: SensorMessage, line: Line = NOMINAL) -> Sample | Refusal:
     """What the codecs make of a message."""
     try:
-        sample: Sample = message.topic.read(message.build(plain))
+        sample: Sample = message.topic.read(message.build(plain), line)
         return sample
     except Rejected as refusal:
         return Refusal(message.topic.name, refusal.reason)
