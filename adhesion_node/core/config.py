@@ -186,6 +186,9 @@ class Config:
     grade_std: float = _unsure(
         0.0, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
+    profile_std: float = _unsure(
+        0.001, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1
+    )
     mass_std: float = _unsure(0.0, "Standard deviation of the mass, relative", "", 0.0, 1.0)
     brake_std: float = _unsure(0.0, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
     rotating_mass_std: float = _unsure(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
@@ -249,6 +252,11 @@ class Config:
         """Standard deviation of the most that the brake can use, B/(M g), relative."""
         rotating = self.rotating_mass_std / (1.0 + self.train.rotating_mass_fraction)
         return math.hypot(self.mass_std, self.brake_std, rotating)
+
+    @property
+    def grade_error(self) -> float:
+        """Standard deviation of the grade, rise over run."""
+        return self.profile_std if self.track.sections else self.grade_std
 
     @property
     def motion(self) -> Motion:

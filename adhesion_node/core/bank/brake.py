@@ -74,6 +74,11 @@ class BrakeSeen(NamedTuple):
         return self.dumped_ns is not None and now_ns - self.dumped_ns < SLID_NS
 
     @property
+    def known(self) -> bool:
+        """Whether anything is measured of the brake."""
+        return bool(self.recent)
+
+    @property
     def rising(self) -> bool:
         """Whether the brake is being applied harder."""
         return len(self.recent) > 1 and self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa

@@ -93,7 +93,7 @@ def met(config: Config, measurement: Measurement) -> Memory:
         SPEED: config.unknown_speed_mps**2,
         MU: FREE_STD**2,
         BRAKE: config.brake_error**2,
-        GRADE: config.grade_std**2,
+        GRADE: config.grade_error**2,
         OFFSET: slow,
         BIAS: BIAS_STD**2,
         PITCH: PITCH_STD**2,
@@ -110,6 +110,8 @@ def met(config: Config, measurement: Measurement) -> Memory:
 def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rail) -> Memory:
     """The train followed up to a measurement, which is taken in; `rail` is known where a braking opens."""
     pressures, speeds = _pressures(measurement), _speeds(config, measurement)
+    if measurement.brake_pressure_pa is None and measurement.demand_pa is None:
+        memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
     for until_ns in _steps(before_ns, measurement.t_ns, (each.t_ns for each in speeds)):
         memory = _moved(config, memory, until_ns)

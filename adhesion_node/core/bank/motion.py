@@ -131,7 +131,7 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     noise[:, MU] = np.where(kind == FREE, kinds.FREE_STD**2 * (1.0 - free**2), drift)
     noise[:, ROUGH] = np.square(kinds.ROUGHNESS[kind]) * (1.0 - lasting[:, ROUGH] ** 2)
     noise[:, BRAKE] = config.brake_drift**2 * dt_s
-    noise[:, GRADE] = config.grade_std**2 * (1.0 - lasting[:, GRADE] ** 2)
+    noise[:, GRADE] = config.grade_error**2 * (1.0 - lasting[:, GRADE] ** 2)
     noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
     noise[:, BIAS] = BIAS_DRIFT**2 * dt_s
     return lasting, noise

@@ -28,6 +28,18 @@ SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
 
 BISECTIONS = 30
 
+TWO_SIDED_95 = 3.92
+"""Width of the 95 % interval of a Gaussian over its standard deviation."""
+
+SLOWING = 0.02
+"""Net deceleration over g from which a train of whose brake nothing is known brakes."""
+
+PARTIAL = 0.8
+"""Part of the full brake below which adhesion may be more than it shows: what was known before still holds."""
+
+BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
+"""Shares of sliding axles that leave no doubt, and the probability from which something is claimed without them."""
+
 BORNE_OUT_S, BORNE_OUT = 2.0, 0.1
 """A change of the rail counts for the way ahead after so long, or once it is so probable."""
 
@@ -68,31 +80,43 @@ def found(config: Config, memory: Memory, before: Rail) -> Findings:
     bank = memory.bank
     mean, covariance = bank.moments()
     belief = Gaussian(mean[:2], covariance[:2, :2])
-    if not memory.braked:
-        return Findings(Regime.COASTING, before, belief, constant(before.lower))
     used = use(config, bank, memory.braking, resistance(config, bank))
-    missed = 1.0 - config.confidence
-    wanted = (0.025, missed, 0.5, 0.975)
     std = np.hypot(used.std(bank), kinds.RIPPLE[bank.kind] * used.value)
+    wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
-    rail = Rail(max(middle, 0.0), (high - low) / 3.92, min(max(bound, 0.0), max(middle, 0.0)))
+    rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
+    if not memory.braked:
+        slows = not memory.brake.known and rail.mu > SLOWING
+        free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu))) if slows else before
+        return Findings(Regime.COASTING, free, belief, constant(before.lower))
     ahead = counted_on(config, _borne_out(memory), 1.0 - config.curve_confidence, memory.braking)
+    full = config.train.specific_brake(config.train.full_pressure_pa)
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, memory.known.lower)
         doubtful = rail._replace(lower=min(max(rail.lower, least), rail.mu))
         return Findings(Regime.COASTING, doubtful, belief, ahead.at_least(least))
-    if _slides(memory, float(bank.weight @ used.slides)):
-        return Findings(Regime.ADHESION_LIMITED, rail, belief, ahead)
-    at_least = rail._replace(lower=min(max(memory.known.lower, rail.lower), rail.mu))
-    return Findings(Regime.BRAKE_LIMITED, at_least, belief, ahead)
+    regime = _regime(config, memory, float(bank.weight @ used.slides), rail.mu)
+    if regime is not Regime.ADHESION_LIMITED and memory.braking.applied < PARTIAL * full:
+        rail = rail._replace(lower=min(max(memory.known.lower, rail.lower), rail.mu))
+        ahead = ahead.at_least(rail.lower)
+    return Findings(regime, rail, belief, ahead)
 
 
-def _slides(memory: Memory, probability: float) -> bool:
-    """Whether adhesion limits: the wheels know best."""
+def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
+    """What limits: the wheels know best; else nothing is claimed that a wrong brake could explain as well."""
     share = memory.wheels.share(memory.t_ns)
-    if share is None or 0.05 <= share < 0.5:
-        return probability > 0.5
-    return share >= 0.5
+    if share is not None and not BRAKE_BELOW <= share < SLIDES_FROM:
+        return Regime.ADHESION_LIMITED if share >= SLIDES_FROM else Regime.BRAKE_LIMITED
+    demanded = config.train.specific_brake(memory.brake.demanded_pa)
+    part, error = mu / max(demanded, 1e-6), config.brake_error
+    if slides > CLAIMED and (part < 1.0 - 2.0 * error or memory.braking.told > 0.0):
+        return Regime.ADHESION_LIMITED
+    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.specific_brake(
+        config.train.full_pressure_pa
+    )
+    if slides < 1.0 - CLAIMED and part > 1.0 - error and not dumps:
+        return Regime.BRAKE_LIMITED
+    return Regime.COASTING
 
 
 def _borne_out(memory: Memory) -> Bank:
@@ -119,7 +143,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> A
     slope[:, GRADE] = grade_kept
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
     roughness = kinds.ROUGHNESS[bank.kind] ** 2 * rough_added + kinds.DRIFT[bank.kind] ** 2 * time_s / 3.0
-    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + config.grade_std**2 * grade_added
+    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + config.grade_error**2 * grade_added
     variance += np.where(sliding, mean[:, MU] ** 2 * roughness, (config.brake_ahead_std * used.value) ** 2)
     speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])

@@ -23,6 +23,9 @@ LEARNT = 0.05
 LEAST_LEARNT = 20
 """Samples from which a radius is good for a speed."""
 
+UNEQUAL = 0.01
+"""By how much wheels of unknown wear may differ, beside creep."""
+
 UNLEARNT = 0.03
 """Error of the radius of a wheel of which nothing was learnt: wear."""
 
@@ -39,23 +42,33 @@ class WheelsSeen(NamedTuple):
     """Samples from which they were learnt."""
     slid_ns: tuple[int | None, ...] = ()
     """When each was last seen to slide."""
-    heard_ns: int | None = None
+    rolled_ns: tuple[int | None, ...] = ()
+    """When each was last seen to roll."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
-        """Take in the speeds of all axles while the train's is known so."""
-        count = len(sample.speeds_radps)
-        wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, 0, (None,) * count)
+        """Take in the speeds of all axles while the train's is known so.
+
+        An axle slides where it is slower than the train, or than the fastest axle: a train is not slower than that. It
+        rolls where neither can be.
+        """
+        count, nothing = len(sample.speeds_radps), (None,) * len(sample.speeds_radps)
+        wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, 0, nothing, nothing)
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         if speed_mps < LEARNING_MPS:
-            return wheels._replace(heard_ns=sample.t_ns)
+            return wheels
         if not braked:
-            return wheels._learning(rims, speed_mps, std_mps)._replace(heard_ns=sample.t_ns)
-        least = config.sliding_creep + 3.0 * std_mps / speed_mps + (0.0 if wheels.learnt else UNLEARNT)
-        slid = tuple(
-            sample.t_ns if 1.0 - radius * rim / speed_mps > least else before  # never true of NaN
-            for radius, rim, before in zip(wheels.radius, rims, wheels.slid_ns, strict=True)
-        )
-        return wheels._replace(slid_ns=slid, heard_ns=sample.t_ns)
+            return wheels._learning(rims, speed_mps, std_mps)
+        rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
+        fastest = max((rim for rim in rims if not math.isnan(rim)), default=0.0)
+        unsure = 3.0 * std_mps / speed_mps + (0.0 if wheels.learnt else UNLEARNT)
+        by_train, by_fastest = ([1.0 - rim / most for rim in rims] for most in (speed_mps, max(fastest, 1e-6)))
+        slid, rolled = list(wheels.slid_ns), list(wheels.rolled_ns)
+        for axle, (creep, behind) in enumerate(zip(by_train, by_fastest, strict=True)):  # never true of NaN
+            if creep > config.sliding_creep + unsure or behind > config.sliding_creep + UNEQUAL:
+                slid[axle] = sample.t_ns
+            elif creep + unsure < 2.0 * config.sliding_creep:
+                rolled[axle] = sample.t_ns
+        return wheels._replace(slid_ns=tuple(slid), rolled_ns=tuple(rolled))
 
     def _learning(self, rims: list[float], speed_mps: float, std_mps: float) -> WheelsSeen:
         if std_mps > LEARNING_SHARE * speed_mps:
@@ -75,11 +88,11 @@ class WheelsSeen(NamedTuple):
         return max((rim for rim in rims if not math.isnan(rim)), default=0.0) * config.train.wheel_radius_m
 
     def share(self, now_ns: int) -> float | None:
-        """Share of the axles that have slid of late; None where the wheels are not heard."""
-        if self.heard_ns is None or now_ns - self.heard_ns > FRESH_NS:
-            return None
-        slid = sum(each is not None and now_ns - each < SLID_NS for each in self.slid_ns)
-        return slid / max(len(self.slid_ns), 1)
+        """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
+        slid = [each is not None and now_ns - each < SLID_NS for each in self.slid_ns]
+        rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
+        known = sum(one or other for one, other in zip(slid, rolled, strict=True))
+        return sum(slid) / known if known and 2 * known >= len(slid) else None
 
 
 def told(share: float | None, dumping: bool) -> float:
