@@ -10,7 +10,7 @@ from .bank import following as bank
 from .bank.verdict import Findings, found
 from .belief.gaussian import Gaussian
 from .config import Config
-from .estimate import Estimate, estimate_of
+from .estimate import Estimate, estimate_of, unknown
 from .intake.outcome import Event, Outcome, counted
 from .intake.samples import Measurement
 from .methods.protocol import Fit, Verdict
@@ -22,6 +22,9 @@ def follow_banked(config: Config, state: State, measurement: Measurement) -> tup
     memory, newest = state.memory, state.newest
     if memory is None or newest is None:
         return _accepted(config, state, measurement, bank.met(config, measurement))
+    if measurement.has_position and memory.misled:
+        detail = f"position x = {measurement.position_m:.12g}"
+        state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
     if measurement.has_position:
         apart = bank.apart(config, memory, measurement)
         if apart > config.gate_sigma:
@@ -48,7 +51,7 @@ def _accepted(
         since_estimate=state.since_estimate + 1,
     )
     since_s = math.inf if state.seen is None else (measurement.t_ns - state.seen.t_ns) * 1e-9
-    if since_s < config.estimate_s - 1e-3 or state.since_estimate < 2:
+    if since_s < config.estimate_s - 1e-3 or (state.seen is None and state.since_estimate < 2):
         return state, None
     return _told(config, state)
 
@@ -59,10 +62,13 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     assert memory is not None
     mean, covariance = memory.bank.moments()
     belief = Gaussian(mean[:2], covariance[:2, :2])
-    findings = found(config, memory, knowledge.aged(config, newest.t_ns, belief))
+    nothing = unknown(config, float(mean[1]))
+    findings = found(config, memory, knowledge.aged(config, newest.t_ns, belief), nothing)
     verdict = _verdict(memory, findings)._replace(changed=memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict)
-    estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(ahead=findings.ahead)
+    estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(
+        ahead=findings.ahead, withheld=memory.misled
+    )
     return state._replace(knowledge=knowledge, since_estimate=0, seen=estimate), estimate
 
 

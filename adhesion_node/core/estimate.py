@@ -68,8 +68,7 @@ class Knowledge(NamedTuple):
 
     def aged(self, config: Config, t_ns: int, belief: Gaussian) -> Rail:
         """The rail as it was known, aged to `t_ns` and the belief of (s, v); ignorance before the first window."""
-        lowest = config.lowest_mu if config.method == BANK else math.inf
-        nothing = ignorance(float(config.low_law(belief.mean[1])), config.unknown_std, lowest)
+        nothing = unknown(config, float(belief.mean[1]))
         if self.rail is None:
             return nothing
         elapsed = (t_ns - self.t_ns) * 1e-9 / config.memory_s
@@ -86,6 +85,12 @@ class Knowledge(NamedTuple):
             t_ns=t_ns,
             position_m=float(verdict.belief.mean[0]),
         )
+
+
+def unknown(config: Config, speed_mps: float) -> Rail:
+    """What is known of any rail at a speed."""
+    lowest = config.lowest_mu if config.method == BANK else math.inf
+    return ignorance(float(config.low_law(np.asarray(speed_mps))), config.unknown_std, lowest)
 
 
 def judge(

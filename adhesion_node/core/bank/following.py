@@ -17,6 +17,7 @@ from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kinds import FREE, FREE_STD, NOISES, SLIDES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
 from .motion import Braking, moved, slow_variance, white_variance
+from .plausible import Course
 from .seeing import acceleration_seen, corrected, not_slower, position_seen, speed_seen
 from .wheels import WheelsSeen, told
 
@@ -33,6 +34,9 @@ STEP_S = 0.2
 
 SPEED_ERROR_MPS = 0.03
 """Of any measured speed, beside what its message tells."""
+
+PAST_NS = 4 * S
+"""How far back it can go."""
 
 CERTAIN = 0.97
 """Probability from which a change of the rail is told."""
@@ -68,6 +72,11 @@ class Memory(NamedTuple):
     """When the rail changed last, as far as it was told."""
     changes: int = 0
     """Changes of the rail told."""
+    course: Course = Course()
+    past: tuple[tuple[int, Bank], ...] = ()
+    """Beliefs of some seconds ago, to go back to where positions turn out to be wrong."""
+    misled: bool = False
+    """Whether the positions are those of a sliding wheel: they are left out until the brake is released."""
     seen: int = 0
     """Measurements of the present braking; 0 while there is none."""
 
@@ -127,10 +136,12 @@ def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rai
             config, (each for each in pressures if since_ns < each.t_ns <= until_ns), measurement.demand_pa
         )
         memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
-    if measurement.has_position:
+    if measurement.has_position and not memory.misled:
         declared = math.sqrt(measurement.variance_m2)
         seen = position_seen(memory.bank, measurement.position_m, declared)
-        memory = memory._replace(bank=corrected(memory.bank, seen).normalised(), declared_m=declared)
+        course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
+        bank = corrected(memory.bank, seen).normalised()
+        memory = memory._replace(bank=bank, declared_m=declared, course=course)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 
@@ -207,6 +218,8 @@ def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
     bank, now_s = memory.bank, memory.t_ns / S
     speed = float(bank.weight @ bank.mean[:, SPEED])
     pressed = memory.brake.demanded_pa >= max(config.brake_threshold_pa, 1.0)
+    if memory.misled:
+        return memory if pressed else _led_again(memory)
     braked = pressed and speed >= config.slowest_mps
     if braked and not memory.braked:
         likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
@@ -218,11 +231,31 @@ def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
     if not memory.braked:
         return memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
     if memory.since_s >= BRANCH_S - 1e-6:
+        if memory.course.is_impossible(config, bank, memory.declared_m):
+            return _misled(config, memory)
         odds = memory.since_s * memory.braking.told
         bank = bank._replace(log_weight=bank.log_weight + odds * SLIDES[bank.kind]).normalised()
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
-        memory = memory._replace(since_s=0.0)
+        kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
+        memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
     return _with_changes(memory._replace(bank=pruned(bank), seen=memory.seen + 1))
+
+
+def _misled(config: Config, memory: Memory) -> Memory:
+    """The positions were those of a sliding wheel: go back to before, and on without them, whatever the brake does."""
+    t_ns, bank = memory.past[0] if memory.past else (memory.t_ns, memory.bank)
+    half = 0.5 * config.train.specific_brake(memory.brake.demanded_pa)
+    before = memory._replace(bank=closed(bank).with_fresh(MU, half, half), t_ns=t_ns, seen=0, past=())
+    ahead = before
+    for until_ns in _steps(t_ns, memory.t_ns, ()):
+        ahead = _moved(config, ahead, until_ns)
+    return ahead._replace(misled=True, since_s=0.0)
+
+
+def _led_again(memory: Memory) -> Memory:
+    """The brake is released, no wheel slides any more: positions count again, wherever they say that the train is."""
+    bank = memory.bank.with_fresh(POSITION, memory.bank.mean[:, POSITION], math.sqrt(MAX_VARIANCE_M2))
+    return memory._replace(bank=bank, misled=False, course=Course())
 
 
 def _with_changes(memory: Memory) -> Memory:

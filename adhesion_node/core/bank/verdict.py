@@ -75,11 +75,13 @@ class Findings(NamedTuple):
     ahead: Ahead
 
 
-def found(config: Config, memory: Memory, before: Rail) -> Findings:
-    """Judge the bank; `before` is the rail as it was known, aged to now."""
+def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findings:
+    """Judge the bank; `before` is the rail as it was known, aged to now, `nothing` what is known of any rail."""
     bank = memory.bank
     mean, covariance = bank.moments()
     belief = Gaussian(mean[:2], covariance[:2, :2])
+    if memory.misled:
+        return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower))
     used = use(config, bank, memory.braking, resistance(config, bank))
     std = np.hypot(used.std(bank), kinds.RIPPLE[bank.kind] * used.value)
     wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)

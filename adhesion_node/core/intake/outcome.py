@@ -22,6 +22,10 @@ class Outcome(Enum):
     INVALID = "not finite, no positive variance or physically impossible: dropped"
     STUCK = "the same to the bit although the train must have moved on: check the sensor"
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
+    SLIDING = (
+        "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
+        "take them from an axle without a brake, or from satellites"
+    )
     OUTLIER = "further from the prediction than gate_sigma: dropped"
     UNPAIRED = "no speed or force of its time: dropped; is that sensor alive, its clock right?"
     SLOW = "slower than min_speed_mps: the creep is not formed"
