@@ -24,7 +24,7 @@ NAME = "point_mass"
 EVERY = 5
 """The sensors measure at 10 Hz."""
 
-SLIDING_CREEP = 0.3
+SLIDING_CREEP = 0.1
 
 
 def drives(seeds: Iterable[int]) -> tuple[Drive, ...]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_node.real.plant.creep import contact, peak
+from sim_node.real.plant.creep import SLIDING
 from sim_node.real.plant.journey import PERIOD_S, Journey
 
 from ...core.physics.train import Array
@@ -67,14 +67,10 @@ def averaged(values: Array) -> Array:
 def slid(journey: Journey) -> Array:
     """Share of the axle groups that slid at any time within the last `SLID_S`, shape (T,).
 
-    A group slides beyond the peak of the creep curve, that of the mean rail under the train.
+    A group slides from `SLIDING` of creep on: on a dry rail beyond the peak of its curve, on others about there.
     """
-    mu0, speed = journey.available, journey.speed_mps
-    for _ in range(2):  # the peak is nearly proportional to mu0
-        highest, creep = peak(speed, contact(mu0))
-        mu0 = mu0 * journey.available / highest
     rim = journey.wheel_radps * journey.radius_m
-    sliding = rim < ((1.0 - creep) * speed)[:, np.newaxis]
+    sliding = rim < (1.0 - SLIDING) * journey.speed_mps[:, np.newaxis]
     count = np.cumsum(sliding, axis=0)
     back = round(SLID_S / PERIOD_S)
     before = np.concatenate((np.zeros((back, count.shape[1]), count.dtype), count))[: len(count)]
