@@ -147,16 +147,15 @@ def _drain(executor: SingleThreadedExecutor, node: Node) -> None:
     """Take the messages that are queued; the timers, which would go on for ever, are over."""
     for timer in node.timers:
         timer.cancel()
-    now = time.monotonic()
-    end, quiet = now + DRAIN_S, now + QUIET_S
-    while (now := time.monotonic()) < min(end, quiet):
+    end = time.monotonic() + DRAIN_S
+    while time.monotonic() < end:
         try:
-            work, *_ = executor.wait_for_ready_callbacks(timeout_sec=min(end, quiet) - now)
+            # with another time than before the executor would begin again at the first topic, and empty that first
+            work, *_ = executor.wait_for_ready_callbacks(timeout_sec=QUIET_S)
         except TimeoutException:
             return
         work()
         work.result()  # raises what the callback raised
-        quiet = time.monotonic() + QUIET_S
 
 
 def _say_goodbye(node: Node) -> None:
