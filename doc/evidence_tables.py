@@ -4,7 +4,7 @@
 
 import json
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,21 @@ PAPERS = {"particle_em": "paper", "ekf_naive": "paper's EKF"}
 
 ERROR = "{mean_relative_error_percent:.2f} ± {std_relative_error_percent:.2f}"
 PEAK = "{peak_estimated_mean:.3f} ± {peak_estimated_std:.3f}"
+GOALS = {
+    "error_percent": ("error against used: positions, aided, leaves, patches", "≤ 4, 2, 4, 6 %", "{by:+.1f} %", 1.0),
+    "coverage95": ("95 % interval covers it", "92–99 %", "{by:+.1f} %", 100.0),
+    "bound_kept": ("bound ≤ used", "≥ 95 %", "{by:+.1f} %", 100.0),
+    "safe": ("safe curve long enough", "≥ 99 %", "{by:+.1f} %", 100.0),
+    "shortfall_percent": ("worst shortfall", "≤ 5 %", "{by:+.1f} %", 1.0),
+    "excess_percent": ("mean excess, sound sensors", "≤ 20 %", "{by:+.0f} %", 1.0),
+    "regime_wrong": ("regime wrong", "≤ 5 %", "{by:+.1f} %", 100.0),
+    "false_changes_per_hour": ("false changes", "≤ 1/h", "{by:+.1f}/h", 1.0),
+    "speed_beyond_3_std": ("published speed beyond 3 σ", "≤ 2 %", "{by:+.1f} %", 100.0),
+    "silence_s": ("longest silence", "≤ 1 s", "{by:+.1f} s", 1.0),
+    "found_s": ("patch found", "≤ 1 s; positions alone 1.2 × soonest", "{by:+.1f} s", 1.0),
+}
+"""Figures of `study real` that have a goal: what it says, the goal, the form of a distance and its factor."""
+
 EARLIER = {"SBI": "sbi_m", "W": "warning_m", "P": "permitted_m", "I": "indication_m"}
 
 
@@ -49,6 +64,10 @@ def parts() -> dict[str, str]:
         "creep withheld": ("creep", map(_wrong, creep[0]["withholding"])),
     }
     made = {name: (file, _listed(COLUMNS[name], rows)) for name, (file, rows) in listed.items()}
+    for name in ("real", "real_before"):
+        made[name] = name, _listed(COLUMNS["real"], files[name], _marked)
+    made["real soonest"] = "real", _listed(COLUMNS["real soonest"], _soonest(files["real"]))
+    made["real goals"] = "real", table(("figure", "goal", "met", "missed most by"), _reached(files["real"]))
     made["creep noise"] = "creep", _crossed("noise on λ", _noise(creep))
     made["creep coverage"] = "creep", _crossed("", _coverage(creep[0]["coverage95"]))
     for name, scenario in SCENARIOS.items():
@@ -72,8 +91,25 @@ def _cell(form: str, row: Row) -> str:
         return "–"
 
 
-def _listed(columns: Sequence[tuple[str, str]], rows: Iterable[Row]) -> str:
-    return table([head for head, _ in columns], ([_cell(form, row) for _, form in columns] for row in rows))
+def _listed(columns: Sequence[tuple[str, str]], rows: Iterable[Row], cell: Callable[[str, Row], str] = _cell) -> str:
+    return table([head for head, _ in columns], ([cell(form, row) for _, form in columns] for row in rows))
+
+
+def _marked(form: str, row: Row) -> str:
+    """Fill in a form, bold where its figure misses its goal."""
+    shown = _cell(form, row)
+    return f"**{shown}**" if any(f"{{{figure}:" in form for figure in row["missed"]) else shown
+
+
+def _reached(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+    """By goal: in how many of the cases that have a figure it is met, and where it is missed most."""
+    for figure, (says, goal, form, factor) in GOALS.items():
+        judged = [row for row in rows if row[figure] is not None and figure in row["goals"]]
+        worst = max(judged, key=lambda row: abs(row["missed"].get(figure, 0.0)), default=None)
+        by = 0.0 if worst is None else worst["missed"].get(figure, 0.0)
+        met = sum(figure not in row["missed"] for row in judged)
+        where = f"{form.format(by=factor * by)} ({worst['case']})" if worst is not None and by else "–"
+        yield says, goal, f"{met} of {len(judged)}", where
 
 
 def _crossed(corner: str, found: Iterable[Crossed]) -> str:
@@ -95,6 +131,13 @@ def _accuracy(rows: Sequence[Row]) -> Iterator[Crossed]:
             converged = "never" if row["converged_kmh"] is None else f"{row['converged_kmh']:.0f} km/h"
             for name, form in COLUMNS["of all starts"]:
                 yield (name, METHODS[method]), _cell(form, {**row, "converged": converged})
+
+
+def _soonest(rows: Sequence[Row]) -> Iterator[Row]:
+    """By what the bound allows: the sets of sensors that it allows that to."""
+    sets = {row["fitted"]: row["found_soonest_s"] for row in rows}
+    for bound_s in sorted({bound_s for bound_s in sets.values() if bound_s is not None}):
+        yield {"bound_s": bound_s, "sets": ", ".join(f"`{name}`" for name, own in sets.items() if own == bound_s)}
 
 
 def _found(row: Row) -> Row:

@@ -39,7 +39,7 @@ def draw(case: Case, found: Found, folder: Path) -> None:
             axis.set_ylim(bottom=0.0)
             axis.legend(loc="best", fontsize="small", ncols=2)
         shades = [Patch(color=color, label=name.replace("_", "-").lower()) for name, color in SHADES.items()]
-        axes[1].add_artist(axes[1].legend(handles=shades, loc="lower left", fontsize="x-small", title="claimed"))
+        axes[1].add_artist(axes[1].legend(handles=shades, loc="center right", fontsize="x-small", title="claimed"))
         axes[1].legend(loc="upper right", fontsize="small")
 
 
