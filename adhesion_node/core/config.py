@@ -176,6 +176,14 @@ class Config:
         0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
     )
     pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
+    used_ripple: float = _unsure(
+        0.03,
+        "By how much the adhesion used swings about its mean over some seconds, as slide protection works in turns, "
+        "relative",
+        "",
+        0.0,
+        1.0,
+    )
     brake_drift: float = _unsure(
         0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
     )
@@ -189,6 +197,7 @@ class Config:
     profile_std: float = _unsure(
         0.001, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1
     )
+    resistance_std: float = _unsure(0.15, "Standard deviation of the running resistance, relative", "", 0.0, 1.0)
     mass_std: float = _unsure(0.0, "Standard deviation of the mass, relative", "", 0.0, 1.0)
     brake_std: float = _unsure(0.0, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
     rotating_mass_std: float = _unsure(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)

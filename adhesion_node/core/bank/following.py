@@ -16,7 +16,7 @@ from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kinds import FREE, FREE_STD, NOISES, SLIDES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
-from .motion import Braking, moved, slow_variance, white_variance
+from .motion import Braking, moved, open_variance, slow_variance, white_variance
 from .plausible import Course
 from .seeing import acceleration_seen, corrected, not_slower, position_seen, speed_seen
 from .wheels import WheelsSeen, told
@@ -102,7 +102,7 @@ def met(config: Config, measurement: Measurement) -> Memory:
         SPEED: config.unknown_speed_mps**2,
         MU: FREE_STD**2,
         BRAKE: config.brake_error**2,
-        GRADE: config.grade_error**2,
+        GRADE: open_variance(config, bank),
         OFFSET: slow,
         BIAS: BIAS_STD**2,
         PITCH: PITCH_STD**2,
@@ -208,7 +208,7 @@ def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Me
         wheels = wheels.after(config, sample, float(mean[SPEED]), std, memory.brake.demanded_pa > 0.0)
     rim = wheels.fastest(config, measurement.wheels[-1])
     if rim is not None and memory.braked and rim > config.slowest_mps:
-        error = WHEEL_SHARE * rim
+        error = math.hypot(WHEEL_SHARE, wheels.error) * rim
         bank = not_slower(bank, rim - error, error).normalised()
     return memory._replace(wheels=wheels, bank=bank)
 

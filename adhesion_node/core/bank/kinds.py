@@ -19,19 +19,17 @@ class Kind(NamedTuple):
     """Of the rail over `ROUGHNESS_M`, relative standard deviation."""
     restlessness_mps: float
     """Standard deviation that unknown decelerations give the speed over 1 s."""
-    ripple: float
-    """Of the adhesion used about what the sensors can follow, as the slide protection works in turns; relative."""
     prior: float
     """Probability when a braking begins."""
 
 
 KINDS = (
-    Kind("free", False, 0.0, 0.0, 0.02, 0.0, 1.0),
-    Kind("brake", False, 0.0, 0.0, 0.03, 0.0, 0.55),
-    Kind("smooth", True, 0.001, 0.0, 0.018, 0.0, 0.15),
-    Kind("even", True, 0.003, 0.03, 0.035, 0.03, 0.15),
-    Kind("rough", True, 0.005, 0.07, 0.05, 0.04, 0.1),
-    Kind("restless", True, 0.02, 0.15, 0.07, 0.05, 0.05),
+    Kind("free", False, 0.0, 0.0, 0.02, 1.0),
+    Kind("brake", False, 0.0, 0.0, 0.03, 0.55),
+    Kind("smooth", True, 0.001, 0.0, 0.018, 0.15),
+    Kind("even", True, 0.003, 0.03, 0.035, 0.15),
+    Kind("rough", True, 0.005, 0.07, 0.05, 0.1),
+    Kind("restless", True, 0.02, 0.15, 0.07, 0.05),
 )
 FREE, HELD = 0, 1
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
@@ -39,7 +37,6 @@ SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
 SLIDES = np.array([kind.slides for kind in KINDS])
 DRIFT = np.array([kind.drift for kind in KINDS])
 ROUGHNESS = np.array([kind.roughness for kind in KINDS])
-RIPPLE = np.array([kind.ripple for kind in KINDS])
 RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
 
 ROUGHNESS_M, GRADE_M = 100.0, 1500.0
@@ -65,8 +62,8 @@ class Noise(NamedTuple):
 
 NOISES = (
     Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
-    Noise(0.1, 0.05, 1.0, 1.0, 30.0, 0.2),
-    Noise(0.05, 0.05, 1.0, 1.0, 200.0, 0.2),
+    Noise(0.1, 0.05, 1.0, 1.0, 30.0, 0.3),
+    Noise(0.05, 0.05, 1.0, 1.0, 200.0, 0.1),
     Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
 )
 LASTS = np.array([noise.lasts_s for noise in NOISES])

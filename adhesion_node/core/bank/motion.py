@@ -24,6 +24,10 @@ from .layout import BIAS, BRAKE, EACH, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED
 if TYPE_CHECKING:
     from ..config import Config
 
+BUILDING_UP = 0.3
+"""Error of the brake's force while it is applied harder, relative: of the speed over 1 s, and as an accelerometer feels
+it."""
+
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""
 
@@ -88,6 +92,8 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     used = use(config, bank, braking, resisting)
     slower = speed - dt_s * GRAVITY * (used.value + resisting + mean[:, GRADE])
     lasting, noise = _lasting(config, bank, slower, dt_s, declared_m)
+    if braking.rising:
+        noise[:, SPEED] += np.square(BUILDING_UP * GRAVITY * used.value) * dt_s
     means = mean * lasting
     means[:, SPEED] = slower
     means[:, POSITION] = mean[:, POSITION] + 0.5 * dt_s * (speed + slower)
@@ -102,6 +108,12 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     covariance = step @ bank.covariance @ step.transpose(0, 2, 1)
     covariance[:, EACH, EACH] += noise
     return bank._replace(mean=means, covariance=covariance)
+
+
+def open_variance(config: Config, bank: Bank) -> Array:
+    """Variance of what profile and papers leave open of grade and running resistance, shape (H,)."""
+    resisting = config.train.specific_resistance(bank.mean[:, SPEED])
+    return np.asarray(config.grade_error**2 + np.square(config.resistance_std * resisting))
 
 
 def white_variance(bank: Bank, declared_m: float) -> Array:
@@ -131,7 +143,7 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     noise[:, MU] = np.where(kind == FREE, kinds.FREE_STD**2 * (1.0 - free**2), drift)
     noise[:, ROUGH] = np.square(kinds.ROUGHNESS[kind]) * (1.0 - lasting[:, ROUGH] ** 2)
     noise[:, BRAKE] = config.brake_drift**2 * dt_s
-    noise[:, GRADE] = config.grade_error**2 * (1.0 - lasting[:, GRADE] ** 2)
+    noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)
     noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
     noise[:, BIAS] = BIAS_DRIFT**2 * dt_s
     return lasting, noise

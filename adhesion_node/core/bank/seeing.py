@@ -10,7 +10,7 @@ import numpy as np
 
 from ..physics.train import GRAVITY, Array
 from .layout import BIAS, OFFSET, PITCH, POSITION, SCALE, SPEED, Bank
-from .motion import Braking, use, white_variance
+from .motion import BUILDING_UP, Braking, use, white_variance
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -60,13 +60,13 @@ def acceleration_seen(
 ) -> Observation:
     """An accelerometer along the train: it feels brake and resistance, not the grade; under the brake it pitches."""
     resisting = config.train.specific_resistance(bank.mean[:, SPEED])
-    used = use(config, bank, braking, resisting)
+    used, error = use(config, bank, braking, resisting), BUILDING_UP if braking.rising else BRAKING_ERROR
     felt, pitched = -(used.value + resisting), 1.0 + bank.mean[:, PITCH]
     slope = -used.slope * pitched[:, None]
     slope[:, PITCH] += felt
     slope[:, BIAS] = 1.0
     innovation = acceleration_mps2 / GRAVITY - felt * pitched - bank.mean[:, BIAS]
-    return Observation(innovation, slope, variance / GRAVITY**2 + STEADY_ERROR**2 + (BRAKING_ERROR * used.value) ** 2)
+    return Observation(innovation, slope, variance / GRAVITY**2 + STEADY_ERROR**2 + (error * used.value) ** 2)
 
 
 def corrected(bank: Bank, seen: Observation) -> Bank:

@@ -17,7 +17,7 @@ from ..physics.train import GRAVITY, Array
 from . import kinds
 from .following import Memory, S
 from .layout import GRADE, MU, ROUGH, SPEED, Bank
-from .motion import Braking, laws_of, resistance, use
+from .motion import Braking, laws_of, open_variance, resistance, use
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
 """Parts of the present speed at which adhesion is foreseen."""
+
+COUNTED_RISE = 0.5
+"""Power of what a law promises for lower speeds that is counted on: slide protection uses less of it."""
 
 BISECTIONS = 30
 
@@ -83,7 +86,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if memory.misled:
         return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower))
     used = use(config, bank, memory.braking, resistance(config, bank))
-    std = np.hypot(used.std(bank), kinds.RIPPLE[bank.kind] * used.value)
+    std = np.hypot(used.std(bank), config.used_ripple * used.value * used.slides)
     wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
     rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
@@ -145,11 +148,11 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> A
     slope[:, GRADE] = grade_kept
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
     roughness = kinds.ROUGHNESS[bank.kind] ** 2 * rough_added + kinds.DRIFT[bank.kind] ** 2 * time_s / 3.0
-    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + config.grade_error**2 * grade_added
+    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added
     variance += np.where(sliding, mean[:, MU] ** 2 * roughness, (config.brake_ahead_std * used.value) ** 2)
     speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
-    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0)
+    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** COUNTED_RISE
     foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
     low = quantiles(bank.weight, foreseen, np.sqrt(np.maximum(variance, 1e-12)) * rising, (missed,))[:, 0]
     return Ahead(tuple(speeds.tolist()), tuple(np.maximum(low, 0.0).tolist()))

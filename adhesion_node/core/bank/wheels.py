@@ -40,6 +40,8 @@ class WheelsSeen(NamedTuple):
     """True over expected radius of each."""
     learnt: int = 0
     """Samples from which they were learnt."""
+    error: float = UNLEARNT
+    """Of all radii together, relative, as the train's speed was not known better."""
     slid_ns: tuple[int | None, ...] = ()
     """When each was last seen to slide."""
     rolled_ns: tuple[int | None, ...] = ()
@@ -52,7 +54,7 @@ class WheelsSeen(NamedTuple):
         rolls where neither can be.
         """
         count, nothing = len(sample.speeds_radps), (None,) * len(sample.speeds_radps)
-        wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, 0, nothing, nothing)
+        wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, slid_ns=nothing, rolled_ns=nothing)
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         if speed_mps < LEARNING_MPS:
             return wheels
@@ -78,7 +80,8 @@ class WheelsSeen(NamedTuple):
             before + part * (speed_mps / rim - before) if rim > 0.0 else before  # never true of NaN
             for before, rim in zip(self.radius, rims, strict=True)
         )
-        return self._replace(radius=radius, learnt=self.learnt + 1)
+        error = self.error + part * (std_mps / speed_mps - self.error)
+        return self._replace(radius=radius, learnt=self.learnt + 1, error=error)
 
     def fastest(self, config: Config, sample: WheelSample) -> float | None:
         """Speed of the fastest rim, m/s; None while nothing was learnt of the radii."""
