@@ -187,8 +187,12 @@ class Config:
     brake_drift: float = _unsure(
         0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
     )
-    brake_ahead_std: float = _unsure(
-        0.03, "By how much the brake's force may differ over the speeds still ahead, relative", "", 0.0, 1.0
+    ahead_std: float = _unsure(
+        0.03,
+        "By how much the adhesion, or the brake's force, may differ over the way ahead in the mean, relative",
+        "",
+        0.0,
+        1.0,
     )
     speed_scale_std: float = _unsure(0.005, "Standard deviation of the scale of measured speeds", "", 0.0, 0.5)
     grade_std: float = _unsure(

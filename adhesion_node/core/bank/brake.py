@@ -66,8 +66,12 @@ class BrakeSeen(NamedTuple):
         demanded = demand_pa
         if demanded is None:
             demanded = max(self.demanded_pa, pressure) if dumping else pressure
-        elsewhere = config.pressure_kind == "cylinder" and dumping
-        return BrakeSeen(recent, demanded, demanded if elsewhere else pressure, dumped_ns if dumping else None, full_ns)
+        applied = pressure
+        if config.pressure_kind == "cylinder" and dumping:
+            applied = demanded  # of the others nothing is known but what is asked of them
+        elif config.pressure_kind == "mean" and pressure <= recent[0].pressure_pa * (1.0 + RISING_SHARE):
+            applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
+        return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns)
 
     def has_slid(self, now_ns: int) -> bool:
         """Whether the slide protection has been at work of late."""

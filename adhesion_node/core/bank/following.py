@@ -38,8 +38,8 @@ SPEED_ERROR_MPS = 0.03
 PAST_NS = 4 * S
 """How far back it can go."""
 
-CERTAIN = 0.97
-"""Probability from which a change of the rail is told."""
+CERTAIN, CHANGED = 0.99, 0.2
+"""Probability from which a change of the rail is told, and by how much it must have changed, relative."""
 
 WHEEL_SHARE = 0.008
 """Error of the fastest rim's speed, relative."""
@@ -259,11 +259,11 @@ def _led_again(memory: Memory) -> Memory:
 
 
 def _with_changes(memory: Memory) -> Memory:
-    """Tell a change of the rail once it is certain."""
+    """Tell a change of the rail once it is certain, and the adhesion another than it was some seconds ago."""
     bank = memory.bank
     later = bank.changed_s > memory.told_s + 1e-6
-    likely = float(bank.weight @ later)
-    if likely < CERTAIN:
+    if float(bank.weight @ later) < CERTAIN or not memory.past:
         return memory
-    when = float((bank.weight * later) @ bank.changed_s) / likely
-    return memory._replace(told_s=max(when, float(bank.changed_s[later].max())), changes=memory.changes + 1)
+    before, now = (float(each.weight @ each.mean[:, MU]) for each in (memory.past[0][1], bank))
+    changed = abs(now - before) > CHANGED * before
+    return memory._replace(told_s=float(bank.changed_s[later].max()), changes=memory.changes + changed)

@@ -26,10 +26,10 @@ class Kind(NamedTuple):
 KINDS = (
     Kind("free", False, 0.0, 0.0, 0.02, 1.0),
     Kind("brake", False, 0.0, 0.0, 0.03, 0.55),
-    Kind("smooth", True, 0.001, 0.0, 0.018, 0.15),
-    Kind("even", True, 0.003, 0.03, 0.035, 0.15),
+    Kind("smooth", True, 0.001, 0.0, 0.018, 0.16),
+    Kind("even", True, 0.003, 0.03, 0.035, 0.16),
     Kind("rough", True, 0.005, 0.07, 0.05, 0.1),
-    Kind("restless", True, 0.02, 0.15, 0.07, 0.05),
+    Kind("restless", True, 0.02, 0.15, 0.07, 0.03),
 )
 FREE, HELD = 0, 1
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)

@@ -149,7 +149,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> A
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
     roughness = kinds.ROUGHNESS[bank.kind] ** 2 * rough_added + kinds.DRIFT[bank.kind] ** 2 * time_s / 3.0
     variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added
-    variance += np.where(sliding, mean[:, MU] ** 2 * roughness, (config.brake_ahead_std * used.value) ** 2)
+    variance += np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
     speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
     rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** COUNTED_RISE
