@@ -18,31 +18,54 @@ from .state import State
 
 
 def follow_banked(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
-    """Follow the train with a good measurement."""
-    memory, newest = state.memory, state.newest
-    if memory is None or newest is None:
+    """Follow the train with a good measurement; a belief whose numbers fail is given up, and met anew."""
+    try:
+        with np.errstate(invalid="raise"):
+            return _followed(config, state, measurement)
+    except (ArithmeticError, ValueError) as error:
+        return _anew(
+            state, Event(Outcome.RESET, f"belief lost ({error}), position x = {measurement.position_m:.12g}")
+        ), None
+
+
+def _followed(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
+    memory = state.memory
+    if memory is None:
         return _accepted(config, state, measurement, bank.met(config, measurement))
     if measurement.has_position and memory.misled:
         detail = f"position x = {measurement.position_m:.12g}"
         state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
-    if measurement.has_position:
-        apart = bank.apart(config, memory, measurement)
-        if apart > config.gate_sigma:
-            detail = f"position x = {measurement.position_m:.12g}, innovation {apart:.3g} standard deviations"
-            if state.outliers + 1 < config.max_outliers:
-                return state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail)), None
-            anew = state.forgotten()._replace(seen=state.seen, repeated=state.repeated, pace=state.pace)
-            anew = anew.told(Event(Outcome.RESET, detail))
-            return _accepted(config, anew, measurement, bank.met(config, measurement))
     mean, _ = memory.bank.moments()
-    belief = Gaussian(mean[:2], np.zeros((2, 2)))
-    rail = state.knowledge.aged(config, measurement.t_ns, belief)
+    rail = state.knowledge.aged(config, measurement.t_ns, Gaussian(mean[:2], np.zeros((2, 2))))
+    off = bank.off(config, memory, measurement)
+    stepping = state.stepping.after(config, memory, measurement, off)
+    size_m = stepping.size_m(off.std_m)
+    if size_m:
+        memory, stepping = stepping.taken(config, size_m, rail)
+        return _accepted(config, state._replace(stepping=stepping), measurement, memory)
+    state = state._replace(stepping=stepping)
+    if off.nearest > config.gate_sigma:
+        detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
+        if state.outliers + 1 >= config.max_outliers:
+            anew = _anew(state, Event(Outcome.RESET, detail))
+            return _accepted(config, anew, measurement, bank.met(config, measurement))
+        memory = bank.followed(config, memory, measurement._replace(variance_m2=math.inf), rail)
+        state = state._replace(memory=memory, outliers=state.outliers + 1)
+        return state.told(Event(Outcome.OUTLIER, detail)), None
     return _accepted(config, state, measurement, bank.followed(config, memory, measurement, rail))
+
+
+def _anew(state: State, event: Event) -> State:
+    """Nothing is known of train and rail any more."""
+    kept = state.forgotten()._replace(seen=state.seen, repeated=state.repeated, pace=state.pace)
+    return kept.told(event)
 
 
 def _accepted(
     config: Config, state: State, measurement: Measurement, memory: bank.Memory
 ) -> tuple[State, Estimate | None]:
+    if not memory.bank.is_sound():
+        raise FloatingPointError("not finite, or a variance below 0")
     state = state._replace(
         counts=counted(state.counts, Event(Outcome.ACCEPTED if measurement.has_position else Outcome.TICK)),
         newest=measurement,
@@ -51,7 +74,7 @@ def _accepted(
         since_estimate=state.since_estimate + 1,
     )
     since_s = math.inf if state.seen is None else (measurement.t_ns - state.seen.t_ns) * 1e-9
-    if since_s < config.estimate_s - 1e-3 or (state.seen is None and state.since_estimate < 2):
+    if since_s < config.estimate_s - 1e-3 or memory.fixes < 2:
         return state, None
     return _told(config, state)
 
@@ -69,17 +92,24 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(
         ahead=findings.ahead, withheld=memory.misled
     )
-    return state._replace(knowledge=knowledge, since_estimate=0, seen=estimate), estimate
+    memory = memory._replace(log_likelihood=0.0)
+    return state._replace(memory=memory, knowledge=knowledge, since_estimate=0, seen=estimate), estimate
 
 
 def _verdict(memory: bank.Memory, findings: Findings) -> Verdict:
-    fit = Fit(window=memory.seen, iterations=int(memory.braked), ess=float(1.0 / np.sum(memory.bank.weight**2)))
+    fit = Fit(
+        window=memory.seen,
+        iterations=int(memory.braked),
+        log_likelihood=memory.log_likelihood,
+        ess=float(1.0 / np.sum(memory.bank.weight**2)),
+    )
     return Verdict(findings.regime, findings.rail, findings.belief, None, fit=fit)
 
 
 def last_banked(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """What is known at the end of the data, or of a time."""
-    if state.memory is None or not state.since_estimate:
+    if state.memory is None or state.memory.fixes < 2 or not state.since_estimate:
         return state, ()
-    state, estimate = _told(config, state)
+    with np.errstate(invalid="raise"):
+        state, estimate = _told(config, state)
     return state, (estimate,)

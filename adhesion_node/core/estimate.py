@@ -33,6 +33,7 @@ class Estimate(NamedTuple):
     regime: Regime
     position_m: float
     speed_mps: float
+    """Signed: below 0 positions fall."""
     position_std_m: float
     speed_std_mps: float
     changes: int = 0
@@ -90,7 +91,7 @@ class Knowledge(NamedTuple):
 def unknown(config: Config, speed_mps: float) -> Rail:
     """What is known of any rail at a speed."""
     lowest = config.lowest_mu if config.method == BANK else math.inf
-    return ignorance(float(config.low_law(np.asarray(speed_mps))), config.unknown_std, lowest)
+    return ignorance(float(config.low_law(np.asarray(abs(speed_mps)))), config.unknown_std, lowest)
 
 
 def judge(
@@ -144,7 +145,7 @@ def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
         mu_lower=rail.lower,
         regime=verdict.regime,
         position_m=position,
-        speed_mps=max(speed, 0.0),
+        speed_mps=speed,
         position_std_m=belief.position_std,
         speed_std_mps=belief.speed_std,
         changes=changes,
@@ -155,7 +156,7 @@ def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
 def blind_estimate(config: Config, before: Estimate, t_ns: int) -> Estimate:
     """What a consumer may count on without positions since `before`: the low-adhesion law, and a speed not yet lost."""
     unseen_s = (t_ns - before.t_ns) * 1e-9
-    low = float(config.low_law(np.asarray(before.speed_mps)))
+    low = float(config.low_law(np.asarray(abs(before.speed_mps))))
     return before._replace(
         t_ns=t_ns,
         mu=low,

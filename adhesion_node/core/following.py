@@ -18,7 +18,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     """Judge the next measurement in time; follow the train with it where it is good."""
     seen = state.seen
     if measurement.has_position:
-        repeated = state.repeated.after(measurement, seen)
+        repeated = state.repeated.after(measurement, state.sure)
         if repeated.is_stuck(measurement):
             return _unseen(config, state, measurement)
         state = state._replace(repeated=repeated, unseen=0)

@@ -49,12 +49,12 @@ def _expected(estimate: Estimate) -> float | AdhesionLaw:
     shape = estimate.shape
     if shape is None:
         return max(estimate.mu, 0.0)
-    now = float(shape(np.asarray(estimate.speed_mps)))
+    now = float(shape(np.asarray(abs(estimate.speed_mps))))
     return replace(shape, scale=shape.scale * max(estimate.mu, 1e-6) / now)
 
 
 def _curve(train: Train, speed_mps: float, mu: float | AdhesionLaw, resistance: float) -> BrakingCurve | None:
     try:
-        return braking.curve(train, speed_mps, mu, grade=resistance)
+        return braking.curve(train, abs(speed_mps), mu, grade=resistance)
     except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
         return None

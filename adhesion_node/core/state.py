@@ -9,7 +9,8 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from .bank.following import Memory
-from .bank.layout import SPEED
+from .bank.layout import POSITION, SPEED
+from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge
 from .intake.outcome import NO_COUNTS, Event, Outcome, counted
@@ -39,6 +40,8 @@ class State(NamedTuple):
     """The present braking; None while coasting or while the speed is not known."""
     memory: Memory | None = None
     """The bank's, where that identifies the adhesion."""
+    stepping: Stepping = Stepping()
+    """Whether the positions have stepped, where the bank follows them."""
     knowledge: Knowledge = Knowledge()
     outliers: int = 0
     """Outliers in a row."""
@@ -67,6 +70,22 @@ class State(NamedTuple):
         if self.memory is not None:
             return float(self.memory.bank.moments()[0][SPEED])
         return math.nan if self.belief is None else float(self.belief.mean[1])
+
+    @property
+    def sure(self) -> Estimate | None:
+        """The last estimate; where the bank is, with position and speed as of the newest measurement."""
+        memory = self.memory
+        if self.seen is None or memory is None or memory.fixes < 2:
+            return self.seen
+        mean, covariance = memory.bank.moments()
+        belief = Gaussian(mean[:2], covariance[:2, :2])
+        return self.seen._replace(
+            t_ns=memory.t_ns,
+            position_m=float(mean[POSITION]),
+            speed_mps=float(mean[SPEED]),
+            position_std_m=belief.position_std,
+            speed_std_mps=belief.speed_std,
+        )
 
     def told(self, *events: Event) -> State:
         """The state after events, which are counted."""

@@ -25,7 +25,7 @@ STUDIES = {
     "sensitivity": (sensitivity, "the same against position noise, window, step and particles", "--runs 10"),
     "robust": (
         robust,
-        "the default method where rail, sensors or train are not what it believes, and under faults",
+        "the method `rail_condition` where rail, sensors or train are not what it believes, and under faults",
         "--runs 40",
     ),
     "real": (

@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from oracles import drive, ride
+from windowed import windowed
 
-from adhesion_node.core import Config, Measurement, Regime
+from adhesion_node.core import Measurement, Regime
 from sim_node.train.plant import Truth
 from sim_node.train.run import run
 from sim_node.train.scenario import find
@@ -56,7 +56,7 @@ def test_the_adhesion_is_found_at_other_rates(rate_hz: float) -> None:
     """50 measurements last 25 s, 1 s, 0.5 s."""
     simulated, measurements = _simulated("tunnel_entry", 1, 40.0, rate_hz)
     truths = {truth.t_ns: truth for truth in simulated}
-    _, estimates = drive(Config(track=find("tunnel_entry").track), measurements)
+    _, estimates = drive(windowed(track=find("tunnel_entry").track), measurements)
     late = [(e, truths[e.t_ns].mu) for e in estimates if e.t_ns >= 30e9]
     assert len(late) >= 4
     for estimate, true in late:
@@ -69,7 +69,7 @@ def test_the_adhesion_is_found_at_other_rates(rate_hz: float) -> None:
 def _score(name: str, seed: int, start_mu: float) -> Scored:
     simulated, measurements = _simulated(name, seed)
     truths, first_mps = {truth.t_ns: truth for truth in simulated}, find(name).speed_mps
-    _, estimates = drive(Config(start_mu=start_mu), measurements, seed)
+    _, estimates = drive(windowed(start_mu=start_mu), measurements, seed)
     rows = []
     for e in estimates:
         t = truths[e.t_ns]
@@ -122,7 +122,7 @@ def test_the_start_is_forgotten() -> None:
 
 
 def test_cruising_is_coasting_only() -> None:
-    _, estimates = drive(Config(), _simulated("cruise", 1)[1])
+    _, estimates = drive(windowed(), _simulated("cruise", 1)[1])
     assert {e.regime for e in estimates} == {Regime.COASTING}
     assert {e.window for e in estimates} == {0}
     assert all(e.mu_std == 0.04 and e.mu_lower <= 0.1432 for e in estimates)
@@ -131,7 +131,7 @@ def test_cruising_is_coasting_only() -> None:
 
 def test_cruising_without_a_pressure_is_coasting_too() -> None:
     measurements = [m._replace(brake_pressure_pa=None) for m in _simulated("tunnel_entry", 1, until_s=38.0)[1]]
-    _, estimates = drive(replace(Config(), iterations=25), measurements)
+    _, estimates = drive(windowed(iterations=25), measurements)
     cruising = [e for e in estimates if 5e9 < e.t_ns < 20e9]
     assert {e.regime for e in cruising} == {Regime.COASTING}
     assert max(e.window for e in cruising) >= 50  # it looked and found no brake
@@ -142,7 +142,7 @@ def test_cruising_without_a_pressure_is_coasting_too() -> None:
 
 def test_full_brake_on_dry_rail_shows_the_brakes_limit_and_nothing_above() -> None:
     """0.0952 is used of the 0.145 there is. A short first window may take the start's side; a full one may not."""
-    _, estimates = drive(Config(), _simulated("dry_braking", 2, until_s=60.0)[1])
+    _, estimates = drive(windowed(), _simulated("dry_braking", 2, until_s=60.0)[1])
     full = [e for e in estimates if e.window >= 50 and e.t_ns > 28e9]
     limited = [e.regime is Regime.BRAKE_LIMITED for e in full]
     assert len(full) > 25
@@ -155,7 +155,7 @@ def test_full_brake_on_dry_rail_shows_the_brakes_limit_and_nothing_above() -> No
 @pytest.mark.parametrize("sigma_m", [0.5, 2.0])
 def test_start_under_the_brake_settles_within_two_windows(sigma_m: float) -> None:
     measurements = ride([(25.0, 410e3)], speed_mps=75.0, sigma_m=sigma_m, seed=2)
-    _, estimates = drive(Config(), measurements)
+    _, estimates = drive(windowed(), measurements)
     settled = [e for e in estimates if e.t_ns >= 11e9]
     assert all(e.window > 0 for e in settled)
     assert all(abs(e.mu - 0.0726) < 4 * e.mu_std for e in settled)

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from oracles import drive, ride
+from windowed import windowed
 
 from adhesion_node.core import Config, Estimate, Measurement, Outcome, Regime, State, finish, init, step
 
@@ -200,7 +201,7 @@ def test_the_extremes_of_window_and_stepdrive(window: int, length: int) -> None:
 def test_releasing_the_brake_ends_the_window_and_the_knowledge_fades() -> None:
     measurements = ride([(5.0, 0.0), (10.0, FULL), (20.0, 0.0)])
     released = measurements[150].t_ns
-    _, estimates = drive(Config(), measurements)
+    _, estimates = drive(windowed(), measurements)
     braking = [e for e in estimates if e.window]
     assert braking[-1].t_ns == released  # its step was braked still
     free = [e for e in estimates if e.t_ns > released]
@@ -228,8 +229,8 @@ def test_what_the_window_knew_of_the_speed_is_not_lost_on_release() -> None:
 @pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])
 def test_one_second_of_braking_claims_nothing_whatever_the_start(start_mu: float) -> None:
     """Ten measurements know little: ignorance stays, and its low law pulls, 0.03 + 8/(130 + 288) = 0.0491 at 80 m/s."""
-    _, estimates = drive(Config(start_mu=start_mu), ride([(5.0, 0.0), (1.0, FULL)]))
-    _, others = drive(Config(), ride([(5.0, 0.0), (1.0, FULL)]))
+    _, estimates = drive(windowed(start_mu=start_mu), ride([(5.0, 0.0), (1.0, FULL)]))
+    _, others = drive(windowed(), ride([(5.0, 0.0), (1.0, FULL)]))
     assert estimates[-1].window == 10
     assert estimates[-1].regime is Regime.COASTING
     assert estimates[-1].mu == pytest.approx(others[-1].mu, abs=1e-6)
@@ -274,7 +275,7 @@ def test_a_speed_helps_while_coasting_and_is_ignored_under_the_brake() -> None:
 def test_a_gap_under_the_brake_ends_the_window_and_a_new_one_opens(sigma_m: float) -> None:
     measurements = ride([(5.0, 0.0), (25.0, FULL)], sigma_m=sigma_m)
     gapped = [m for m in measurements if not 12e9 <= m.t_ns < 15e9]
-    state, estimates = drive(Config(), gapped)
+    state, estimates = drive(windowed(), gapped)
     assert _counts(state) == {"ACCEPTED": 270}
     after = [e for e in estimates if e.t_ns >= 15e9]
     assert after[0].window <= 10

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from windowed import windowed
 
 from adhesion_node.core import Config, Estimate, Regime
 from adhesion_node.core.physics.adhesion import WET
@@ -26,7 +27,7 @@ def estimate(mu: float = 0.08, lower: float = 0.05, position_m: float = 0.0, spe
 
 
 def config(*sections: Grade | Tunnel) -> Config:
-    return Config(train=FREE, track=Track(sections))
+    return windowed(train=FREE, track=Track(sections))
 
 
 @pytest.mark.parametrize("speed_mps", [1.0, 30.0, 83.0])

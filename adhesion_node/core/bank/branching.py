@@ -42,10 +42,6 @@ RISING_S, STEADY_S, REACHED_S = 5.0, 60.0, 2.0
 """In such times axles begin to slide while the brake is applied harder, and while it is not; and adhesion that the
 brake no longer reaches lets them roll."""
 
-FALLS = ((0.9, 0.15, 0.7), (0.45, 0.3, 0.3))
-"""What is left of the adhesion that the brake needed when axles begin to slide: part, its standard deviation, and how
-probable: a little less, or another rail."""
-
 ALIKE, ALIKE_STD = 0.3, 1.4
 """Hypotheses of one label say the same where speed and adhesion differ by less than this part of their standard
 deviations, and these by less than this factor."""
@@ -132,11 +128,11 @@ def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, 
     needed = use(config, held, braking, resistance(config, held)).value
     rate = elapsed_s / (RISING_S if braking.rising else STEADY_S)
     share = sum(KINDS[kind].prior for kind in SLIDING)
+    slipping = held.with_fresh(MU, 0.9 * needed, 0.2 * needed + 0.003)
     return [
-        held.with_fresh(MU, part * needed, spread * needed + 0.003)
-        .with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
-        .labelled(kind, law, now_s, math.log(rate * likely * probability * KINDS[kind].prior / share))
-        for part, spread, likely in FALLS
+        slipping.with_fresh(ROUGH, 0.0, KINDS[kind].roughness).labelled(
+            kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share)
+        )
         for law, (_, probability) in enumerate(laws_of(config))
         for kind in SLIDING
         if probability > 0.0

@@ -12,13 +12,14 @@ import numpy as np
 
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
+from ..physics.train import Array
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kinds import FREE, FREE_STD, NOISES, SLIDES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
 from .motion import Braking, moved, open_variance, slow_variance, white_variance
 from .plausible import Course
-from .seeing import acceleration_seen, corrected, not_slower, position_seen, speed_seen
+from .seeing import Observation, acceleration_seen, corrected, not_slower, position_seen, speed_seen
 from .wheels import WheelsSeen, told
 
 if TYPE_CHECKING:
@@ -79,11 +80,51 @@ class Memory(NamedTuple):
     """Whether the positions are those of a sliding wheel: they are left out until the brake is released."""
     seen: int = 0
     """Measurements of the present braking; 0 while there is none."""
+    fixes: int = 0
+    """Positions taken in; a speed counts as two, as it takes two positions to tell one."""
+    log_likelihood: float = 0.0
+    """Sum of ln p of what positions, speeds and accelerometer told since the last estimate, in m, m/s and g."""
 
     @property
     def braked(self) -> bool:
         """Whether a braking is open."""
         return self.seen > 0
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether any position has said where the train is."""
+        return bool(self.bank.covariance[0, POSITION, POSITION] < 0.5 * MAX_VARIANCE_M2)
+
+    def told(self, seen: Observation, fixes: int = 0) -> Memory:
+        """Take in an observation."""
+        bank = corrected(self.bank, seen)
+        evidence = float(np.logaddexp.reduce(bank.log_weight)) - 0.5 * math.log(2.0 * math.pi)
+        return self._replace(
+            bank=bank.normalised(), fixes=self.fixes + fixes, log_likelihood=self.log_likelihood + evidence
+        )
+
+
+def _with_position(memory: Memory, measurement: Measurement) -> Memory:
+    """Take a position in; the first one places the train, with what there is of slow error in it."""
+    declared, bank = math.sqrt(measurement.variance_m2), memory.bank
+    memory = memory._replace(declared_m=declared)
+    if memory.is_placed:
+        return memory.told(position_seen(bank, measurement.position_m, declared), fixes=1)
+    slow = slow_variance(bank, declared)
+    placed = bank.with_fresh(POSITION, measurement.position_m, np.sqrt(white_variance(bank, declared) + slow))
+    placed = placed.with_fresh(OFFSET, 0.0, np.sqrt(slow))
+    placed.covariance[:, POSITION, OFFSET] = placed.covariance[:, OFFSET, POSITION] = -slow
+    return memory._replace(bank=placed, fixes=memory.fixes + 1)
+
+
+class Off(NamedTuple):
+    """Deviation of a measured position from what was foreseen."""
+
+    metres: float
+    std_m: float
+    """Of what was foreseen and of the position, over all hypotheses."""
+    nearest: float
+    """In standard deviations, without sign, by the hypothesis nearest."""
 
 
 def met(config: Config, measurement: Measurement) -> Memory:
@@ -96,24 +137,21 @@ def met(config: Config, measurement: Measurement) -> Memory:
     priors = np.log([noise.prior for noise in NOISES])
     labels = np.arange(count), np.zeros(count, np.intp), np.full(count, FREE), np.zeros(count), np.zeros(count)
     bank = Bank(mean, np.zeros((count, SIZE, SIZE)), priors, *labels)
-    slow, white = slow_variance(bank, declared), white_variance(bank, declared)
-    variances = {
-        POSITION: white + slow if measurement.has_position else MAX_VARIANCE_M2,
+    variances: dict[int, float | Array] = {
+        POSITION: MAX_VARIANCE_M2,
         SPEED: config.unknown_speed_mps**2,
-        MU: FREE_STD**2,
+        MU: (3.0 * FREE_STD) ** 2,  # it may be in the midst of the strongest traction
         BRAKE: config.brake_error**2,
         GRADE: open_variance(config, bank),
-        OFFSET: slow,
+        OFFSET: slow_variance(bank, declared),
         BIAS: BIAS_STD**2,
         PITCH: PITCH_STD**2,
         SCALE: config.speed_scale_std**2,
     }
     for component, variance in variances.items():
         bank.covariance[:, component, component] = variance
-    if measurement.has_position:
-        bank.covariance[:, POSITION, OFFSET] = bank.covariance[:, OFFSET, POSITION] = -slow
     memory = Memory(bank.normalised(), measurement.t_ns - 1, declared)
-    return followed(config, memory, measurement._replace(variance_m2=math.inf), Rail(0.0, 1.0, 0.0))
+    return followed(config, memory, measurement, Rail(0.0, 1.0, 0.0))
 
 
 def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rail) -> Memory:
@@ -126,30 +164,32 @@ def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rai
         memory = _moved(config, memory, until_ns)
         since_ns, before_ns = before_ns, until_ns
         now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
-        memory = memory._replace(bank=_felt(config, memory, now))
+        memory = _felt(config, memory, now)
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
                 variance = config.speed_std_mps**2 if speed.variance is None else speed.variance
                 seen = speed_seen(memory.bank, speed.speed_mps, variance + SPEED_ERROR_MPS**2)
-                memory = memory._replace(bank=corrected(memory.bank, seen).normalised())
+                memory = memory.told(seen, fixes=2)
         brake = memory.brake.after(
             config, (each for each in pressures if since_ns < each.t_ns <= until_ns), measurement.demand_pa
         )
         memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
     if measurement.has_position and not memory.misled:
-        declared = math.sqrt(measurement.variance_m2)
-        seen = position_seen(memory.bank, measurement.position_m, declared)
         course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
-        bank = corrected(memory.bank, seen).normalised()
-        memory = memory._replace(bank=bank, declared_m=declared, course=course)
+        memory = _with_position(memory, measurement)._replace(course=course)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 
-def apart(config: Config, memory: Memory, measurement: Measurement) -> float:
-    """Deviation of the measured position from what was foreseen, in standard deviations, by the hypothesis nearest."""
+def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
+    """How far the measured position lies from what was foreseen; 0 if none was."""
+    if not (measurement.has_position and memory.is_placed):
+        return Off(0.0, 1.0, 0.0)
     bank = _moved(config, memory, measurement.t_ns).bank
     seen = position_seen(bank, measurement.position_m, math.sqrt(measurement.variance_m2))
-    return float(seen.apart(bank).min())
+    sigmas = seen.apart(bank)
+    metres = float(bank.weight @ seen.innovation)
+    each = np.square(seen.innovation / np.maximum(sigmas, 1e-9)) + np.square(seen.innovation - metres)
+    return Off(metres, math.sqrt(bank.weight @ each), float(sigmas.min()))
 
 
 def _steps(from_ns: int, to_ns: int, stamps: Iterable[int]) -> Iterator[int]:
@@ -169,14 +209,14 @@ def _moved(config: Config, memory: Memory, until_ns: int) -> Memory:
     return memory._replace(bank=bank, t_ns=until_ns, since_s=memory.since_s + dt_s)
 
 
-def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample]) -> Bank:
+def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample]) -> Memory:
     """Take in the mean of accelerations."""
     if not felt:
-        return memory.bank
+        return memory
     mean = sum(each.acceleration_mps2 for each in felt) / len(felt)
     variances = [config.imu_std_mps2**2 if each.variance is None else each.variance for each in felt]
     variance = sum(variances) / len(felt) ** 2
-    return corrected(memory.bank, acceleration_seen(config, memory.bank, mean, variance, memory.braking)).normalised()
+    return memory.told(acceleration_seen(config, memory.bank, mean, variance, memory.braking))
 
 
 def _pressures(measurement: Measurement) -> tuple[PressureSample, ...]:

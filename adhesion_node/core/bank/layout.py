@@ -51,6 +51,11 @@ class Bank(NamedTuple):
         result: Array = np.exp(self.log_weight)
         return result
 
+    def is_sound(self) -> bool:
+        """Whether every number is finite and no variance below 0."""
+        finite = all(bool(np.isfinite(numbers).all()) for numbers in (self.mean, self.covariance, self.log_weight))
+        return finite and bool((self.covariance[:, EACH, EACH] >= 0.0).all())
+
     def normalised(self) -> Bank:
         """With probabilities that sum to 1."""
         return self._replace(log_weight=self.log_weight - np.logaddexp.reduce(self.log_weight))

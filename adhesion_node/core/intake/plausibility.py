@@ -58,7 +58,7 @@ class Repeated(NamedTuple, Generic[Known]):
         if self.before is None:
             return False
         known_s = abs(self.since_ns - self.before.t_ns) * 1e-9
-        slowest = max(self.before.speed_mps - 3.0 * self.before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
+        slowest = max(abs(self.before.speed_mps) - 3.0 * self.before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
         return least_way(slowest, (measurement.t_ns - self.since_ns) * 1e-9) >= stuck_way(measurement.variance_m2)
 
 

@@ -48,15 +48,18 @@ class Context(NamedTuple):
 
 
 class Fit(NamedTuple):
-    """How a window was evaluated; an estimate tells it as it is."""
+    """How a window was evaluated, or what the bank did; an estimate tells it as it is."""
 
     window: int = 0
-    """Measurements in the window; 0 where none was evaluated."""
+    """Measurements in the window, of the bank: of the present braking so far; 0 where there is none."""
     iterations: int = 0
+    """Until the window's fit converged; of the bank, which looks at every measurement once, 1 within a braking."""
     converged: bool = True
+    """Always so of the bank."""
     log_likelihood: float = 0.0
+    """Of the window's measurements; of the bank: of those since the last estimate, foreseen one by one."""
     ess: float = 0.0
-    """Smallest effective sample size in the window; 0 where no particles were used."""
+    """Smallest effective sample size in the window, 0 where no particles were used; of the bank: of its hypotheses."""
     shape: SpeedLaw | None = None
     """How mu goes on, up to a factor, as the train slows down; None: nothing is known of it."""
 

@@ -16,7 +16,6 @@ import numpy as np
 
 from ...bag import BagReader, select
 from ...command.options import progress
-from ...core import Config
 from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
 from ...core.atp.received import TrainState
@@ -28,6 +27,7 @@ from ...core.prediction import Prediction
 from ...run import offline
 from ...run.pipeline import Pipeline
 from ...run.score import Truth
+from ..trial.estimators import EXACT
 from ..xie.distances import BRAKINGS
 from ..xie.published import WORST
 
@@ -82,7 +82,7 @@ def predictions(bag: Path, seed: int) -> list[Prediction]:
     """What the estimator says in an offline replay of a recording. Raises ValueError when it cannot be read."""
     with BagReader(bag) as reader:
         messages = offline.messages(reader, select(reader.topics))
-        return offline.replay(Pipeline(Config(), seed), Truth(), progress(messages, "messages")).predictions
+        return offline.replay(Pipeline(EXACT, seed), Truth(), progress(messages, "messages")).predictions
 
 
 def rows(scenario: str, said: list[Prediction], kwet: float) -> Iterator[dict[str, Any]]:

@@ -5,13 +5,14 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 from sim_node.faults.plan import Plan, period_of
 from sim_node.train.sensors import SensorSettings
 
 from ...core import Config
-from ..trial.estimators import Estimator
+from ..trial.estimators import EXACT, Estimator
 from ..trial.trials import Trials
 from ..trial.world import PERIOD_S, World
 
@@ -21,7 +22,6 @@ WHOLE_RUN, BEFORE_BRAKING_S = 0.0, 10.0
 MOMENT_S = 0.0
 """Duration of a jump."""
 
-NOMINAL = Config()
 POSITIONS = SensorSettings()
 """Positions and pressures alone."""
 
@@ -57,7 +57,7 @@ def _lasting(
     name: str,
     fault: str,
     start_s: float = Plan().fault_start_s,
-    config: Config = NOMINAL,
+    config: Config = EXACT,
     sensors: SensorSettings = POSITIONS,
     size: float = 0.0,
 ) -> Case:
@@ -77,8 +77,8 @@ OUTLIERS = World("tunnel_entry", SensorSettings(outlier_fraction=0.05))
 WHEELS = SensorSettings(wheel_speed_std_radps=0.05)
 ODOMETER = SensorSettings(speed_std_mps=0.3)
 
-PAPER = Estimator(Config(method="particle_em", step=10))
-GAUSSIAN = Estimator(Config(tail_dof=0.0))
+PAPER = Estimator(replace(EXACT, method="particle_em", step=10))
+GAUSSIAN = Estimator(replace(EXACT, tail_dof=0.0))
 STRANGER = Estimator(knows_track=False)
 
 RAILS = (
@@ -96,7 +96,9 @@ RAILS = (
     Case("brake at 60 %", World("weak_brake")),
     Case("brake at 60 %, wheel speeds", World("weak_brake", WHEELS)),
     Case("5 ‰ downhill, unknown", World("grade_unknown"), STRANGER),
-    Case("the same, grade_std 0.003", World("grade_unknown"), STRANGER._replace(config=Config(grade_std=0.003))),
+    Case(
+        "the same, grade_std 0.003", World("grade_unknown"), STRANGER._replace(config=replace(EXACT, grade_std=0.003))
+    ),
     Case("10 % heavier", World("overweight")),
     Case("tunnel unknown", ENTRY, STRANGER),
     Case("Gaussian weights: as believed", ENTRY, GAUSSIAN),
@@ -122,7 +124,7 @@ FAULTS = (
     _lasting("1e308 on top", "huge"),
     _lasting("no variance told", "zero_variance"),
     _lasting("negative variance, on top", "negative_variance"),
-    _lasting("0.3 s late, max_lag_s 0.5", "late", config=Config(max_lag_s=0.5)),
+    _lasting("0.3 s late, max_lag_s 0.5", "late", config=replace(EXACT, max_lag_s=0.5)),
     _lasting("0.3 s late, too late", "late"),
     _lasting("sent twice", "duplicates"),
     _passing("stamps 100 s back", "stamps_back", MOMENT_S),
@@ -131,9 +133,9 @@ FAULTS = (
     _passing("stuck position for 10 s", "stuck", 10.0),
     _lasting("10, 1, 50 Hz in turn, ±30 %", "irregular"),
     _lasting("5 ‰ downhill, unknown", "grade", WHOLE_RUN),
-    _lasting("the same, grade_std 0.005", "grade", WHOLE_RUN, Config(grade_std=0.005)),
+    _lasting("the same, grade_std 0.005", "grade", WHOLE_RUN, replace(EXACT, grade_std=0.005)),
     _lasting("10 % heavier", "mass", WHOLE_RUN),
-    _lasting("the same, mass_std 0.1", "mass", WHOLE_RUN, Config(mass_std=0.1)),
+    _lasting("the same, mass_std 0.1", "mass", WHOLE_RUN, replace(EXACT, mass_std=0.1)),
     _lasting("balise step of 2 m forward", "balise_step"),
     _lasting("balise step of 2 m back", "balise_step", size=-2.0),
     _lasting("balise step of 1 m back", "balise_step", size=-1.0),

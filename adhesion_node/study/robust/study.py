@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""`study robust`: the default method where rail, sensors or train are not what it believes, and under faults.
+"""`study robust`: the method `rail_condition` where rail, sensors or train are not what it believes, and under faults.
 
 Every figure of the first table stands beside that of tunnel_entry without a fault. *Bound*: estimates under the brake
 whose lower bound is not above the true adhesion; *claimed*: those that claim to observe the adhesion although the

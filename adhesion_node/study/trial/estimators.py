@@ -17,6 +17,18 @@ from ..baselines.ekf import TUNED, EkfState, Tuning, ekf_step
 from . import lockstep
 from .world import Refusal, Sent, SimulatedRun
 
+EXACT = Config(
+    method="rail_condition",
+    law_probability=0.9,
+    grade_std=0.0,
+    profile_std=0.0,
+    resistance_std=0.0,
+    mass_std=0.0,
+    brake_std=0.0,
+    rotating_mass_std=0.0,
+)
+"""The paper's world: train and track are known exactly, and the shape of the law nearly."""
+
 
 class Lane(NamedTuple):
     """A simulated run from one start of mu."""
@@ -58,7 +70,7 @@ class LaneResults(NamedTuple):
 class Estimator(NamedTuple):
     """A way to run and its settings."""
 
-    config: Config = Config()
+    config: Config = EXACT
     """The start of mu is that of the lane."""
     way: str = "pipeline"
     """One of `WAYS`."""

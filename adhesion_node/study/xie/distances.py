@@ -2,7 +2,7 @@
 
 """`study distances`: braking distances and times of Xie et al. 2019 beside the published ones, without noise.
 
-With `--runs` also those by the adhesion that the paper's method and the default one identify in the runs of
+With `--runs` also those by the adhesion that the paper's method and `rail_condition` identify in the runs of
 `study tables`, whose cache both share.
 """
 
@@ -27,7 +27,7 @@ BRAKINGS = {"tunnel_entry": (300.0, 100.0), "tunnel_exit": (250.0, 50.0)}
 """Speeds of the scenarios, km/h."""
 
 IDENTIFYING = ("particle_em", "rail_condition")
-"""The paper's method and the default one."""
+"""The paper's method and the smoother."""
 
 SPEEDS = Column("km/h", 12, "", lambda row: f"{row['from_kmh']:>5g} -> {row['to_kmh']:>3g}")
 

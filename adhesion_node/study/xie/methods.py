@@ -9,7 +9,7 @@ from sim_node.train.sensors import SensorSettings
 
 from ...core import Config
 from ..baselines.ekf import NAIVE, TUNED
-from ..trial.estimators import Estimator
+from ..trial.estimators import EXACT, Estimator
 from ..trial.trials import Trials
 from ..trial.world import World
 
@@ -19,10 +19,11 @@ STARTS = (0.0, 0.03, 0.05, 0.09, 0.12)
 NOMINAL_SIGMA_M = 0.5
 """Standard deviation of the positions."""
 
-PAPER = Config(method="particle_em", window=50, step=10, particles=20, iterations=50)
+PAPER = replace(EXACT, method="particle_em", window=50, step=10, particles=20, iterations=50)
 """The paper's settings at the nominal noise, those of every method in the tables."""
 
 METHODS: Mapping[str, Estimator] = {
+    "bank": Estimator(replace(PAPER, method="bank", law_probability=Config().law_probability), "core"),
     "rail_condition": Estimator(replace(PAPER, method="rail_condition"), "core"),
     "particle_em": Estimator(PAPER, "lockstep"),
     "ekf_tuned": Estimator(PAPER, "ekf", TUNED),

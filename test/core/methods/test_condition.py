@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The default method over whole brakings of an independent integrator: calibration, outliers, patches, limits, laws."""
+"""The method `rail_condition` over whole brakings of an independent integrator: calibration, outliers, patches."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ import numpy as np
 import pytest
 from journeys import LIMIT, Journey, Rail, braking, wet
 from oracles import drive
+from windowed import windowed
 
 from adhesion_node.core import Config, Estimate, Regime
 from adhesion_node.core.methods.rail_condition.method import ConditionWindow
 from adhesion_node.core.physics.adhesion import SNOW, WET
 
-LAW_KNOWN = Config(law_probability=1.0, step=10)
+LAW_KNOWN = windowed(law_probability=1.0, step=10)
 QUANTILE = 1.6448536269514722
 """Of the normal law at the configured 95 %."""
 
@@ -50,7 +51,7 @@ def test_outliers_of_20_m_change_little() -> None:
     jumps = np.where(rng.random(len(journey.measurements)) < 0.05, rng.choice([-20.0, 20.0], 250), 0.0)
     wild = [m._replace(position_m=m.position_m + d) for m, d in zip(journey.measurements, jumps, strict=True)]
     assert np.count_nonzero(jumps) > 8
-    ungated = Config(gate_sigma=1e6)  # so that the tails have to do it alone
+    ungated = windowed(gate_sigma=1e6)  # so that the tails have to do it alone
     clean, tails = (_estimates(ungated, journey._replace(measurements=m)) for m in (journey.measurements, wild))
     for before, after in zip(clean[15:], tails[15:], strict=True):
         assert abs(after.mu - before.mu) < 3.0 * before.mu_std
@@ -63,7 +64,7 @@ def test_outliers_of_20_m_change_little() -> None:
 def test_a_patch_is_found_within_seconds_and_counted(seed: int) -> None:
     """A wet rail falls to 0.45 of itself 12 s after the brakes came, at 17 s."""
     journey = braking(lambda t, v: wet(0.45 if t > 12.0 else 1.0)(t, v), 20.0, seed)
-    estimates = _estimates(Config(), journey)
+    estimates = _estimates(windowed(), journey)
     assert all(e.changes == 0 for e in estimates if e.t_ns < 17e9)
     found = [e for e in estimates if e.changes]
     assert found[0].t_ns < 22e9
@@ -79,10 +80,10 @@ def test_a_step_of_the_positions_is_no_change_of_the_rail() -> None:
     """A balise corrects the odometry 12 s after the brakes came, at any of the samples between two windows."""
     for seed in range(6):
         journey, first = braking(wet(), 15.5, seed), 170 + seed % 5
-        plain = _estimates(Config(), journey)
+        plain = _estimates(windowed(), journey)
         for size_m in (2.0, -2.0):
             later = [m._replace(position_m=m.position_m + size_m) for m in journey.measurements[first:]]
-            stepped = _estimates(Config(), journey._replace(measurements=journey.measurements[:first] + later))
+            stepped = _estimates(windowed(), journey._replace(measurements=journey.measurements[:first] + later))
             for before, after in zip(plain, stepped, strict=True):
                 assert after.changes == 0
                 assert abs(after.mu - before.mu) < 2.0 * max(before.mu_std, after.mu_std)
@@ -93,13 +94,13 @@ def test_a_step_of_the_positions_is_no_change_of_the_rail() -> None:
 
 def test_a_steady_rail_has_no_changes() -> None:
     for seed in range(3):
-        assert _estimates(Config(), braking(wet(), 25.0, seed))[-1].changes == 0
+        assert _estimates(windowed(), braking(wet(), 25.0, seed))[-1].changes == 0
 
 
 @pytest.mark.parametrize("pressure_pa", [410e3, 200e3])
 def test_a_limited_brake_claims_no_more_than_it_uses(pressure_pa: float) -> None:
     journey, limit = braking(lambda _, v: 0.14, 15.0, 2, pressure_pa=pressure_pa), LIMIT * pressure_pa / 410e3
-    estimates = _estimates(Config(), journey)
+    estimates = _estimates(windowed(), journey)
     known = float(SNOW(np.array(journey.speed_mps[-1])))
     assert estimates[-1].regime is Regime.BRAKE_LIMITED
     for estimate in estimates:
@@ -116,7 +117,7 @@ def test_a_braking_begins_with_the_bound_that_was_known(seed: int) -> None:
     """The low-adhesion law, which the first seconds neither confirm nor refute, until the rail has been seen."""
 
     def bounds(rail: Rail) -> list[float]:
-        estimates = _estimates(Config(), braking(rail, 6.0, seed))
+        estimates = _estimates(windowed(), braking(rail, 6.0, seed))
         return [estimate.mu_lower / float(SNOW(np.array(estimate.speed_mps))) for estimate in estimates]
 
     better, worse = bounds(wet()), bounds(wet(0.4))
@@ -130,7 +131,7 @@ def test_a_limited_brake_hands_on_no_knowledge_of_the_adhesion() -> None:
     """Only that it is not below: else the windows to come would take the limit for the adhesion."""
     open_rail, seen_rail = (braking(rail, 15.0, 2) for rail in (lambda _, v: 0.14, wet(0.8)))
     for journey, low, high in ((open_rail, 0.03, 0.05), (seen_rail, 0.0, 0.002)):
-        window = drive(Config(), journey.measurements)[0].window
+        window = drive(windowed(), journey.measurements)[0].window
         assert isinstance(window, ConditionWindow)
         assert low < math.sqrt(window.hypotheses[0].variance) < high
 
@@ -138,7 +139,7 @@ def test_a_limited_brake_hands_on_no_knowledge_of_the_adhesion() -> None:
 def test_where_the_search_starts_does_not_matter() -> None:
     """The second rail is at the brake's limit from 128 km/h on."""
     for journey in (braking(wet(0.8), 8.0, 4), braking(wet(), 14.0, 4, speed_mps=44.0)):
-        one, *others = (_estimates(Config(start_mu=start), journey) for start in (0.05, 0.0, 0.12))
+        one, *others = (_estimates(windowed(start_mu=start), journey) for start in (0.05, 0.0, 0.12))
         for other in others:
             for expected, estimate in zip(one, other, strict=True):
                 assert estimate.mu == pytest.approx(expected.mu, abs=0.05 * expected.mu_std)
@@ -167,11 +168,11 @@ def test_a_grade_that_was_not_told_stays_within_its_standard_deviation() -> None
 
 @pytest.mark.parametrize(
     "uncertain",
-    [Config(step=10, brake_std=0.05), Config(step=10, mass_std=0.05), Config(step=10, rotating_mass_std=0.05)],
+    [windowed(step=10, brake_std=0.05), windowed(step=10, mass_std=0.05), windowed(step=10, rotating_mass_std=0.05)],
     ids=["brake", "mass", "rotating mass"],
 )
 def test_an_uncertain_brake_widens_the_bound_only_where_it_limits(uncertain: Config) -> None:
-    config = Config(step=10)
+    config = windowed(step=10)
     limited, sliding = braking(lambda _, v: 0.14, 12.0, 6), braking(wet(0.7), 12.0, 6)
     sure, unsure = (_estimates(each, limited)[-1] for each in (config, uncertain))
     assert unsure.regime is sure.regime is Regime.BRAKE_LIMITED
@@ -195,7 +196,7 @@ def test_an_uncertain_brake_widens_the_bound_only_where_it_limits(uncertain: Con
 def test_the_shape_of_the_law_is_recognised(rail: Rail, shape: object) -> None:
     """A hundred km/h tell them apart, where each weighs the same at first."""
     journey = braking(rail, 40.0, 3, sigma_m=0.3)
-    last = _estimates(Config(step=10, law_probability=1.0 / 3.0), journey)[-1]
+    last = _estimates(windowed(step=10, law_probability=1.0 / 3.0), journey)[-1]
     assert last.shape is not None
     assert last.shape == shape if shape else last.shape.gain_kmh == 0.0
     assert abs(last.mu - journey.truth(last.t_ns)) < 3.5 * last.mu_std
@@ -207,7 +208,7 @@ def test_a_patch_that_the_brakes_limit_hid_is_not_taken_for_better_than_it_is() 
     errors, kept = [], []
     for seed in range(6):
         journey = braking(lambda t, v: wet(0.45 if t > 38.0 else 1.0)(t, v), 46.0, seed, speed_mps=60.0)
-        after = [e for e in _estimates(Config(step=10), journey) if e.changes and e.t_ns > 47e9]
+        after = [e for e in _estimates(windowed(step=10), journey) if e.changes and e.t_ns > 47e9]
         assert after
         errors += [(e.mu - journey.truth(e.t_ns)) / e.mu_std for e in after]
         kept += [e.mu_lower <= journey.truth(e.t_ns) for e in after]

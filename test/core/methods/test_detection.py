@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from journeys import Journey, braking, wet
 from oracles import Array
+from windowed import windowed
 
 from adhesion_node.core import Config, Estimate, State, finish, init, step
 from adhesion_node.core.methods.rail_condition.method import ConditionWindow
@@ -75,7 +76,7 @@ def wandering(count: int, seed: int, std_m: float = 2.0, time_s: float = 5.0) ->
 def test_the_speed_stays_with_positions_from_an_axle_that_slides(mean_s: float, seed: int) -> None:
     """Its lost way, taken for steps, hid that the speed was wrong: at 12 m/s, 40 were published."""
     clean = braking(wet(), 90.0, seed, sigma_m=0.3)
-    estimates = ride(Config(), moved(clean, lost_by_sliding(clean, seed + 1000, mean_s))).estimates[12:]
+    estimates = ride(windowed(), moved(clean, lost_by_sliding(clean, seed + 1000, mean_s))).estimates[12:]
     errors = []
     for estimate in estimates:
         true_mps = max(clean.speed_mps[round(estimate.t_ns / 1e8)], 0.0)
@@ -89,7 +90,7 @@ def test_the_speed_stays_with_positions_from_an_axle_that_slides(mean_s: float, 
 def test_a_slow_error_of_the_positions_moves_the_speed_no_further_than_itself(seed: int) -> None:
     """2 m that change within 5 s, declared as white 0.3 m."""
     clean = braking(wet(), 85.0, seed, sigma_m=0.3)
-    estimates = ride(Config(), moved(clean, wandering(len(clean.measurements), seed))).estimates[12:]
+    estimates = ride(windowed(), moved(clean, wandering(len(clean.measurements), seed))).estimates[12:]
     errors = np.array([e.speed_mps - max(clean.speed_mps[round(e.t_ns / 1e8)], 0.0) for e in estimates])
     assert np.sqrt(np.mean(errors**2)) < 1.25
     assert np.mean(np.abs(errors) < 3.0 * np.array([e.speed_std_mps for e in estimates])) > 0.35
@@ -98,7 +99,7 @@ def test_a_slow_error_of_the_positions_moves_the_speed_no_further_than_itself(se
 @pytest.mark.parametrize("seed", range(31, 35))
 @pytest.mark.parametrize("slides", [True, False])
 def test_two_steps_of_the_positions_lie_a_distance_apart(seed: int, slides: bool) -> None:
-    config, clean = Config(position_step_spacing_m=700.0), braking(wet(), 80.0, seed, sigma_m=0.3)
+    config, clean = windowed(position_step_spacing_m=700.0), braking(wet(), 80.0, seed, sigma_m=0.3)
     error = lost_by_sliding(clean, seed, 10.0) if slides else wandering(len(clean.measurements), seed)
     stepped_m = ride(config, moved(clean, error)).stepped_m
     assert stepped_m
@@ -108,7 +109,7 @@ def test_two_steps_of_the_positions_lie_a_distance_apart(seed: int, slides: bool
 def test_balises_that_correct_the_positions_are_still_steps() -> None:
     clean = braking(wet(), 60.0, 4, sigma_m=0.3)
     passed = np.floor(np.cumsum(0.1 * clean.speed_mps) / 600.0)
-    ridden = ride(Config(), moved(clean, 2.5 * (passed % 2)))
+    ridden = ride(windowed(), moved(clean, 2.5 * (passed % 2)))
     assert len(ridden.stepped_m) == np.max(passed)
     for estimate in ridden.estimates:
         assert estimate.changes == 0

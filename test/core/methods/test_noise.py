@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from windowed import windowed
 
 from adhesion_node.core import Config, Measurement, init, step
 from adhesion_node.core.methods.rail_condition.method import ConditionWindow
@@ -31,10 +32,10 @@ def _identified(true_std_m: float, given_std_m: float, config: Config, seed: int
 def test_the_factor_goes_from_the_given_to_the_true_variance(
     true_std_m: float, given_std_m: float, tail_dof: float
 ) -> None:
-    noise = _identified(true_std_m, given_std_m, Config(identify_noise=True, tail_dof=tail_dof))
+    noise = _identified(true_std_m, given_std_m, windowed(identify_noise=True, tail_dof=tail_dof))
     assert np.sqrt(noise.factor) * given_std_m == pytest.approx(true_std_m, rel=0.2)
     assert noise.steps > 400
 
 
 def test_unless_asked_the_given_variance_stands() -> None:
-    assert _identified(1.0, 0.5, Config()) == Noise()
+    assert _identified(1.0, 0.5, windowed()) == Noise()

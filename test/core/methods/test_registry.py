@@ -12,6 +12,7 @@ import pytest
 from oracles import ride
 
 from adhesion_node.core import Config, Estimate, Regime, finish, init, step
+from adhesion_node.core.bank import BANK, SUMMARY
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.belief.window import WindowSample
@@ -84,9 +85,11 @@ def test_a_window_that_has_lost_the_train_begins_anew_at_the_tracker() -> None:
 
 def test_the_setting_offers_and_describes_the_methods_of_the_registry() -> None:
     method = next(setting for setting in settings_of(Config) if setting.name == "method")
-    assert method.choices == tuple(METHODS)
+    assert method.choices == (BANK, *METHODS)
+    assert f"{BANK}: {SUMMARY}" in method.description
+    assert init(Config(method=BANK), 1).method is None
     assert all(f"{name}: {value.summary}" in method.description for name, value in METHODS.items())
     for name in METHODS:
         assert init(Config(method=name), 1).method is METHODS[name]
-    with pytest.raises(ValueError, match=r"method = 'toy': choose one of rail_condition, particle_em"):
+    with pytest.raises(ValueError, match=r"method = 'toy': choose one of bank, rail_condition, particle_em"):
         Config(method="toy")

@@ -1,3 +1,3 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The default method: a factor on the speed law, by a Gaussian smoother."""
+"""A factor on the speed law, by a Gaussian smoother in a window."""

@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The default method for one window: the rail condition kappa in mu(v) = kappa law(v), and the changes of the rail.
+"""The rail condition kappa in one window in mu(v) = kappa law(v), and the changes of the rail.
 
 The window's prior is the joint belief of (s, v, kappa) that the measurements behind it left, so nothing is counted
 twice: what the window finds is its answer, and only what leaves it becomes prior.

@@ -1,0 +1,73 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Steps of the measured positions: a balise, or another set of satellites, moves them and not the train."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..belief.rail import Rail
+from ..intake.samples import Measurement
+from .following import Memory, Off, followed
+from .layout import POSITION
+from .plausible import Course
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+AGREEING = 3
+"""Positions in a row that must lie off alike."""
+
+FIRST_SIGMA, MEAN_SIGMA, ALIKE_SIGMA = 2.5, 2.3, 3.5
+"""By how much the first of them and their mean must lie off; within what they agree, in declared deviations."""
+
+ABRUPT = 0.6
+"""Share of it that the position before may have been off: what grows is motion."""
+
+LARGEST = 4.0
+"""Size of a step over `position_step_std_m` at most."""
+
+
+class Stepping(NamedTuple):
+    """Positions that lie off alike, and what was believed before the first of them."""
+
+    before: Memory | None = None
+    """None: there are none."""
+    since: tuple[Measurement, ...] = ()
+    off_m: tuple[float, ...] = ()
+    last_off_m: float = 0.0
+    """Of the position before."""
+    stepped_m: float = -math.inf
+    """Where the positions stepped last."""
+
+    def after(self, config: Config, memory: Memory, measurement: Measurement, off: Off) -> Stepping:
+        """Take in a measurement; its position, if it has one, lies so far off what `memory` had foreseen."""
+        if not measurement.has_position:
+            return self._replace(since=(*self.since, measurement)) if self.before is not None else self
+        alike_m = ALIKE_SIGMA * math.sqrt(measurement.variance_m2)
+        if self.off_m and abs(off.metres - self.off_m[0]) < alike_m:
+            return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
+        calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m)
+        spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
+        abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
+        near = abs(off.metres) <= LARGEST * config.position_step_std_m
+        if abs(off.metres) > FIRST_SIGMA * off.std_m and spaced and abrupt and near:
+            return calm._replace(before=memory, since=(measurement,), off_m=(off.metres,))
+        return calm
+
+    def size_m(self, std_m: float) -> float:
+        """Size of the step; 0 unless it is plain."""
+        mean = sum(self.off_m) / AGREEING
+        return mean if len(self.off_m) == AGREEING and abs(mean) > MEAN_SIGMA * std_m else 0.0
+
+    def taken(self, config: Config, size_m: float, rail: Rail) -> tuple[Memory, Stepping]:
+        """The train followed anew from before the step on, which moves its position and nothing else."""
+        assert self.before is not None  # there is no size without it
+        bank = self.before.bank
+        covariance = bank.covariance.copy()
+        covariance[:, POSITION, POSITION] += size_m**2
+        memory = self.before._replace(bank=bank._replace(covariance=covariance), course=Course())
+        for measurement in self.since:
+            memory = followed(config, memory, measurement, rail)
+        return memory, Stepping(stepped_m=self.since[-1].position_m)
