@@ -34,7 +34,7 @@ STEP_S = 0.2
 """Longest step in time."""
 
 SPEED_ERROR_MPS = 0.03
-"""Of any measured speed, beside what its message tells."""
+"""Of any measured speed, beside what its message tells; it lasts, so that no filter makes it less."""
 
 PAST_NS = 4 * S
 """How far back it can go."""

@@ -15,7 +15,7 @@ from ..belief.rail import Rail
 from ..belief.regime import Regime
 from ..physics.train import GRAVITY, Array
 from . import kinds
-from .following import Memory, S
+from .following import SPEED_ERROR_MPS, Memory, S
 from .layout import GRADE, MU, ROUGH, SPEED, Bank
 from .motion import Braking, laws_of, open_variance, resistance, use
 
@@ -82,11 +82,11 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     """Judge the bank; `before` is the rail as it was known, aged to now, `nothing` what is known of any rail."""
     bank = memory.bank
     mean, covariance = bank.moments()
-    belief = Gaussian(mean[:2], covariance[:2, :2])
+    belief = Gaussian(mean[:2], covariance[:2, :2] + np.diag([0.0, SPEED_ERROR_MPS**2]))
     if memory.misled:
         return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower))
     used = use(config, bank, memory.braking, resistance(config, bank))
-    std = np.hypot(used.std(bank), config.used_ripple * used.value * used.slides)
+    std = np.hypot(used.std(bank), config.used_ripple * used.value)
     wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
     rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
