@@ -81,7 +81,9 @@ def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     slope = np.zeros(mean.shape)
     slope[:, MU] = np.where(free, 1.0, sliding * (1.0 + mean[:, ROUGH]))
     slope[:, ROUGH] = sliding * mean[:, MU]
-    slope[:, BRAKE] = np.where(free, 0.0, (1.0 - sliding) * braking.applied / (1.0 + rotating))
+    held = np.where(free, 0.0, (1.0 - sliding) / (1.0 + rotating))
+    slope[:, BRAKE] = held * braking.applied
+    slope[:, SPEED] = -held * rotating * config.train.resistance_slope(mean[:, SPEED])
     return Use(np.where(free, mean[:, MU], sliding * rail + (1.0 - sliding) * needed), slope, slides)
 
 
@@ -99,7 +101,7 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     means[:, POSITION] = mean[:, POSITION] + 0.5 * dt_s * (speed + slower)
     effect = used.slope
     effect[:, GRADE] = 1.0
-    effect[:, SPEED] = config.train.resistance_slope(speed)
+    effect[:, SPEED] += config.train.resistance_slope(speed)
     step = np.zeros(bank.covariance.shape)
     step[:, EACH, EACH] = lasting
     step[:, SPEED] -= dt_s * GRAVITY * effect

@@ -1,0 +1,90 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Banks made by hand, and a simulated train: what the tests of the bank share."""
+
+from __future__ import annotations
+
+import numpy as np
+from oracles import specific_resistance
+
+from adhesion_node.core.bank.layout import (
+    BIAS,
+    BRAKE,
+    GRADE,
+    MU,
+    OFFSET,
+    PITCH,
+    POSITION,
+    ROUGH,
+    SCALE,
+    SIZE,
+    SPEED,
+    Bank,
+)
+from adhesion_node.core.intake.samples import Measurement, PressureSample
+from adhesion_node.core.physics.train import Array
+
+S = 1_000_000_000
+FULL_PA = 410e3
+FULL = 500_183 / (536e3 * 9.8)
+"""B/(M g) of the full brake (model.md)."""
+
+MEAN = {POSITION: 500.0, SPEED: 40.0, MU: 0.05, ROUGH: 0.02, BRAKE: 1.03, GRADE: 0.002}
+MEAN |= {OFFSET: 1.5, BIAS: 0.001, PITCH: 0.08, SCALE: 0.004}
+STD = {POSITION: 2.0, SPEED: 0.4, MU: 0.01, ROUGH: 0.05, BRAKE: 0.05, GRADE: 0.003}
+STD |= {OFFSET: 1.0, BIAS: 0.003, PITCH: 0.05, SCALE: 0.005}
+
+
+def bank_of(
+    kinds: list[int], laws: list[int] | None = None, noises: list[int] | None = None, seed: int = 0, spread: float = 0.3
+) -> Bank:
+    """Hypotheses of these labels about one mean, with full covariances and unequal weights."""
+    rng, count = np.random.default_rng(seed), len(kinds)
+    std = np.array([STD[each] for each in range(SIZE)])
+    mean = np.array([MEAN[each] for each in range(SIZE)]) + spread * std * rng.standard_normal((count, SIZE))
+    root = rng.standard_normal((count, SIZE, SIZE)) / np.sqrt(SIZE)
+    shape = root @ root.transpose(0, 2, 1) + 0.2 * np.eye(SIZE)
+    bank = Bank(
+        mean,
+        std[:, None] * shape * std,
+        rng.uniform(-3.0, 0.0, count),
+        np.array(noises or [0] * count, dtype=np.intp),
+        np.array(laws or [0] * count, dtype=np.intp),
+        np.array(kinds, dtype=np.intp),
+        np.zeros(count),
+        np.zeros(count),
+    )
+    return bank.normalised()
+
+
+def braked_run(
+    mu: float, seed: int, seconds: float, dt_s: float = 0.1, speed_mps: float = 70.0, std_m: float = 0.3
+) -> tuple[Array, Array, Array]:
+    """Times, true (s, v) and measured positions of a train that begins to brake at 5 s, with adhesion `mu`.
+
+    It runs before that under the traction that holds its speed.
+    """
+    rng, fine = np.random.default_rng(seed), 10
+    count = round(seconds / dt_s)
+    truth = np.zeros((count, 2))
+    s, v, h = 0.0, speed_mps, dt_s / fine
+    for index in range(count):
+        truth[index] = s, v
+        for step in range(fine):
+            braked = index * dt_s + step * h >= 5.0
+            slowing = 9.8 * (min(mu, FULL) + float(specific_resistance(np.array(v)))) if braked else 0.0
+            s, v = s + h * v - 0.5 * h * h * slowing, v - h * slowing
+    times = dt_s * np.arange(count, dtype=np.float64)
+    return times, truth, np.asarray(truth[:, 0] + std_m * rng.standard_normal(count))
+
+
+def measurements(times: Array, positions: Array, std_m: float, pressure_pa: float = FULL_PA) -> list[Measurement]:
+    """What is measured of such a run."""
+    result = []
+    for time, position in zip(times, positions, strict=True):
+        t_ns = S + round(float(time) * 1e9)
+        pressure = pressure_pa if time >= 5.0 else 0.0
+        result.append(
+            Measurement(t_ns, float(position), std_m**2, pressure, pressures=(PressureSample(t_ns, pressure),))
+        )
+    return result

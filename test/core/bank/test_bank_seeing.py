@@ -1,0 +1,146 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What observations do: against the Kalman update of the textbook, and Gaussian densities of scipy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from banks import FULL, bank_of
+from oracles import specific_resistance
+from scipy.stats import norm
+
+from adhesion_node.core.bank.layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSITION, ROUGH, SCALE, SIZE, SPEED, Bank
+from adhesion_node.core.bank.motion import Braking
+from adhesion_node.core.bank.seeing import (
+    CLIPPED,
+    Observation,
+    acceleration_seen,
+    corrected,
+    not_slower,
+    position_seen,
+    speed_seen,
+)
+from adhesion_node.core.config import Config
+from adhesion_node.core.physics.train import Array
+
+BANK = bank_of([0, 1, 2, 5], noises=[0, 1, 2, 3], seed=11)
+CONFIG = Config()
+
+
+def textbook(x: Array, p: Array, h: Array, residual: float, r: float) -> tuple[Array, Array, float]:
+    """x + K r, Joseph's form of the covariance, and the log density of the residual."""
+    s = float(h @ p @ h) + r
+    k = p @ h / s
+    left = np.eye(SIZE) - np.outer(k, h)
+    return x + k * residual, left @ p @ left.T + r * np.outer(k, k), float(norm.logpdf(residual, scale=np.sqrt(s)))
+
+
+def check(bank: Bank, seen: Observation, rows: list[tuple[Array, float, float]]) -> None:
+    """Each row: derivative, residual and variance under a hypothesis."""
+    after = corrected(bank, seen)
+    densities = []
+    for index, (h, residual, r) in enumerate(rows):
+        x, p, density = textbook(bank.mean[index], bank.covariance[index], h, residual, r)
+        assert after.mean[index] == pytest.approx(x, rel=1e-9, abs=1e-12)
+        assert after.covariance[index] == pytest.approx(p, rel=1e-7, abs=1e-12)
+        densities.append(density)
+    gained = after.log_weight - bank.log_weight
+    assert gained - gained[0] == pytest.approx(np.array(densities) - densities[0], abs=1e-9)
+
+
+def test_a_position() -> None:
+    declared = 2.0
+    r = [declared**2, 0.2**2, 0.1**2, declared**2]  # 1, 0.1, 0.05, 1 times what is declared
+    h = np.zeros(SIZE)
+    h[POSITION] = h[OFFSET] = 1.0
+    rows = [(h, 503.0 - float(h @ x), r[index]) for index, x in enumerate(BANK.mean)]
+    check(BANK, position_seen(BANK, 503.0, declared), rows)
+
+
+def test_a_speed_with_its_scale() -> None:
+    rows = []
+    for x in BANK.mean:
+        h = np.zeros(SIZE)
+        h[SPEED], h[SCALE] = 1.0 + x[SCALE], x[SPEED]
+        rows.append((h, 40.3 - (1.0 + x[SCALE]) * x[SPEED], 0.09))
+    check(BANK, speed_seen(BANK, 40.3, 0.09), rows)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.5])
+@pytest.mark.parametrize("rising", [False, True])
+def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool) -> None:
+    braking, measured, variance = Braking(FULL, share, rising), -0.72, 0.05**2
+
+    def felt(x: Array, index: int, resisting: float) -> tuple[float, float]:
+        held = x[BRAKE] * FULL
+        rail = x[MU] * (1.0 + x[ROUGH])
+        used = (x[MU], held, share * rail + (1 - share) * held, share * rail + (1 - share) * held)[index]
+        return -(used + resisting) * (1.0 + x[PITCH]) + x[BIAS], used
+
+    rows = []
+    for index, x in enumerate(BANK.mean):
+        resisting = float(specific_resistance(np.array(x[SPEED])))  # held fixed: nothing is learnt of the speed
+        foreseen, used = felt(x, index, resisting)
+        step = 1e-6 * np.eye(SIZE)
+        h = np.array([(felt(x + d, index, resisting)[0] - felt(x - d, index, resisting)[0]) / 2e-6 for d in step])
+        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 0.06) * used) ** 2
+        rows.append((h, measured / 9.8 - foreseen, r))
+    check(BANK, acceleration_seen(CONFIG, BANK, measured, variance, braking), rows)
+
+
+def test_the_order_of_positions_does_not_matter() -> None:
+    def taken(*places: tuple[float, float]) -> Bank:
+        bank = BANK
+        for place, declared in places:
+            bank = corrected(bank, position_seen(bank, place, declared))
+        return bank
+
+    there, back = taken((501.4, 1.0), (501.6, 1.5)), taken((501.6, 1.5), (501.4, 1.0))
+    assert there.mean == pytest.approx(back.mean, rel=1e-9)
+    assert there.covariance == pytest.approx(back.covariance, rel=1e-7, abs=1e-12)
+    assert there.log_weight == pytest.approx(back.log_weight, abs=1e-9)
+
+
+def test_far_observations_pull_no_harder_than_the_limit() -> None:
+    seen = position_seen(BANK, 500.0, 1.0)
+    spread = np.abs(seen.innovation) / seen.apart(BANK)
+    at = {}
+    for sigma in (CLIPPED, 10.0, 1e3, 1e6):
+        after = corrected(BANK, seen._replace(innovation=sigma * spread))
+        at[sigma] = after
+        assert np.all(np.linalg.eigvalsh(after.covariance) > 0.0)
+    limit = at[CLIPPED].mean - BANK.mean
+    for sigma in (10.0, 1e3, 1e6):
+        assert at[sigma].mean - BANK.mean == pytest.approx(limit, rel=1e-9, abs=1e-12)
+        # evidence falls as of an exponential: by 3.5 per standard deviation
+        lost = at[CLIPPED].log_weight - at[sigma].log_weight
+        assert lost == pytest.approx(np.full(4, CLIPPED * (sigma - CLIPPED)), rel=1e-9)
+
+
+def test_evidence_and_pull_are_continuous_at_the_limit() -> None:
+    seen = position_seen(BANK, 500.0, 1.0)
+    spread = np.abs(seen.innovation) / seen.apart(BANK)
+    below = corrected(BANK, seen._replace(innovation=(CLIPPED - 1e-9) * spread))
+    above = corrected(BANK, seen._replace(innovation=(CLIPPED + 1e-9) * spread))
+    assert below.mean == pytest.approx(above.mean, abs=1e-7)
+    assert below.log_weight == pytest.approx(above.log_weight, abs=1e-7)
+    assert below.covariance == pytest.approx(above.covariance, abs=1e-7)
+
+
+def test_a_slower_rim_says_nothing() -> None:
+    after = not_slower(BANK, 30.0, 0.3)
+    assert after.mean == pytest.approx(BANK.mean, abs=1e-6)
+    assert after.covariance == pytest.approx(BANK.covariance, rel=1e-6, abs=1e-9)
+    assert np.array_equal(after.log_weight, BANK.log_weight)
+
+
+def test_a_faster_rim_corrects_and_weighs() -> None:
+    after, before = not_slower(BANK, 41.5, 0.3), BANK
+    assert np.all(after.mean[:, SPEED] > before.mean[:, SPEED])
+    assert np.all(after.covariance[:, SPEED, SPEED] < before.covariance[:, SPEED, SPEED])
+    assert np.all(after.log_weight < before.log_weight)
+    slowest, fastest = np.argmin(before.mean[:, SPEED]), np.argmax(before.mean[:, SPEED])
+    lost = before.log_weight - after.log_weight
+    assert lost[slowest] >= lost[fastest]
+    assert np.all(not_slower(BANK, 1000.0, 0.3).mean[:, SPEED] < 50.0)  # clipped

@@ -1,0 +1,159 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What the bank says: quantiles against scipy, means over the way ahead against sampled ways, bounds in their order."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from banks import FULL, FULL_PA, S, bank_of
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from adhesion_node.core.bank import verdict
+from adhesion_node.core.bank.brake import BrakeSeen
+from adhesion_node.core.bank.following import Memory
+from adhesion_node.core.bank.kinds import KINDS
+from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank
+from adhesion_node.core.bank.motion import Braking
+from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
+from adhesion_node.core.belief.rail import Rail
+from adhesion_node.core.config import Config
+from adhesion_node.core.intake.samples import PressureSample
+from adhesion_node.core.physics.braking import curve
+from adhesion_node.core.physics.train import CRH3, Array
+
+CONFIG = Config(method="bank")
+NOTHING = Rail(0.05, 0.04, 0.02)
+WANTED = (0.01, 0.025, 0.05, 0.5, 0.975)
+
+
+class Mixture(NamedTuple):
+    weights: Array
+    means: Array
+    stds: Array
+
+
+def mixture(seed: int) -> Mixture:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 12))
+    return Mixture(rng.dirichlet(np.ones(count)), rng.uniform(0.0, 0.3, count), 10 ** rng.uniform(-4.0, -1.0, count))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_quantiles_are_those_of_the_mixture(seed: int) -> None:
+    weights, means, stds = mixture(seed)
+    got = quantiles(weights, means, stds, WANTED)
+    expected = [
+        brentq(lambda x, p=p: float(weights @ norm.cdf(x, means, stds)) - p, -2.0, 2.0, xtol=1e-12) for p in WANTED
+    ]
+    assert got == pytest.approx(expected, abs=1e-8)
+    assert np.all(np.diff(got) >= 0.0)
+
+
+def test_quantiles_of_several_mixtures_at_once() -> None:
+    weights, means, stds = mixture(3)
+    rows = quantiles(weights, np.array([means, means + 0.1, 2.0 * means]), np.array([stds, stds, 2.0 * stds]), WANTED)
+    alone = quantiles(weights, means, stds, WANTED)
+    assert rows == pytest.approx(np.array([alone, alone + 0.1, 2.0 * alone]), abs=1e-8)
+
+
+@pytest.mark.parametrize("way", [20.0, 300.0, 4000.0])
+def test_what_stays_of_a_fading_error_over_the_way(way: float) -> None:
+    """The mean of an Ornstein-Uhlenbeck process over a way, given where it starts."""
+    length, count, paths = 100.0, 600, 4000
+    rng, step = np.random.default_rng(2), way / count
+    kept = math.exp(-step / length)
+    for start in (0.0, 2.0):
+        x, total = np.full(paths, start), np.zeros(paths)
+        for _ in range(count):
+            following = kept * x + math.sqrt(1.0 - kept**2) * rng.standard_normal(paths)
+            total += 0.5 * (x + following) / count
+            x = following
+        stays, added = verdict._mean_ahead(np.array([way]), length)
+        error = 4.0 * total.std() / math.sqrt(paths)
+        assert total.mean() == pytest.approx(start * stays[0], abs=error)
+        assert total.var() == pytest.approx(added[0], rel=0.1), start
+
+
+def ahead_bank(mu: float, speed: float, kinds: list[int] | None = None) -> Bank:
+    bank = bank_of(kinds or [2, 3, 4, 5], spread=0.0)
+    for component, value in ((MU, mu), (SPEED, speed), (ROUGH, 0.0), (GRADE, 0.0)):
+        bank = bank.with_fresh(component, value, 0.05 * abs(value))
+    return bank
+
+
+@pytest.mark.parametrize("mu", [0.01, 0.03, 0.08])
+@pytest.mark.parametrize("speed", [4.0, 30.0, 83.0])
+def test_ahead_is_counted_on_in_the_braking_curve(mu: float, speed: float) -> None:
+    ahead = counted_on(CONFIG, ahead_bank(mu, speed), 0.01, Braking(FULL))
+    assert ahead.speed_mps[0] == 0.0
+    assert list(ahead.speed_mps) == sorted(ahead.speed_mps)
+    assert ahead.speed_mps[-1] == pytest.approx(speed, rel=0.05)
+    assert all(0.0 <= low <= 3.0 * mu for low in ahead.mu)
+    assert ahead.mu[-1] < min(mu, FULL)
+    here = curve(CRH3, speed, ahead)
+    # the curve lies between those of its least and of its largest value
+    longest, shortest = (curve(CRH3, speed, part(ahead.mu)) for part in (min, max))
+    assert shortest.distance_m[-1] - 1e-6 <= here.distance_m[-1] <= longest.distance_m[-1] + 1e-6
+    better = curve(CRH3, speed, ahead.at_least(0.02))
+    assert better.distance_m[-1] <= here.distance_m[-1] + 1e-9
+
+
+def test_the_safer_the_longer() -> None:
+    bank = ahead_bank(0.05, 50.0)
+    lengths = [
+        curve(CRH3, 50.0, counted_on(CONFIG, bank, missed, Braking(FULL))).distance_m[-1]
+        for missed in (0.5, 0.1, 0.05, 0.01, 0.001)
+    ]
+    assert lengths == sorted(lengths)
+
+
+def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:
+    ahead = Ahead((0.0, 10.0, 20.0), (0.06, 0.05, 0.03))
+    assert ahead(np.array([0.0, 5.0, 15.0, 20.0, 90.0])) == pytest.approx([0.06, 0.055, 0.04, 0.03, 0.03])
+    assert constant(-1.0)(np.array([0.0, 80.0])) == pytest.approx([0.0, 0.0])
+
+
+def memory_of(bank: Bank, braking: Braking, seen: int) -> Memory:
+    pressed = BrakeSeen((PressureSample(10 * S, FULL_PA),), FULL_PA, FULL_PA, None, 10 * S)
+    return Memory(bank, 10 * S, 1.0, brake=pressed, braking=braking, seen=seen, known=NOTHING)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_bounds_stand_in_their_order_whatever_the_bank(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 20))
+    bank = bank_of(rng.integers(1, len(KINDS), count).tolist(), rng.integers(0, 3, count).tolist(), seed=seed)
+    wild = 10.0 ** rng.uniform(-6.0, 3.0)
+    bank = bank._replace(mean=bank.mean.copy(), covariance=wild * bank.covariance)
+    bank.mean[:, MU] = rng.choice([-0.3, -0.01, 0.0, 1e-9, 0.02, 0.5, 3.0], count)
+    bank.mean[:, SPEED] = rng.choice([-5.0, 0.0, 1e-6, 3.0, 80.0, 500.0], count)
+    bank.mean[:, GRADE] = rng.choice([-0.5, 0.0, 0.5], count)
+    for seen, braking in ((0, Braking(0.0)), (3, Braking(FULL)), (3, Braking(FULL, 0.5, True, 4.0))):
+        findings = found(CONFIG, memory_of(bank, braking, seen), NOTHING, NOTHING)
+        rail, ahead = findings.rail, findings.ahead
+        assert 0.0 <= rail.lower <= rail.mu < math.inf
+        assert 0.0 < rail.std < math.inf
+        assert all(0.0 <= each < math.inf for each in (*ahead.mu, *ahead.speed_mps))
+        assert np.all(np.isfinite(findings.belief.mean))
+
+
+def test_the_bound_is_the_mixtures_and_below_its_median() -> None:
+    bank = ahead_bank(0.05, 50.0, [2])
+    rail = found(CONFIG, memory_of(bank, Braking(FULL), 3), NOTHING, NOTHING).rail
+    std = math.hypot(
+        math.sqrt(
+            bank.covariance[0, MU, MU]
+            + (0.05**2) * bank.covariance[0, ROUGH, ROUGH]
+            + 2 * 0.05 * bank.covariance[0, MU, ROUGH]
+        ),
+        0.03 * 0.05,
+    )
+    low, bound, high = norm.ppf([0.025, 0.05, 0.975], 0.05, std)
+    assert (rail.mu, rail.lower) == pytest.approx((0.05, bound), rel=1e-6)
+    assert rail.std == pytest.approx((high - low) / 3.92, rel=1e-6)
+    assert low < rail.lower < rail.mu
