@@ -65,7 +65,7 @@ class BrakeSeen(NamedTuple):
         dumping = dumped_ns is not None and t_ns - dumped_ns < HELD_NS and t_ns - full_ns < EMPTY_NS
         demanded = demand_pa
         if demanded is None:
-            demanded = max(self.demanded_pa, pressure) if dumping else pressure
+            demanded = max(self.demanded_pa, peak) if dumping else pressure  # it fell before that was a dump
         applied = pressure
         if config.pressure_kind == "cylinder" and dumping:
             applied = demanded  # of the others nothing is known but what is asked of them

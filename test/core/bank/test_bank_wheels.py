@@ -1,0 +1,156 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What the wheels tell of a simulated train, whose radii, sliding axles and faults are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from banks import S
+
+from adhesion_node.core.bank.wheels import FRESH_NS, SLID_NS, WheelsSeen, told
+from adhesion_node.core.config import Config
+from adhesion_node.core.intake.samples import WheelSample
+from adhesion_node.core.physics.train import Array
+
+CONFIG = Config(method="bank")
+RADIUS_M = 0.46
+WORN = np.array([1.0, 0.97, 0.985, 1.01])
+EVEN = np.ones(4)
+MS = S // 1000
+
+
+def sample(t_ns: int, speed: float, creep: Array, radius: Array, rng: np.random.Generator | None = None) -> WheelSample:
+    noise = 0.0 if rng is None else 0.002 * rng.standard_normal(creep.size)
+    rates = speed * (1.0 - creep) / (RADIUS_M * radius) * (1.0 + noise)
+    return WheelSample(t_ns, tuple(rates.tolist()))
+
+
+def coasted(radius: Array, std: float = 0.1, seconds: float = 30.0, speed: float = 40.0) -> WheelsSeen:
+    rng, wheels = np.random.default_rng(1), WheelsSeen()
+    for index in range(round(seconds * 10)):
+        rolling = sample(S + index * 100 * MS, speed, np.zeros(radius.size), radius, rng)
+        wheels = wheels.after(CONFIG, rolling, speed, std, False)
+    return wheels
+
+
+def braked(wheels: WheelsSeen, creep: Array, radius: Array, speed: float = 40.0, std: float = 0.1) -> WheelsSeen:
+    for index in range(10):
+        wheels = wheels.after(CONFIG, sample(100 * S + index * 100 * MS, speed, creep, radius), speed, std, True)
+    return wheels
+
+
+NOW = 100 * S + 900 * MS
+
+
+def test_radii_are_learnt_while_coasting() -> None:
+    wheels = coasted(WORN)
+    assert wheels.radius == pytest.approx(WORN, rel=1e-3)
+    assert wheels.learnt == 300
+    assert wheels.error < 0.003
+    rolling = sample(40 * S, 35.0, np.zeros(4), WORN)
+    assert wheels.fastest(CONFIG, rolling) == pytest.approx(35.0, rel=2e-3)
+
+
+def test_nothing_is_learnt_slowly_or_while_the_speed_is_not_known() -> None:
+    assert coasted(WORN, speed=4.0).radius == (1.0,) * 4
+    assert coasted(WORN, std=2.0).radius == (1.0,) * 4
+    wheels = coasted(WORN, std=2.0)
+    assert wheels.fastest(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN)) is None
+
+
+@pytest.mark.parametrize("radius", [EVEN, WORN])
+@pytest.mark.parametrize("sliding", [0, 1, 2, 3, 4])
+def test_sliding_axles_are_counted_each_by_its_own_radius(radius: Array, sliding: int) -> None:
+    creep = np.where(np.arange(4) < sliding, 0.12, 0.003)
+    wheels = braked(coasted(radius), creep, radius)
+    assert wheels.share(NOW) == pytest.approx(sliding / 4)
+
+
+@pytest.mark.parametrize("sliding", [0, 1, 3])
+def test_worn_wheels_of_which_nothing_was_learnt_slide_by_the_others_at_most(sliding: int) -> None:
+    """Wear of 3 % beside the creep of a slide, 15 %: neither is taken for the other."""
+    creep = np.where(np.arange(4) < sliding, 0.15, 0.003)
+    wheels = braked(WheelsSeen(), creep, np.array([0.985, 0.99, 1.0, 0.995]))
+    share = wheels.share(NOW)
+    assert share == pytest.approx(sliding / 4)
+
+
+def test_all_axles_that_slide_alike_are_told_by_the_trains_speed() -> None:
+    assert braked(coasted(EVEN), np.full(4, 0.1), EVEN).share(NOW) == 1.0
+
+
+@pytest.mark.parametrize("creep", [0.05, 0.1, 0.3])
+def test_a_train_held_slower_than_it_is_claims_no_rolling(creep: float) -> None:
+    """Positions of a wheel that slides give a speed as low as that: the axles agree with it, and one rolls faster."""
+    wheels = coasted(EVEN)
+    slips = np.array([creep, creep, creep, 0.002])
+    for index in range(10):
+        stamp = 100 * S + index * 100 * MS
+        wheels = wheels.after(CONFIG, sample(stamp, 40.0, slips, EVEN), 40.0 * (1.0 - creep), 0.1, True)
+    assert wheels.share(NOW) == 0.75
+    assert wheels.fastest(CONFIG, sample(NOW, 40.0, slips, EVEN)) == pytest.approx(39.92, rel=2e-3)
+
+
+def test_an_unsure_speed_claims_neither() -> None:
+    wheels = braked(coasted(EVEN), np.full(4, 0.05), EVEN, std=4.0)
+    assert wheels.share(NOW) is None
+
+
+def test_a_dropout_leaves_the_others() -> None:
+    creep = np.array([0.12, math.nan, 0.003, math.nan])
+    wheels = braked(coasted(WORN), creep, WORN)
+    assert wheels.share(NOW) == 0.5
+    assert all(math.isfinite(each) for each in wheels.radius)
+    three = braked(coasted(WORN), np.array([0.12, math.nan, math.nan, math.nan]), WORN)
+    assert three.share(NOW) is None  # of too few it is known
+    nothing = sample(NOW, 40.0, np.full(4, math.nan), WORN)
+    assert wheels.after(CONFIG, nothing, 40.0, 0.1, True).share(NOW) == 0.5
+
+
+def test_dropouts_while_learning_spoil_nothing() -> None:
+    rng, wheels = np.random.default_rng(2), WheelsSeen()
+    for index in range(300):
+        rates = list(sample(S + index * 100 * MS, 40.0, np.zeros(4), WORN, rng).speeds_radps)
+        rates[index % 4] = math.nan if index % 2 else 0.0
+        wheels = wheels.after(CONFIG, WheelSample(S + index * 100 * MS, tuple(rates)), 40.0, 0.1, False)
+    assert wheels.radius == pytest.approx(WORN, rel=3e-3)
+
+
+def test_another_number_of_axles_is_another_train() -> None:
+    wheels = coasted(WORN)
+    two = sample(50 * S, 40.0, np.zeros(2), EVEN[:2])
+    assert wheels.fastest(CONFIG, two) is None
+    after = wheels.after(CONFIG, two, 40.0, 0.1, True)
+    assert len(after.radius) == len(after.slid_ns) == len(after.rolled_ns) == 2
+    assert after.radius == (1.0, 1.0)
+    assert after.learnt == 0
+
+
+def test_what_was_seen_fades() -> None:
+    wheels = braked(coasted(EVEN), np.array([0.12, 0.003, 0.003, 0.003]), EVEN)
+    assert wheels.share(NOW + FRESH_NS - 1) == 0.25
+    assert wheels.share(NOW + FRESH_NS) is None  # of those that rolled nothing is heard
+    assert wheels.share(NOW + SLID_NS) is None
+
+
+def test_an_axle_counts_as_sliding_between_its_slides() -> None:
+    wheels = coasted(EVEN)
+    for index in range(100):
+        creep = np.where(index % 20 < 8, np.array([0.2, 0.0, 0.0, 0.0]), 0.003)
+        stamp = 100 * S + index * 100 * MS
+        wheels = wheels.after(CONFIG, sample(stamp, 40.0, creep, EVEN), 40.0, 0.1, True)
+        assert wheels.share(stamp) == 0.25
+
+
+def test_standing_wheels_are_no_judges() -> None:
+    wheels = coasted(EVEN)
+    assert wheels.after(CONFIG, WheelSample(50 * S, (0.0,) * 4), 0.0, 0.1, True) == wheels
+
+
+def test_what_counts_as_told() -> None:
+    assert [told(share, False) > 0 for share in (0.0, 0.1, 0.25, 1.0)] == [False, False, True, True]
+    assert told(0.0, True) < 0.0 < told(None, True)
+    assert told(None, False) == told(0.1, True) == 0.0
