@@ -22,6 +22,7 @@ COLUMNS: dict[str, Sequence[tuple[str, str]]] = json.loads(Path(__file__).with_s
 
 SCENARIOS = {"tunnel_entry": "flat → wet tunnel, 300 → 100 km/h", "tunnel_exit": "tunnel → wet line, 250 → 50 km/h"}
 METHODS = {
+    "bank": "bank",
     "rail_condition": "rail condition",
     "particle_em": "paper's method",
     "ekf_tuned": "tuned EKF",

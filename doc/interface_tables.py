@@ -8,6 +8,8 @@ from pathlib import Path
 
 import adhesion_node
 from adhesion_node.core import Outcome
+from adhesion_node.core.bank.kinds import KINDS
+from adhesion_node.core.bank.learnt import KIND, QUANTITIES, RADIUS
 from adhesion_node.core.setting import Setting, by_group
 from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.codecs import Reason
@@ -32,6 +34,7 @@ def parts() -> dict[str, str]:
         ),
         "refusals": table(("refused message", "what helps"), ((f"`{r.name}`", _cell(r.value)) for r in Reason)),
         "outcomes": table(("sample", "what becomes of it"), ((f"`{o.name}`", _cell(o.value)) for o in Outcome)),
+        "learnt": table(("value", "unit", "meaning"), _learnt()),
         "house": table(("folder", "what is in it"), _house()),
         "real trains": table(("scenario", "train", "from, km/h", "differs from what the estimator is told"), _real()),
         "fitted": table(
@@ -73,6 +76,15 @@ def _range(spec: Setting) -> str:
 def _cell(text: str) -> str:
     """Keep Markdown from taking a home folder for a struck-out text, or a bar for the end of a cell."""
     return text.replace("~", "\\~").replace("|", "\\|")
+
+
+def _learnt() -> Iterator[tuple[str, ...]]:
+    """Yield what the bank learns of train and sensors."""
+    for quantity in QUANTITIES:
+        yield f"`{quantity.name}`, `{quantity.name}_std`", quantity.unit, quantity.meaning
+    kinds = ", ".join(kind.name for kind in KINDS)
+    yield f"`{KIND}NAME`", "", f"that this limits the motion: {kinds} (of the rail's roughness but the first two)"
+    yield f"`{RADIUS}AXLE`", "", "true over expected radius of the wheels of an axle"
 
 
 def _house() -> Iterator[tuple[str, str]]:

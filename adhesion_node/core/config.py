@@ -34,7 +34,7 @@ class Config:
     train: Train = CRH3
     track: Track = LEVEL
     method: str = _method(
-        "rail_condition",
+        BANK,
         "; ".join((f"{BANK}: {SUMMARY}", *(f"{name}: {method.summary}" for name, method in METHODS.items()))),
         choices=(BANK, *METHODS),
     )
@@ -42,7 +42,7 @@ class Config:
         "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))
     )
     law_probability: float = _method(
-        0.9, "Probability of that shape; else that of low_adhesion, or no dependence on speed", low=0.0, high=1.0
+        0.5, "Probability of that shape; else that of low_adhesion, or no dependence on speed", low=0.0, high=1.0
     )
     rail_drift: float = _rail(0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0)
     change_threshold: float = _rail(
@@ -196,15 +196,15 @@ class Config:
     )
     speed_scale_std: float = _unsure(0.005, "Standard deviation of the scale of measured speeds", "", 0.0, 0.5)
     grade_std: float = _unsure(
-        0.0, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
+        0.005, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
     profile_std: float = _unsure(
         0.001, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1
     )
     resistance_std: float = _unsure(0.15, "Standard deviation of the running resistance, relative", "", 0.0, 1.0)
-    mass_std: float = _unsure(0.0, "Standard deviation of the mass, relative", "", 0.0, 1.0)
-    brake_std: float = _unsure(0.0, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
-    rotating_mass_std: float = _unsure(0.0, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
+    mass_std: float = _unsure(0.05, "Standard deviation of the mass, relative", "", 0.0, 1.0)
+    brake_std: float = _unsure(0.1, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
+    rotating_mass_std: float = _unsure(0.02, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
     low_adhesion: str = _method(
         "snow", "Adhesion law to fall back to where nothing is known", choices=tuple(sorted(LAWS))
     )

@@ -154,14 +154,14 @@ def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
 
 
 def blind_estimate(config: Config, before: Estimate, t_ns: int) -> Estimate:
-    """What a consumer may count on without positions since `before`: the low-adhesion law, and a speed not yet lost."""
+    """What a consumer may count on without positions since `before`: what holds of any rail, the speed not lost yet."""
     unseen_s = (t_ns - before.t_ns) * 1e-9
-    low = float(config.low_law(np.asarray(abs(before.speed_mps))))
+    rail = unknown(config, before.speed_mps)
     return before._replace(
         t_ns=t_ns,
-        mu=low,
-        mu_std=config.unknown_std,
-        mu_lower=low,
+        mu=rail.mu,
+        mu_std=rail.std,
+        mu_lower=rail.lower,
         regime=Regime.COASTING,
         position_m=before.position_m + before.speed_mps * unseen_s,
         position_std_m=before.position_std_m + STRONGEST_MPS2 * unseen_s**2 / 2,
@@ -169,4 +169,5 @@ def blind_estimate(config: Config, before: Estimate, t_ns: int) -> Estimate:
         window=0,
         iterations=0,
         withheld=True,
+        ahead=None,
     )

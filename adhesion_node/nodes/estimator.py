@@ -13,6 +13,7 @@ from typing import Any
 
 from adhesion_node.core import Config, Estimate, Outcome, Regime
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.core.bank.learnt import learnt
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import SETTINGS, setup_of
@@ -30,6 +31,7 @@ EXAMPLES = (
 )
 
 UNMEASURED = "no brake pressure: a full brake is assumed"
+UNBRAKED = "no brake pressure: mu cannot be told; publish brake_pressure or brake_demand"
 
 
 class Estimator(EstimatingNode[Pipeline]):
@@ -58,7 +60,10 @@ def _findings(pipeline: Pipeline) -> list[Finding]:
     found = [Finding(Severity.OK, pipeline.last.regime.value)]
     newest = pipeline.state.newest
     if newest is not None and newest.brake_pressure_pa is None:
-        found.append(Finding(Severity.WARN, UNMEASURED))
+        if pipeline.state.memory is None:
+            found.append(Finding(Severity.WARN, UNMEASURED))
+        elif newest.demand_pa is None:
+            found.append(Finding(Severity.WARN, UNBRAKED))
     return found
 
 
@@ -73,7 +78,9 @@ def _values(pipeline: Pipeline) -> dict[str, str]:
         "windows": str(pipeline.windows),
     }
     told = {"confidence": f"{pipeline.config.confidence:g}", "digest": pipeline.digest}
-    return {**_estimate_values(pipeline.last), **counts, **drops, **told}
+    memory = pipeline.state.memory
+    taught = {} if memory is None else {name: f"{value:.5g}" for name, value in learnt(memory).items()}
+    return {**_estimate_values(pipeline.last), **taught, **counts, **drops, **told}
 
 
 def _estimate_values(last: Estimate | None) -> dict[str, str]:

@@ -41,8 +41,8 @@ EVERY = 50
 SHARED = (type, ModuleType, FunctionType, BuiltinFunctionType, Config)
 """Belongs to no pipeline alone."""
 
-MORE = 1.2
-"""What is held goes up and down with the brake: windows come and go."""
+MORE = 1.6
+"""What is held goes up and down with the brake: hypotheses come and go."""
 
 REASONS = ("BAD_VARIANCE", "DUPLICATE", "INVALID", "LATE", "NOT_FINITE", "OUTLIER", "STUCK", "TOO_OFTEN")
 

@@ -70,7 +70,7 @@ def other(value: Value) -> Value:
         "cylinder": "mean",
         "snow": "wet",
         "wet": "snow",
-        "rail_condition": "particle_em",
+        "bank": "particle_em",
         "track": "map",
         "auto": "position",
         "": "tunnel 0 1000",

@@ -102,7 +102,9 @@ def test_while_it_is_stuck_mu_is_withheld_and_the_curve_falls_back_to_the_low_la
         estimate, true = prediction.estimate, truth[prediction.estimate.t_ns]
         assert prediction.nominal is None
         assert prediction.safe is not None
-        assert estimate.mu_lower == pytest.approx(float(SNOW(np.array(seen.speed_mps))))
+        assert estimate.mu == pytest.approx(float(SNOW(np.array(seen.speed_mps))), rel=0.01)
+        assert estimate.mu_lower == FAST.lowest_mu
+        assert estimate.ahead is None  # else the curve would go on with what was identified
         assert prediction.safe.speed_mps[0] >= true.speed_mps
         assert estimate.position_m >= true.position_m - 3.0 * estimate.position_std_m
     stamps = [p.estimate.t_ns for p in predictions]

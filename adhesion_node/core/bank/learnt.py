@@ -1,0 +1,49 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What a journey teaches of train and sensors beside the adhesion, as numbers by name: what an operator may look at."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from ..physics.train import GRAVITY
+from .following import Memory
+from .kinds import KINDS
+from .layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, SCALE
+
+
+class Quantity(NamedTuple):
+    """A component of the belief, told with its standard deviation."""
+
+    name: str
+    component: int
+    unit: str
+    meaning: str
+    factor: float = 1.0
+    """From the component to the unit."""
+
+
+QUANTITIES = (
+    Quantity("brake_factor", BRAKE, "", "true over expected brake force"),
+    Quantity("grade_residual", GRADE, "", "grade that the profile leaves open, with the error of the resistance"),
+    Quantity("position_error", OFFSET, "m", "slow error of the positions"),
+    Quantity("speed_scale_error", SCALE, "", "scale error of the measured speeds"),
+    Quantity("acceleration_bias", BIAS, "m/s^2", "bias of the accelerometer", GRAVITY),
+    Quantity("acceleration_pitch", PITCH, "", "what the accelerometer feels too much, over the deceleration"),
+)
+
+KIND, RADIUS = "probability.", "wheel_radius."
+"""Beginnings of the names of the kinds' probabilities, and of the axles' true over expected radii."""
+
+
+def learnt(memory: Memory) -> dict[str, float]:
+    """Every quantity with its standard deviation as NAME_std, the kinds' probabilities, the radii that are known."""
+    mean, covariance = memory.bank.moments()
+    found = dict[str, float]()
+    for name, component, _, _, factor in QUANTITIES:
+        found[name] = factor * float(mean[component])
+        found[f"{name}_std"] = factor * math.sqrt(max(float(covariance[component, component]), 0.0))
+    weight = memory.bank.weight
+    found |= {f"{KIND}{kind.name}": float(weight[memory.bank.kind == k].sum()) for k, kind in enumerate(KINDS)}
+    return found | {f"{RADIUS}{axle}": radius for axle, radius in enumerate(memory.wheels.radius)}
