@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from oracles import specific_resistance
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from adhesion_node.core.physics.adhesion import WET, AdhesionLaw
 from adhesion_node.core.physics.braking import BrakingCurve, curve, distance_to
@@ -146,3 +147,33 @@ def test_less_adhesion_more_speed_or_a_descent_lengthen_it() -> None:
 def test_refuses_what_has_no_braking_curve(arguments: tuple[float, float, float, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         curve(CRH3, *arguments)
+
+
+@pytest.mark.parametrize("end_kmh", [84.0, 87.0, 90.0])
+def test_the_accident_at_salisbury_tunnel_junction(end_kmh: float) -> None:
+    """RAIB 2021: the emergency brake from 138 km/h on level track took some 1500 m + 220 m to come down to 84-90 km/h.
+
+    That is 0.25 to 0.27 m/s^2, for which the rail gave 0.02 to 0.03 beside the running resistance.
+    """
+    start, way = 138 * KMH, 1500.0 + 220.0
+
+    def at(mu: float) -> BrakingCurve:
+        return curve(CRH3, start, mu, end_kmh * KMH)
+
+    mu = float(brentq(lambda mu: at(mu).distance_m[-1] - way, 0.005, 0.09))
+    assert 0.018 <= mu <= 0.026
+    braking = at(mu)
+    mean = (start**2 - (end_kmh * KMH) ** 2) / (2.0 * way)
+    assert 0.24 <= mean <= 0.275
+    assert (start - end_kmh * KMH) / braking.time_s[-1] == pytest.approx(mean, rel=0.02)
+    # the same from the other side: with 0.02 to 0.03 the train is about so slow at the buffer of the figures
+    assert at(0.03).distance_m[-1] < way < at(0.015).distance_m[-1]
+
+
+@pytest.mark.parametrize("mu", [0.02, 0.03])
+def test_the_mean_deceleration_at_salisbury_lies_between_those_of_leaves(mu: float) -> None:
+    braking = curve(CRH3, 138 * KMH, mu, 87 * KMH)
+    mean = ((138 * KMH) ** 2 - (87 * KMH) ** 2) / (2.0 * braking.distance_m[-1])
+    # 9.8 mu and the resistance between 138 and 87 km/h, 0.0021 to 0.0039
+    assert 9.8 * (mu + 0.0021) < mean < 9.8 * (mu + 0.0039)
+    assert (0.215 < mean < 0.235) if mu == 0.02 else (0.31 < mean < 0.335)
