@@ -47,6 +47,13 @@ GOALS = {
 }
 """Figures of `study real` that have a goal: what it says, the goal, the form of a distance and its factor."""
 
+BOUGHT = ("error, %", "bound", "safe")
+BESIDE = (*BOUGHT, "covers", "short, %", "false/h")
+"""Columns of the real train's table that stand in the shorter ones."""
+
+RAILS = ("wet", "leaves")
+"""Scenarios in which sets of sensors are compared."""
+
 EARLIER = {"SBI": "sbi_m", "W": "warning_m", "P": "permitted_m", "I": "indication_m"}
 
 
@@ -69,6 +76,11 @@ def parts() -> dict[str, str]:
         made[name] = name, _listed(COLUMNS["real"], files[name], _marked)
     made["real soonest"] = "real", _listed(COLUMNS["real soonest"], _soonest(files["real"]))
     made["real goals"] = "real", table(("figure", "goal", "met", "missed most by"), _reached(files["real"]))
+    made["real before and now"] = "real", table(("case", *BESIDE), _beside(files["real_before"], files["real"]))
+    made["real sensors"] = (
+        "real",
+        table(("sensors", *(f"{rail}: {head}" for rail in RAILS for head in BOUGHT)), _bought(files["real"])),
+    )
     made["creep noise"] = "creep", _crossed("noise on λ", _noise(creep))
     made["creep coverage"] = "creep", _crossed("", _coverage(creep[0]["coverage95"]))
     for name, scenario in SCENARIOS.items():
@@ -111,6 +123,22 @@ def _reached(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
         met = sum(figure not in row["missed"] for row in judged)
         where = f"{form.format(by=factor * by)} ({worst['case']})" if worst is not None and by else "–"
         yield says, goal, f"{met} of {len(judged)}", where
+
+
+def _beside(before: Sequence[Row], now: Sequence[Row]) -> Iterator[Sequence[str]]:
+    """The cases that were measured before, too: each figure as it was and as it is."""
+    was, forms = {row["case"]: row for row in before}, dict(COLUMNS["real"])
+    for row in (row for row in now if row["case"] in was):
+        cells = ((_marked(forms[head], was[row["case"]]), _marked(forms[head], row)) for head in BESIDE)
+        yield row["case"], *(f"{then} → {after}" for then, after in cells)
+
+
+def _bought(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+    """Sets of sensors on the rails on which they are compared."""
+    at, forms = {(row["scenario"], row["fitted"]): row for row in rows}, dict(COLUMNS["real"])
+    for fitted in dict.fromkeys(fitted for rail, fitted in at if rail in RAILS):
+        own = [at.get((rail, fitted)) for rail in RAILS]
+        yield f"`{fitted}`", *("–" if row is None else _marked(forms[head], row) for row in own for head in BOUGHT)
 
 
 def _crossed(corner: str, found: Iterable[Crossed]) -> str:

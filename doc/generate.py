@@ -6,8 +6,9 @@
     python doc/generate.py --check            # name the pages that would change; exit code 1 where one would
     python doc/generate.py --measure robust   # run that study again first
 
-A part stands between `<!-- generated: NAME -->` and `<!-- end -->`. Parameters, topics and faults come from the code;
-what was measured comes from doc/evidence/*.json, the JSON of the commands in doc/evidence/made_by.json.
+A part stands between `<!-- generated: NAME -->` and `<!-- end -->`. Parameters, topics, faults and
+constants come from the code; what was measured comes from doc/evidence/*.json, the JSON of the commands in
+doc/evidence/made_by.json.
 """
 
 import argparse
@@ -17,6 +18,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+import bank_tables
 import evidence_tables
 import interface_tables
 
@@ -31,7 +33,7 @@ def written(text: str, parts: Mapping[str, str]) -> str:
 
 def changed() -> Iterator[tuple[Path, str]]:
     """Yield the pages that are not as they should be, with what they should be."""
-    parts = {**interface_tables.parts(), **evidence_tables.parts()}
+    parts = {**interface_tables.parts(), **bank_tables.parts(), **evidence_tables.parts()}
     for page in sorted(PAGES.glob("*.md")):
         text = page.read_text(encoding="utf-8")
         wanted = written(text, parts)

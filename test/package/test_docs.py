@@ -25,6 +25,7 @@ from rclpy.subscription import Subscription
 from test_package import console_scripts
 
 from adhesion_node.bag import BagReader, select
+from adhesion_node.core.bank import layout
 from adhesion_node.live.node import Live
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator
 from adhesion_node.nodes.player import Replay
@@ -130,6 +131,11 @@ def test_every_program_and_every_scenario_is_named() -> None:
     named = set(re.findall(r"`(\w+)`", text_of(ROOT / "README.md")))
     assert console_scripts().keys() <= named
     assert {*SCENARIOS, *REAL, *FITTED} <= set(re.findall(r"^\| `(\w+)` \|", text_of(DOC / "demo.md"), re.MULTILINE))
+
+
+def test_the_page_of_the_bank_names_every_component_of_its_state() -> None:
+    listed = re.findall(r"^\| `([A-Z]+)` \|", section("bank.md", "What is believed"), re.MULTILINE)
+    assert [vars(layout)[name] for name in listed] == list(range(layout.SIZE))
 
 
 def test_every_measured_file_says_how_it_was_made() -> None:

@@ -1,0 +1,79 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Tables of the bank: what it believes, its labels, and every constant with the words that stand below it."""
+
+import ast
+import importlib
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from interface_tables import table
+
+import adhesion_node.core.bank as package
+from adhesion_node.core import Config
+from adhesion_node.core.bank import kinds, layout
+from adhesion_node.core.bank.motion import laws_of
+
+COMPONENTS = [
+    name for name, value in vars(layout).items() if name.isupper() and isinstance(value, int) and name != "SIZE"
+]
+"""Names of the components of the state."""
+
+MODULES = sorted(path.stem for path in Path(package.__file__).parent.glob("[a-z]*.py"))
+
+
+def parts() -> dict[str, str]:
+    """Return the tables by the name of their part."""
+    return {
+        "bank kinds": table(("kind", "limits", "drift", "roughness", "restless", "prior"), _kinds()),
+        "bank noises": table(("white σ", "slow σ", "lasts, s", "prior"), _noises()),
+        "bank laws": table(("law over speed", "prior"), _laws()),
+        "bank constants": table(("module", "constant", "value", "what it is"), _constants()),
+    }
+
+
+def _kinds() -> Iterator[Sequence[str]]:
+    for each in kinds.KINDS:
+        limits = "adhesion" if each.slides else "brake" if each.name == "brake" else "no brake"
+        shares = (f"{share:.1%}".replace("%", " %") for share in (each.drift, each.roughness))
+        yield f"`{each.name}`", limits, *shares, f"{each.restlessness_mps:g}", f"{each.prior:g}"
+
+
+def _noises() -> Iterator[Sequence[str]]:
+    for each in kinds.NOISES:
+        parts = ((each.white, each.least_white_m), (each.slow, each.least_slow_m))
+        stds = (
+            f"{of:g} × declared" + (f", at least {least:g} m" if least else "") if of else "–" for of, least in parts
+        )
+        yield *stds, f"{each.lasts_s:g}" if each.slow else "–", f"{each.prior:g}"
+
+
+def _laws() -> Iterator[Sequence[str]]:
+    config = Config()
+    names = (f"`law` = {config.law}", f"`low_adhesion` = {config.low_adhesion}", "none: the same at any speed")
+    return ((name, f"{prior:g}") for name, (_, prior) in zip(names, laws_of(config), strict=True))
+
+
+def _constants() -> Iterator[Sequence[str]]:
+    """Yield every number that has words below it."""
+    for name in MODULES:
+        module = importlib.import_module(f"{package.__name__}.{name}")
+        body = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8")).body
+        for one, below in pairwise(body):
+            if isinstance(one, ast.Assign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
+                names = [node.id for node in ast.walk(one.targets[0]) if isinstance(node, ast.Name)]
+                values = [_value(each, getattr(module, each)) for each in names]
+                if "" not in values:
+                    words = " ".join(str(below.value.value).split())
+                    yield f"`{name}`", ", ".join(f"`{each}`" for each in names), ", ".join(values), words
+
+
+def _value(name: str, value: object) -> str:
+    """Tell a number, or several, times in s; nothing for what is none."""
+    several = np.atleast_1d(np.asarray(value))
+    if several.dtype.kind not in "if" or name in COMPONENTS:
+        return ""
+    shown = " ".join(f"{each:g}" for each in (several * 1e-9 if name.endswith("_NS") else several).tolist())
+    return f"{shown} s" if name.endswith("_NS") else shown
