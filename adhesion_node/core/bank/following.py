@@ -238,14 +238,18 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> B
     return Braking(applied, 1.0 if share is None else share, brake.rising, told(share, brake.has_slid(now_ns)))
 
 
+def _is_pressed(config: Config, memory: Memory) -> bool:
+    return memory.brake.demanded_pa >= max(config.brake_threshold_pa, 1.0)
+
+
 def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
     if not measurement.wheels:
         return memory
     mean, covariance = memory.bank.moments()
     std, wheels = math.sqrt(covariance[SPEED, SPEED]), memory.wheels
-    bank = memory.bank
+    bank, pressed = memory.bank, _is_pressed(config, memory)
     for sample in measurement.wheels:
-        wheels = wheels.after(config, sample, float(mean[SPEED]), std, memory.brake.demanded_pa > 0.0)
+        wheels = wheels.after(config, sample, float(mean[SPEED]), std, pressed)
     rim = wheels.fastest(config, measurement.wheels[-1])
     if rim is not None and memory.braked and rim > config.slowest_mps:
         error = math.hypot(WHEEL_SHARE, wheels.error) * rim
@@ -257,7 +261,7 @@ def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
     """Open or close a braking, ask what has changed, weigh what wheels and slide protection tell."""
     bank, now_s = memory.bank, memory.t_ns / S
     speed = float(bank.weight @ bank.mean[:, SPEED])
-    pressed = memory.brake.demanded_pa >= max(config.brake_threshold_pa, 1.0)
+    pressed = _is_pressed(config, memory)
     if memory.misled:
         return memory if pressed else _led_again(memory)
     braked = pressed and speed >= config.slowest_mps

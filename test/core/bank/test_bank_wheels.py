@@ -10,9 +10,11 @@ import numpy as np
 import pytest
 from banks import S
 
+from adhesion_node.core.bank.following import Memory, followed, met
 from adhesion_node.core.bank.wheels import FRESH_NS, SLID_NS, WheelsSeen, told
+from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
-from adhesion_node.core.intake.samples import WheelSample
+from adhesion_node.core.intake.samples import Measurement, SpeedSample, WheelSample
 from adhesion_node.core.physics.train import Array
 
 CONFIG = Config(method="bank")
@@ -154,3 +156,19 @@ def test_what_counts_as_told() -> None:
     assert [told(share, False) > 0 for share in (0.0, 0.1, 0.25, 1.0)] == [False, False, True, True]
     assert told(0.0, True) < 0.0 < told(None, True)
     assert told(None, False) == told(0.1, True) == 0.0
+
+
+@pytest.mark.parametrize("idle_pa", [-3e3, 0.0, 3e3])
+def test_radii_are_learnt_whatever_a_released_cylinder_seems_to_hold(idle_pa: float) -> None:
+    """A gauge that is off by less than the brake's threshold tells of no brake."""
+    memory: Memory | None = None
+    for index in range(100):
+        t_ns = S + index * 100 * MS
+        wheels = (sample(t_ns, 40.0, np.zeros(4), WORN),)
+        speeds = (SpeedSample(t_ns, 40.0, 0.01),)
+        measured = Measurement(t_ns, 4.0 * index, 0.04, idle_pa, 40.0, speeds=speeds, wheels=wheels)
+        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, Rail(0.05, 0.04, 0.02))
+    assert memory is not None
+    assert memory.wheels.learnt > 50
+    assert memory.wheels.radius == pytest.approx(WORN, rel=3e-3)
+    assert memory.wheels.share(memory.t_ns) is None
