@@ -21,8 +21,19 @@ from adhesion_node.core.bank.layout import (
     SPEED,
     Bank,
 )
+from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import Measurement, PressureSample
 from adhesion_node.core.physics.train import Array
+
+CONFIG = Config(
+    method="bank",
+    law_probability=0.9,
+    grade_std=0.0,
+    mass_std=0.0,
+    brake_std=0.0,
+    rotating_mass_std=0.0,
+)
+"""A train and a track that are known well, whatever the defaults are."""
 
 S = 1_000_000_000
 FULL_PA = 410e3

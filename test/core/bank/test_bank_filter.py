@@ -4,11 +4,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 import pytest
-from banks import FULL, FULL_PA, S, bank_of, braked_run, measurements
+from banks import CONFIG, FULL, FULL_PA, S, bank_of, braked_run, measurements
 from oracles import specific_resistance
 
 from adhesion_node.core.bank.branching import closed
@@ -21,10 +22,9 @@ from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.train import Array
 
-SURE = Config(method="bank", resistance_std=0.0, brake_drift=0.0)
+SURE = replace(CONFIG, resistance_std=0.0, brake_drift=0.0)
 """Nothing open of the resistance."""
 
-CONFIG = Config(method="bank")
 UNKNOWN = Rail(0.06, 0.04, 0.02)
 
 

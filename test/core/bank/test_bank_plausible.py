@@ -8,14 +8,13 @@ import math
 
 import numpy as np
 import pytest
-from banks import FULL, FULL_PA, S
+from banks import CONFIG, FULL, FULL_PA, S
 from oracles import specific_resistance
 
-from adhesion_node.core import Config, Measurement, Outcome, State, init, step
+from adhesion_node.core import Measurement, Outcome, State, init, step
 from adhesion_node.core.estimate import Estimate
 from adhesion_node.core.physics.train import Array
 
-CONFIG = Config(method="bank")
 BRAKE_S, RELEASE_S, END_S = 12.0, 30.0, 36.0
 H = 0.1
 
