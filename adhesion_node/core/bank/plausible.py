@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.train import GRAVITY, Array
+from ..physics.train import GRAVITY
 from . import kinds
 from .layout import SPEED, Bank
-from .motion import slow_variance, white_variance
+from .motion import white_variance
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -19,10 +19,16 @@ if TYPE_CHECKING:
 S = 1_000_000_000
 
 SPAN_NS, LEAST = 3 * S, 8
-"""Time and number of the positions that are looked at together."""
+"""Time of the positions that are kept, and how many must be looked at together."""
 
-BRAKE_ERROR, RESISTANCE_ERROR, SIGMA = 1.15, 1.2, 3.0
-"""Factors on brake and resistance, and standard deviations, beyond which a deceleration is impossible."""
+LOOKS = ((3.0, 3.0), (1.5, 4.0))
+"""Times, s, over which they are looked at, and the standard deviations beyond which a deceleration is impossible."""
+
+RECEIVER = 1
+"""Index into `NOISES` of what satellites may always do."""
+
+BRAKE_ERROR, RESISTANCE_ERROR = 1.15, 1.2
+"""Factors on the full brake and the running resistance that are still possible."""
 
 GAIN_MPS2, BRAKED_NS = 0.1, 3 * S
 """A train that has been braked so long does not gain speed by more than this, and the grade's part."""
@@ -46,24 +52,26 @@ class Course(NamedTuple):
         stamps, places = np.array([each[0] for each in self.recent]), np.array([each[1] for each in self.recent])
         if self.braked_ns is None or stamps.size < LEAST:
             return False
-        time = (stamps - stamps[-1]) / S
-        span = float(-time[0])
-        if span < 0.8 * SPAN_NS / S:
-            return False
-        slowing = -2.0 * float(np.polyfit(time, places, 2)[0])
-        error = SIGMA * _error(bank, declared_m, span, stamps.size)
         speed = max(float(bank.weight @ bank.mean[:, SPEED]), 0.0)
-        resistance = GRAVITY * float(config.train.specific_resistance(np.array(speed)))
-        most = GRAVITY * config.train.specific_brake(config.train.full_pressure_pa)
-        grade = GRAVITY * 2.0 * config.grade_error
-        if slowing > BRAKE_ERROR * most + RESISTANCE_ERROR * resistance + grade + error:
-            return True
-        long = stamps[0] - self.braked_ns >= BRAKED_NS
-        return bool(long and slowing < -GAIN_MPS2 - grade - error)
+        brake = config.train.specific_brake(config.train.full_pressure_pa)
+        resistance, grade = float(config.train.specific_resistance(np.array(speed))), 2.0 * config.grade_error
+        most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * resistance + grade)
+        time = (stamps - stamps[-1]) / S
+        for span_s, sigma in LOOKS:
+            seen = time >= -span_s
+            if np.count_nonzero(seen) < LEAST or time[seen][0] > -0.8 * span_s:
+                continue
+            slowing = -2.0 * float(np.polyfit(time[seen], places[seen], 2)[0])
+            error = sigma * _error(bank, declared_m, span_s, int(np.count_nonzero(seen)))
+            long = stamps[seen][0] - self.braked_ns >= BRAKED_NS
+            if slowing > most + error or (long and slowing < -GAIN_MPS2 - GRAVITY * grade - error):
+                return True
+        return False
 
 
 def _error(bank: Bank, declared_m: float, span_s: float, count: int) -> float:
-    """Standard deviation of the parabola's deceleration by white errors and by those that wander, m/s^2."""
-    white = 720.0 * white_variance(bank, declared_m) / (count * span_s**4)
-    wander: Array = 17.0 * 2.0 * slow_variance(bank, declared_m) / kinds.LASTS[bank.noise] / span_s**3
-    return float(np.sqrt(bank.weight @ (white + wander)))
+    """Standard deviation of the parabola's deceleration, m/s^2, by white errors and by the worst that wander."""
+    white = 720.0 * float(bank.weight @ white_variance(bank, declared_m)) / (count * span_s**4)
+    slow = np.maximum(kinds.SLOW[:, 0] * declared_m, kinds.SLOW[:, 1]) ** 2 / kinds.LASTS
+    wander = 17.0 * 2.0 * float(max(slow[RECEIVER], slow[bank.noise].max())) / span_s**3
+    return float(np.sqrt(white + wander))
