@@ -92,7 +92,7 @@ def probe(index: int, measurements: list[Measurement]) -> None:
 
 
 @given(st.integers(0, len(CONFIGS) - 1), stops)
-@settings(max_examples=60)
+@settings(max_examples=40)
 def test_any_sequence_of_measurements_leaves_a_sound_belief(
     index: int, rides: list[tuple[int, float, float | None, float, float, str]]
 ) -> None:
@@ -100,7 +100,7 @@ def test_any_sequence_of_measurements_leaves_a_sound_belief(
 
 
 @given(st.integers(0, len(CONFIGS) - 1), stops)
-@settings(max_examples=30)
+@settings(max_examples=20)
 def test_the_estimator_never_raises_and_tells_finite_numbers(
     index: int, rides: list[tuple[int, float, float | None, float, float, str]]
 ) -> None:
