@@ -75,5 +75,5 @@ def _value(name: str, value: object) -> str:
     several = np.atleast_1d(np.asarray(value))
     if several.dtype.kind not in "if" or name in COMPONENTS:
         return ""
-    shown = " ".join(f"{each:g}" for each in (several * 1e-9 if name.endswith("_NS") else several).tolist())
+    shown = " ".join(f"{each:g}" for each in (several * 1e-9 if name.endswith("_NS") else several).flat)
     return f"{shown} s" if name.endswith("_NS") else shown

@@ -69,7 +69,7 @@ def _moments(run: Run, config: Config, planned: Distances) -> list[dict[str, Any
     moments = []
     for i, speed, place, mu, lower in zip(kept.tolist(), *(column.tolist() for column in columns), strict=True):
         t_ns = int(run.speed.t_ns[i])
-        fixed = braking.curve(config.train, speed, FIXED_MU)
+        fixed = braking.curve(config.train, abs(speed), FIXED_MU)
         moments.append(
             {
                 "t": _round(run.seconds(run.speed.t_ns)[i], 2),

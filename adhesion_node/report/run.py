@@ -165,7 +165,9 @@ def distance_to_target(
     on a level track; a bound below 0 counts as no adhesion.
     """
     recorded = {curve.t_ns: curve.distance_to(target_mps) for curve in curves}
-    estimates = zip(*(a.tolist() for a in (run.speed.t_ns, *np.broadcast_arrays(run.speed.values, mu))), strict=True)
+    estimates = zip(
+        *(a.tolist() for a in (run.speed.t_ns, *np.broadcast_arrays(np.abs(run.speed.values), mu))), strict=True
+    )
     return np.array(
         [
             recorded[t_ns] if t_ns in recorded else braking.curve(train, v, max(held, 0.0), target_mps).distance_m[-1]

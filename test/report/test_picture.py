@@ -235,6 +235,12 @@ def test_distances_are_those_of_the_recorded_curves_and_of_the_present_mu_where_
     assert shown["259"] == ["208", "400"]
 
 
+def test_a_train_that_stands_may_seem_to_roll_back(recorded: Run) -> None:
+    """A speed has a sign; before, a picture of a train that stops was refused."""
+    back = recorded._replace(speed=recorded.speed.map(np.negative))
+    assert distance_to_target(back, 0.0726, 0.0, FREE) == pytest.approx(distance_to_target(recorded, 0.0726, 0.0, FREE))
+
+
 def test_distances_are_the_closed_form(recorded: Run) -> None:
     lengths = distance_to_target(recorded, 0.0726, 50.0, FREE)
     speeds = 80.0 - 2.0 * np.arange(20)
