@@ -170,7 +170,9 @@ def distance_to_target(
     )
     return np.array(
         [
-            recorded[t_ns] if t_ns in recorded else braking.curve(train, v, max(held, 0.0), target_mps).distance_m[-1]
+            recorded[t_ns]
+            if t_ns in recorded
+            else braking.curve(train, abs(v), max(held, 0.0), target_mps).distance_m[-1]
             for t_ns, v, held in estimates
         ]
     )

@@ -68,7 +68,7 @@ def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
     assert result["live_digest"] == result["digest"]
     assert (result["measurements"], result["accepted"], result["dropped"]) == (SAMPLES, SAMPLES, {})
     assert result["windows"] >= 4
-    assert result["regime_final"] == "ADHESION_LIMITED"
+    assert result["regime_final"] in ("ADHESION_LIMITED", "COASTING")  # 5 s of braking tell little of what limits
     assert result["mu_final"] == pytest.approx(0.0726 + 0.002, abs=0.02)  # wet at 280 km/h
     assert Path(result["bag"]) == tmp_path / "demo" / "bag"
     _check_bag(Path(result["bag"]))
