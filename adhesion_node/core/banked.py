@@ -46,6 +46,12 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     state = state._replace(stepping=stepping)
     if off.nearest > config.gate_sigma:
         detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
+        memory = memory.with_place(measurement)
+        behind = memory.braked and off.metres < 0.0
+        if state.outliers + 1 >= config.max_outliers and behind:
+            # under the brake positions fall behind for good where their wheel slides
+            blind = measurement._replace(variance_m2=math.inf)
+            return _accepted(config, state, blind, bank.followed(config, bank.misled(config, memory), blind, rail))
         if state.outliers + 1 >= config.max_outliers:
             anew = _anew(state, Event(Outcome.RESET, detail))
             return _accepted(config, anew, measurement, bank.met(config, measurement))

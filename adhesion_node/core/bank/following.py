@@ -85,6 +85,10 @@ class Memory(NamedTuple):
     log_likelihood: float = 0.0
     """Sum of ln p of what positions, speeds and accelerometer told since the last estimate, in m, m/s and g."""
 
+    def with_place(self, measurement: Measurement) -> Memory:
+        """With a measured position in the course that is checked, whether or not it is believed."""
+        return self._replace(course=self.course.after(measurement.t_ns, measurement.position_m, self.braked))
+
     @property
     def braked(self) -> bool:
         """Whether a braking is open."""
@@ -175,8 +179,7 @@ def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rai
         )
         memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
     if measurement.has_position and not memory.misled:
-        course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
-        memory = _with_position(memory, measurement)._replace(course=course)
+        memory = _with_position(memory, measurement).with_place(measurement)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 
@@ -276,7 +279,7 @@ def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
         return memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):
-            return _misled(config, memory)
+            return misled(config, memory)
         odds = memory.since_s * memory.braking.told
         bank = bank._replace(log_weight=bank.log_weight + odds * SLIDES[bank.kind]).normalised()
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
@@ -285,7 +288,7 @@ def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
     return _with_changes(memory._replace(bank=pruned(bank), seen=memory.seen + 1))
 
 
-def _misled(config: Config, memory: Memory) -> Memory:
+def misled(config: Config, memory: Memory) -> Memory:
     """The positions were those of a sliding wheel: go back to before, and on without them, whatever the brake does."""
     t_ns, bank = memory.past[0] if memory.past else (memory.t_ns, memory.bank)
     half = 0.5 * config.train.specific_brake(memory.brake.demanded_pa)

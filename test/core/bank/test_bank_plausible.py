@@ -59,11 +59,11 @@ def followed(positions: Array, std: float) -> tuple[State, list[Estimate]]:
     return state, estimates
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_positions_of_a_sliding_wheel_are_caught_until_the_brake_is_released(seed: int) -> None:
+@pytest.mark.parametrize(("seed", "slip"), [*((seed, 0.1) for seed in range(3)), (0, 0.15), (0, 0.2), (0, 0.3)])
+def test_positions_of_a_sliding_wheel_are_caught_until_the_brake_is_released(seed: int, slip: float) -> None:
     rng = np.random.default_rng(seed)
     _, speeds = truth(0.03)
-    positions = wheel(speeds, rng, 0.1)
+    positions = wheel(speeds, rng, slip)
     state, estimates = followed(positions, 0.3)
     assert state.counts[Outcome.SLIDING] > 0
     withheld = [(each.t_ns - S) / S for each in estimates if each.withheld]
