@@ -46,7 +46,6 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     state = state._replace(stepping=stepping)
     if off.nearest > config.gate_sigma:
         detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
-        memory = memory.with_place(measurement)
         behind = memory.braked and off.metres < 0.0
         if state.outliers + 1 >= config.max_outliers and behind:
             # under the brake positions fall behind for good where their wheel slides

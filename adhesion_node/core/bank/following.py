@@ -85,10 +85,6 @@ class Memory(NamedTuple):
     log_likelihood: float = 0.0
     """Sum of ln p of what positions, speeds and accelerometer told since the last estimate, in m, m/s and g."""
 
-    def with_place(self, measurement: Measurement) -> Memory:
-        """With a measured position in the course that is checked, whether or not it is believed."""
-        return self._replace(course=self.course.after(measurement.t_ns, measurement.position_m, self.braked))
-
     @property
     def braked(self) -> bool:
         """Whether a braking is open."""
@@ -179,7 +175,8 @@ def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rai
         )
         memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
     if measurement.has_position and not memory.misled:
-        memory = _with_position(memory, measurement).with_place(measurement)
+        course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
+        memory = _with_position(memory, measurement)._replace(course=course)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 

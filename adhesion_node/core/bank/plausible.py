@@ -21,7 +21,7 @@ S = 1_000_000_000
 SPAN_NS, LEAST = 3 * S, 8
 """Time of the positions that are kept, and how many must be looked at together."""
 
-LOOKS = ((3.0, 3.0), (1.5, 4.0))
+LOOKS = ((3.0, 4.0), (1.5, 5.0))
 """Times, s, over which they are looked at, and the standard deviations beyond which a deceleration is impossible."""
 
 RECEIVER = 1

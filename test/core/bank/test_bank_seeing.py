@@ -51,7 +51,7 @@ def check(bank: Bank, seen: Observation, rows: list[tuple[Array, float, float]])
 
 def test_a_position() -> None:
     declared = 2.0
-    r = [declared**2, 0.2**2, 0.1**2, declared**2]  # 1, 0.1, 0.05, 1 times what is declared
+    r = [declared**2, 0.1**2, 0.1**2, declared**2]  # 1, 0.05, 0.05, 1 times what is declared
     h = np.zeros(SIZE)
     h[POSITION] = h[OFFSET] = 1.0
     rows = [(h, 503.0 - float(h @ x), r[index]) for index, x in enumerate(BANK.mean)]
