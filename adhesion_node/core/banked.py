@@ -50,7 +50,8 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         if state.outliers + 1 >= config.max_outliers and behind:
             # under the brake positions fall behind for good where their wheel slides
             blind = measurement._replace(variance_m2=math.inf)
-            return _accepted(config, state, blind, bank.followed(config, bank.misled(config, memory), blind, rail))
+            memory = bank.followed(config, bank.misled(config, memory), blind, rail)
+            return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
         if state.outliers + 1 >= config.max_outliers:
             anew = _anew(state, Event(Outcome.RESET, detail))
             return _accepted(config, anew, measurement, bank.met(config, measurement))
