@@ -16,6 +16,9 @@ from .intake.samples import Measurement
 from .methods.protocol import Fit, Verdict
 from .state import State
 
+LOST_S = 5.0
+"""A wheel that slides loses no more than the way of so many seconds before it is told; further off is another place."""
+
 
 def follow_banked(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Follow the train with a good measurement; a belief whose numbers fail is given up, and met anew."""
@@ -46,7 +49,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     state = state._replace(stepping=stepping)
     if off.nearest > config.gate_sigma:
         detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
-        behind = memory.braked and off.metres < 0.0
+        behind = memory.braked and -LOST_S * state.followed_mps < off.metres < 0.0
         if state.outliers + 1 >= config.max_outliers and behind:
             # under the brake positions fall behind for good where their wheel slides
             blind = measurement._replace(variance_m2=math.inf)

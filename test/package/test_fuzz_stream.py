@@ -146,7 +146,7 @@ class Watched:
     def _note(self) -> None:
         """Count the positions among what was not used."""
         for event in self.pipeline.events:
-            of_positions = event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.STUCK)
+            of_positions = event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.SLIDING, Outcome.STUCK)
             self.refused_positions += of_positions or event.detail.startswith("PositionSample")
 
     def _check(self, predictions: list[Prediction]) -> None:
