@@ -21,6 +21,9 @@ TOOLS = {
     "bench": "adhesion_node.bench.__main__",
 }
 
+# Tables as Parquet: small files with types, which pandas, Spark and DuckDB read alike. Only where one is asked for.
+PARQUET = ["pyarrow>=15,<30"]
+
 # The studies on a Dask cluster. Its versions are those of the calendar.
 CLUSTER = ["distributed>=2024.8,<2027"]
 
@@ -67,6 +70,7 @@ setup(
         # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
         "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],
         "live": ["aiohttp>=3.9,<4"],
+        "parquet": PARQUET,
         "cluster": CLUSTER,
         "test": [
             "pytest>=7.4,<10",
@@ -74,6 +78,7 @@ setup(
             "mcap-ros2-support>=0.5.5,<1",
             "playwright>=1.48,<2",
             *CLUSTER,
+            *PARQUET,
         ],
         "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],

@@ -14,6 +14,7 @@ from ..wire.topics import POSITIONS, TRACTION_FORCE
 EXAMPLES = (
     "replay my_run --offline",
     "replay my_run --offline --set start_mu=0.12 --json result.json",
+    "replay my_run --offline --out results.csv",
     "replay my_run --rate 5",
     "replay their_run --offline --remap /gnss/along_track:=position",
 )
@@ -38,8 +39,8 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
     from .player import Replay
     from .ros import runtime
 
-    if options.set or options.params or options.node or options.seed is not None or options.estimator is not None:
-        own = "--set, --params, --node, --seed and --estimator are for --offline"
+    if any((options.set, options.params, options.node, options.estimator, options.out)) or options.seed is not None:
+        own = "--set, --params, --node, --seed, --estimator and --out are for --offline"
         raise ValueError(f"{own}: start the live estimator of your choice with its own parameters")
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
@@ -70,6 +71,8 @@ def _offline(options: argparse.Namespace) -> int:
         names = set(selection.values())
         has_place = any(topic.name in names for topic in POSITIONS)
         wanted = options.estimator or (ADHESION if has_place or TRACTION_FORCE.name not in names else CREEP)
+        if options.out and wanted == CREEP:
+            raise ValueError(f"out = {options.out}: rows are there of the adhesion alone, not of the creep curve")
         run = offline.run if wanted == ADHESION else creep_offline.run
         return run(options, reader, selection)
 
@@ -97,5 +100,9 @@ def _parser() -> argparse.ArgumentParser:
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
     either = "the adhesion under the brake, or the creep curve (default: by whether there is a position or no force)"
     straight("--estimator", choices=(ADHESION, CREEP), help=either)
+    rows = (
+        "every estimate as a row: time, place, speed, adhesion, bound, regime, distances, what was learnt of the train"
+    )
+    straight("--out", metavar="FILE.csv|.parquet", help=rows)
     setting_options(straight)
     return parser

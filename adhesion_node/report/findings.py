@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import Config, Regime
 from ..core.physics.train import KMH, Array, Train
-from ..run.score import CONVERGED_AFTER_MPS, Truth, mean_relative_error_percent
+from ..run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
 from .run import FIXED_MU, Run, distance_to_target
 from .series import NONE, Series
 
@@ -39,11 +39,6 @@ class Distances(NamedTuple):
     def saved_at_least(self) -> Array:
         """Saved at least, with the confidence of the bound."""
         return self.fixed - self.longest
-
-
-class _Point(NamedTuple):
-    t_ns: int
-    mu: float
 
 
 def distances(run: Run, target_mps: float, train: Train) -> Distances:
@@ -125,4 +120,4 @@ def _error(run: Run, config: Config) -> float | None:
     """The score of an offline replay; None where the recording holds no truth of the estimates' stamps."""
     pressure_pa = run.pressure.by_time()
     truth = Truth(mu=run.true_mu.by_time(), speed_mps=run.true_speed.by_time(), pressure_pa=pressure_pa)
-    return mean_relative_error_percent(config, truth, [_Point(*row) for row in run.mu.by_time().items()])
+    return mean_relative_error_percent(config, truth, [Point(*row) for row in run.mu.by_time().items()])

@@ -4,6 +4,7 @@
 
 import argparse
 import time
+from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
@@ -19,7 +20,8 @@ from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE, To
 from .engine import EstimatorPipeline
 from .pipeline import Pipeline
 from .reader import Reader
-from .score import Truth, mean_relative_error_percent
+from .results import row_of, rows_to
+from .score import Identified, Point, Truth, mean_relative_error_percent
 
 Recorded = tuple[str, Any, int]
 """Our name of a message's topic, the message or why it is refused, its log time in ns."""
@@ -29,18 +31,28 @@ Output = TypeVar("Output")
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
-    setup, truth = setup_of(parameters_of(options)), Truth()
+    setup = setup_of(parameters_of(options))
     anchors = [topic.name for topic in (*Reader(ADHESION_INPUTS, setup.line).anchors, SPEED)]
     if not set(anchors) & set(selection.values()):
         fix = f"; a {FIX.name} needs track_line" if FIX.name in selection.values() else ""
         raise ValueError(
             f"bag = {reader.path}: holds no {' or '.join(anchors)}, without which nothing is identified{fix}"
         )
-    pipeline = Pipeline(setup.config, setup.seed)
-    replayed = replay(pipeline, truth, progress(messages(reader, selection), "messages"), setup.line)
-    result = summary(pipeline, replayed, truth)
+    pipeline, window_ms = Pipeline(setup.config, setup.seed), array("d")
+    truth = Truth() if TRUTH_MU.name in selection.values() else None
+    recorded = progress(messages(reader, selection), "messages")
+    compared: list[Point] = []
+    with rows_to(options.out) as write:
+        # nothing is kept of an estimate but what is compared with the truth: a day takes no more memory than an hour
+        for made in predictions(pipeline, truth, recorded, setup.line, window_ms):
+            write(row_of(pipeline, made))
+            if truth is not None:
+                compared.append(Point(made.estimate.t_ns, made.estimate.mu))
+    result = summary(pipeline, window_ms, truth, compared)
+    if options.out:
+        result["out"] = options.out
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
-    return DONE if replayed.predictions else FAILED
+    return FAILED if pipeline.last is None else DONE
 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:
@@ -53,21 +65,28 @@ class Replayed(NamedTuple):
     """Result of a replay."""
 
     predictions: list[Prediction]
-    window_ms: list[float]
+    window_ms: Sequence[float]
     """How long each full window took, estimate and curves included."""
 
 
 def replay(pipeline: Pipeline, truth: Truth, recorded: Iterable[Recorded], line: Line = NOMINAL) -> Replayed:
-    """Feed recorded messages to the pipeline, and the simulator's truth to `truth`."""
-    replayed = Replayed([], [])
-    for sample, predictions, took_s in feed(pipeline, _noting(truth, recorded), ADHESION_INPUTS, line):
-        if isinstance(sample, PressureSample):
+    """Feed recorded messages to the pipeline, and the simulator's truth to `truth`; keep all that comes out."""
+    window_ms = array("d")
+    return Replayed(list(predictions(pipeline, truth, recorded, line, window_ms)), window_ms)
+
+
+def predictions(
+    pipeline: Pipeline, truth: Truth | None, recorded: Iterable[Recorded], line: Line, window_ms: "array[float]"
+) -> Iterator[Prediction]:
+    """Yield what recorded messages give as soon as it is there; note the truth, if asked for, and times of windows."""
+    noted = recorded if truth is None else _noting(truth, recorded)
+    for sample, outputs, took_s in feed(pipeline, noted, ADHESION_INPUTS, line):
+        if truth is not None and isinstance(sample, PressureSample):
             truth.pressure_pa[sample.t_ns] = sample.pressure_pa
-        if any(prediction.estimate.window >= pipeline.config.window for prediction in predictions):
-            replayed.window_ms.append(1e3 * took_s)
-        replayed.predictions.extend(predictions)
-    replayed.predictions.extend(pipeline.finish())
-    return replayed
+        if any(prediction.estimate.window >= pipeline.config.window for prediction in outputs):
+            window_ms.append(1e3 * took_s)
+        yield from outputs
+    yield from pipeline.finish()
 
 
 def feed(
@@ -106,10 +125,11 @@ def _noting(truth: Truth, recorded: Iterable[Recorded]) -> Iterator[Recorded]:
             yield name, message, log_ns
 
 
-def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, Any]:
-    """What a replay reports; without any estimate the final values are None."""
-    estimates = [prediction.estimate for prediction in replayed.predictions]
-    last = estimates[-1] if estimates else None
+def summary(
+    pipeline: Pipeline, window_ms: Sequence[float], truth: Truth | None, estimates: Iterable[Identified]
+) -> dict[str, Any]:
+    """What a replay reports; without any estimate the final values are None, without truth there is no error."""
+    last = pipeline.last
     result: dict[str, Any] = {
         "measurements": pipeline.measurements,
         "accepted": pipeline.accepted,
@@ -121,11 +141,11 @@ def summary(pipeline: Pipeline, replayed: Replayed, truth: Truth) -> dict[str, A
         "regime_final": last and last.regime.name,
         "digest": pipeline.digest,
     }
-    error = mean_relative_error_percent(pipeline.config, truth, estimates)
+    error = truth and mean_relative_error_percent(pipeline.config, truth, estimates)
     if error is not None:
         result["mean_relative_error_percent"] = error
-    if replayed.window_ms:
-        result |= {f"ms_per_window_p{p}": float(np.percentile(replayed.window_ms, p)) for p in (50, 99)}
+    if window_ms:
+        result |= {f"ms_per_window_p{p}": float(np.percentile(window_ms, p)) for p in (50, 99)}
     return result
 
 

@@ -4,7 +4,7 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -23,6 +23,13 @@ class Identified(Protocol):
 
     @property
     def mu(self) -> float: ...
+
+
+class Point(NamedTuple):
+    """An adhesion and its time, alone."""
+
+    t_ns: int
+    mu: float
 
 
 @dataclass

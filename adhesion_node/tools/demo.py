@@ -243,4 +243,5 @@ def _evaluate(reader: BagReader, task: Task) -> dict[str, Any]:
     replayed = offline.replay(pipeline, truth, offline.messages(reader, selection), setup.line)
     levels = read_status(reader, ATP_STATUS, "level").values.tolist()
     changes = [level for previous, level in pairwise(["", *levels]) if level != previous]
-    return {**offline.summary(pipeline, replayed, truth), "atp": " > ".join(changes)}
+    estimates = [made.estimate for made in replayed.predictions]
+    return {**offline.summary(pipeline, replayed.window_ms, truth, estimates), "atp": " > ".join(changes)}

@@ -23,7 +23,7 @@ from conftest import ROOT
 
 OWN = ("adhesion_node", "sim_node")
 ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|srvs|interfaces)")
-OPTIONAL = {"distributed": "cluster"}
+OPTIONAL = {"distributed": "cluster", "pyarrow": "parquet"}
 """Imported only where it is asked for: extra by module."""
 
 BY_APT = {
