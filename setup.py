@@ -11,15 +11,20 @@ NAME = "adhesion_node"
 HERE = Path(__file__).parent
 MANIFEST = ElementTree.parse(HERE / "package.xml")
 
-NODES = ("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "live", "simulator", "slip_simulator")
-TOOLS = {
-    "import_csv": "adhesion_node.tools.import_csv",
-    "recover": "adhesion_node.tools.recover",
-    "demo": "adhesion_node.tools.demo",
-    "report": "adhesion_node.report.__main__",
-    "study": "adhesion_node.study.__main__",
-    "bench": "adhesion_node.bench.__main__",
-}
+PROGRAMS = (
+    *("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "live", "simulator", "slip_simulator"),
+    *("import_csv", "recover", "demo", "report", "study", "bench"),
+)
+
+# Recordings, pictures, geographic positions, completion in the shell. The nodes of a train run without.
+TOOLS = [
+    "mcap>=1.5,<2",
+    "zstandard>=0.22,<1",
+    "rosbags>=0.11.6,<0.12",
+    "matplotlib>=3.6,<4",
+    "pyproj>=3.4,<4",
+    "argcomplete>=3,<4",
+]
 
 # Tables as Parquet: small files with types, which pandas, Spark and DuckDB read alike. Only where one is asked for.
 PARQUET = ["pyarrow>=15,<30"]
@@ -55,20 +60,12 @@ setup(
     data_files=shared_files(),
     zip_safe=False,
     python_requires=">=3.11",
-    install_requires=[
-        "numpy>=1.26,<3",
-        "scipy>=1.11,<2",
-        "matplotlib>=3.6,<4",
-        "argcomplete>=3,<4",
-        "pyproj>=3.4,<4",
-        "mcap>=1.5,<2",
-        "zstandard>=0.22,<1",
-        "rosbags>=0.11.6,<0.12",
-        "ruamel.yaml>=0.17.21,<0.20",
-    ],
+    # pyyaml: parameter files; rclpy itself has it from the distribution.
+    install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "pyyaml>=6,<7"],
     extras_require={
         # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
         "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],
+        "tools": TOOLS,
         "live": ["aiohttp>=3.9,<4"],
         "parquet": PARQUET,
         "cluster": CLUSTER,
@@ -77,20 +74,16 @@ setup(
             "hypothesis>=6.98,<7",
             "mcap-ros2-support>=0.5.5,<1",
             "playwright>=1.48,<2",
+            *TOOLS,
             *CLUSTER,
             *PARQUET,
         ],
-        "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16"],
+        "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16", "types-PyYAML>=6,<7"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
         # What `bench` measures against; particles wants numpy below 2.
         "bench": ["filterpy>=1.4.5,<3", "particles>=0.4,<0.5", "threadpoolctl>=3.2,<4"],
         # colcon drives `setup.py develop`, which setuptools 80 removed.
         "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
     },
-    entry_points={
-        "console_scripts": [
-            *(f"{node} = adhesion_node.main:{node}" for node in NODES),
-            *(f"{name} = {module}:main" for name, module in TOOLS.items()),
-        ]
-    },
+    entry_points={"console_scripts": [f"{name} = adhesion_node.main:{name}" for name in PROGRAMS]},
 )

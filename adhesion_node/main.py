@@ -1,21 +1,61 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The nodes as programs: signals are taken over first, then the node's module, with numpy and ROS, is imported.
+"""The programs. A node first takes the signals over, then its module, with numpy and ROS, is imported.
 
-So a Ctrl-C ends a program that is still importing as cleanly as one that spins.
+So a Ctrl-C ends a program that is still importing as cleanly as one that spins. A program that needs a package which
+is not installed says how to get it: the nodes of a train run with rclpy, numpy and scipy alone.
 """
 
+import sys
 from collections.abc import Callable
 from importlib import import_module
 
 from .command.signals import stop_on_signals
 
+Program = Callable[[], int]
 
-def _node(module: str) -> Callable[[], int]:
+_EXTRAS = {"aiohttp": "live", "distributed": "cluster", "rclpy": "ros"}
+"""What brings a package; the others come with `tools`."""
+
+
+def _main_of(module: str) -> Program:
+    program: Program = import_module(module).main
+    return program
+
+
+def _node(module: str) -> Program:
     def main() -> int:
         with stop_on_signals() as stop:
-            program: Callable[[], int] = import_module(module).main
+            program = _main_of(module)
             return 0 if stop.requested else program()
+
+    return _saying_what_is_missing(main)
+
+
+def _replay() -> int:
+    """It is also a tool: it takes the signals over itself where it is a node."""
+    with stop_on_signals() as stop:
+        program = _main_of("adhesion_node.nodes.replay")
+    return 0 if stop.requested else program()
+
+
+def _tool(module: str) -> Program:
+    def main() -> int:
+        return _main_of(module)()
+
+    return _saying_what_is_missing(main)
+
+
+def _saying_what_is_missing(program: Program) -> Program:
+    def main() -> int:
+        try:
+            return program()
+        except ModuleNotFoundError as error:
+            name = (error.name or "").partition(".")[0]
+            if name in ("", __package__, "sim_node"):
+                raise
+            print(f"{name} is missing: pip install '.[{_EXTRAS.get(name, 'tools')}]'", file=sys.stderr)
+            return 2
 
     return main
 
@@ -27,10 +67,10 @@ recorder = _node("adhesion_node.nodes.recorder")
 live = _node("adhesion_node.live.__main__")
 simulator = _node("sim_node.nodes.simulator")
 slip_simulator = _node("sim_node.nodes.slip_simulator")
-
-
-def replay() -> int:
-    """Run `replay`, which is also a tool: it takes the signals over itself where it is a node."""
-    with stop_on_signals() as stop:
-        program: Callable[[], int] = import_module("adhesion_node.nodes.replay").main
-    return 0 if stop.requested else program()
+replay = _saying_what_is_missing(_replay)
+import_csv = _tool("adhesion_node.tools.import_csv")
+recover = _tool("adhesion_node.tools.recover")
+demo = _tool("adhesion_node.tools.demo")
+report = _tool("adhesion_node.report.__main__")
+study = _tool("adhesion_node.study.__main__")
+bench = _tool("adhesion_node.bench.__main__")

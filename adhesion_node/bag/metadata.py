@@ -3,13 +3,11 @@
 """metadata.yaml of rosbag2: written in version 9, as ROS 2 Jazzy does, and what is read of any version."""
 
 from collections.abc import Mapping, Sequence
-from io import StringIO
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+import yaml
 
 VERSION = 9
 
@@ -52,7 +50,7 @@ class Metadata(NamedTuple):
 def read_metadata(bag: Path) -> Metadata:
     """Read the metadata in a directory; an empty one when it is missing or unreadable, as after an interruption."""
     try:
-        information = YAML(typ="safe").load((bag / "metadata.yaml").read_text(encoding="utf-8"))[_ROOT]
+        information = yaml.safe_load((bag / "metadata.yaml").read_text(encoding="utf-8"))[_ROOT]
         return Metadata(
             True,
             tuple(Path(name).name for name in information.get("relative_file_paths") or ()),
@@ -62,7 +60,7 @@ def read_metadata(bag: Path) -> Metadata:
             },
             str(information.get("compression_mode") or "none").lower() != "none",
         )
-    except (OSError, YAMLError, AttributeError, LookupError, TypeError, ValueError):
+    except (OSError, ValueError, OverflowError, yaml.YAMLError, AttributeError, LookupError, TypeError, RecursionError):
         return Metadata()
 
 
@@ -104,9 +102,7 @@ def document(files: Sequence[File], topics: Sequence[tuple[Topic, int]]) -> str:
         "custom_data": None,
         "ros_distro": "jazzy",
     }
-    text = StringIO()
-    YAML().dump({_ROOT: information}, text)
-    return text.getvalue()
+    return yaml.safe_dump({_ROOT: information}, sort_keys=False)
 
 
 def _period(first_ns: int, duration_ns: int) -> dict[str, dict[str, int]]:

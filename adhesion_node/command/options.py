@@ -4,6 +4,7 @@
 
 import argparse
 import json
+import os
 import shutil
 import sys
 import textwrap
@@ -11,8 +12,6 @@ import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
-
-import argcomplete
 
 Item = TypeVar("Item")
 
@@ -68,7 +67,7 @@ def run_tool(
     A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback.
     Bad usage ends the program with 2 (SystemExit). Asked by a shell, it says how the command line may go on and ends.
     """
-    argcomplete.autocomplete(parser)
+    complete(parser)
     options = parser.parse_args(args)
     try:
         return work(options)
@@ -78,6 +77,14 @@ def run_tool(
         return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}", FAILED)
     except KeyboardInterrupt:
         return _complain(parser, "interrupted", FAILED)
+
+
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Tell a shell that asks how the command line may go on, and end; else do nothing."""
+    if "_ARGCOMPLETE" in os.environ:
+        import argcomplete  # only here: no node needs it to run
+
+        argcomplete.autocomplete(parser)
 
 
 def report(destination: str | None, result: Mapping[str, Any] | Sequence[Any], text: str) -> None:

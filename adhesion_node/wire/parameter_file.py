@@ -13,13 +13,21 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+import yaml
 
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 """Parameters that ROS itself gives to every node: they may stand in a parameter file and mean nothing here."""
 
 _WILDCARDS = {"*": r"/\w+", "**": r"(/\w+)*"}
+
+
+class _Loader(yaml.SafeLoader):
+    """YAML as ROS reads it: 1e-6 is a number."""
+
+
+_Loader.add_implicit_resolver(
+    "tag:yaml.org,2002:float", re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$"), [*"-+.0123456789"]
+)
 
 
 class Section(NamedTuple):
@@ -64,8 +72,8 @@ def unheeded(ros_arguments: Sequence[str], node: str) -> list[str]:
 def sections(path: str) -> list[Section]:
     """Return the sections of a file in their order; ValueError when it is no readable parameter file."""
     try:
-        return list(_named(YAML(typ="safe").load(Path(path).read_text(encoding="utf-8")), ""))
-    except (OSError, UnicodeDecodeError, YAMLError, AttributeError, LookupError, TypeError) as error:
+        return list(_named(yaml.load(Path(path).read_text(encoding="utf-8"), _Loader), ""))
+    except (OSError, ValueError, yaml.YAMLError, AttributeError, LookupError, TypeError, RecursionError) as error:
         raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
 
 

@@ -18,13 +18,13 @@ from typing import Any
 import cdrs
 import numpy as np
 import pytest
+import yaml
 from conftest import SpinUntil
 from mcap.reader import make_reader
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rosbags.rosbag2 import Reader
-from ruamel.yaml import YAML
 from test_recorder import clock, has_messages, recording_process, stamped, start
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
@@ -50,7 +50,7 @@ def assert_complete(bag: Path, messages: int) -> None:
 
 
 def metadata(bag: Path) -> dict[str, Any]:
-    document = YAML(typ="safe").load((bag / "metadata.yaml").read_text())
+    document = yaml.safe_load((bag / "metadata.yaml").read_text())
     return dict(document["rosbag2_bagfile_information"])
 
 

@@ -18,15 +18,15 @@ from test_package import console_scripts
 MODULES = {"simulator": "sim_node.nodes.simulator", "slip_simulator": "sim_node.nodes.slip_simulator"}
 MODULES |= {name: f"adhesion_node.nodes.{name}" for name in ("estimator", "creep_estimator", "atp_monitor")}
 MODULES |= {name: f"adhesion_node.nodes.{name}" for name in ("recorder", "replay")}
-MODULES["live"] = "adhesion_node.live.__main__"
-"""Where the programs are whose entry only takes the signals over."""
+MODULES |= {name: f"adhesion_node.tools.{name}" for name in ("import_csv", "recover", "demo")}
+MODULES |= {name: f"adhesion_node.{name}.__main__" for name in ("live", "report", "study", "bench")}
+"""Where the programs are behind their entries."""
 
 
 @cache
 def help_of(program: str, *study: str) -> str:
     """Return what a program says of itself."""
-    module, function = console_scripts()[program]
-    main = getattr(import_module(MODULES.get(program, module)), "main" if program in MODULES else function)
+    main = import_module(MODULES[program]).main
     with pytest.MonkeyPatch.context() as patch:
         said: list[str] = []
         patch.setattr("argparse.ArgumentParser._print_message", lambda _self, message, _file=None: said.append(message))

@@ -17,10 +17,10 @@ from typing import Any
 
 import cdrs
 import pytest
+import yaml
 from conftest import ROOT
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from ruamel.yaml import YAML
 
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record
 from adhesion_node.bag.writer import file_name
@@ -157,10 +157,10 @@ ENTRIES = ("relative_file_paths", "topics_with_message_count", "compression_mode
 @given(entry=st.sampled_from(ENTRIES), value=YAML_VALUES)
 def test_metadata_of_any_shape(whole: tuple[bytes, str], entry: str, value: Any) -> None:
     mcap, metadata = whole
-    document = YAML(typ="safe").load(metadata)
+    document = yaml.safe_load(metadata)
     document["rosbag2_bagfile_information"][entry] = value
     text = io.StringIO()
-    YAML(typ="safe").dump(document, text)
+    yaml.safe_dump(document, text)
     records = read(mcap, text.getvalue())
     assert records == written() or entry == "compression_mode"
 
@@ -288,6 +288,6 @@ def test_any_file_as_a_parameter_file(data: bytes) -> None:
 @given(document=YAML_VALUES, node=st.sampled_from(["estimator", "/**", "**", "/estimator", "estimatr", "simulator"]))
 def test_parameters_of_any_shape(document: Any, node: str) -> None:
     text = io.StringIO()
-    YAML(typ="safe").dump({node: {"ros__parameters": document}}, text)
+    yaml.safe_dump({node: {"ros__parameters": document}}, text)
     values = parameters_in(text.getvalue().encode())
     assert values is None or node.strip("/") in ("estimator", "**"), "a file for another node is not taken for ours"

@@ -11,6 +11,7 @@ import re
 import runpy
 import subprocess
 import sys
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -27,9 +28,8 @@ OPTIONAL = {"distributed": "cluster", "pyarrow": "parquet"}
 """Imported only where it is asked for: extra by module."""
 
 BY_APT = {
-    *("python3-numpy", "python3-scipy", "python3-matplotlib", "python3-argcomplete", "python3-aiohttp"),
-    "python3-pyproj",
-    *("python3-ruamel.yaml", "python3-hypothesis", "python3-pytest"),
+    *("python3-numpy", "python3-scipy", "python3-yaml", "python3-matplotlib", "python3-argcomplete", "python3-aiohttp"),
+    *("python3-pyproj", "python3-hypothesis", "python3-pytest"),
 }
 BY_PIP = {"python3-rosbags-pip", "mcap-ros2-support"}
 """What the keys of rosdep/python.yaml install on Ubuntu 24.04; those by pip take a venv."""
@@ -41,7 +41,7 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "argcomplete": ("argcomplete", "python3-argcomplete"),
     "pyproj": ("pyproj", "python3-pyproj"),
     "rosbags": ("rosbags", "python3-rosbags-pip"),
-    "ruamel": ("ruamel.yaml", "python3-ruamel.yaml"),
+    "yaml": ("pyyaml", "python3-yaml"),
     "mcap": ("mcap", "mcap-ros2-support"),
     "lz4": ("lz4", "mcap-ros2-support"),
     "zstandard": ("zstandard", "mcap-ros2-support"),
@@ -143,24 +143,39 @@ def test_the_executables_of_the_design_are_there() -> None:
     assert set(console_scripts()) == NODES | tools
 
 
+def depends(*kinds: str) -> set[str | None]:
+    return {depend.text for kind in kinds for depend in manifest().findall(kind)}
+
+
+def names_of(requirements: Iterable[str]) -> set[str]:
+    return {re.split(r"[<>=~!\[]", requirement)[0] for requirement in requirements}
+
+
 def test_what_is_imported_is_declared() -> None:
-    depends = {depend.text for depend in manifest().findall("exec_depend")}
     ros_packages = {name for name in imported() if ROS.fullmatch(name)}
-    assert ros_packages <= depends
+    assert ros_packages <= depends("exec_depend")
     extras = setup_arguments()["extras_require"]
-    requirements = [*setup_arguments()["install_requires"], *extras["live"]]
-    required = {re.split(r"[<>=~!\[]", requirement)[0] for requirement in requirements}
+    requirements = [*setup_arguments()["install_requires"], *extras["tools"], *extras["live"]]
     assert all(requirement.startswith(name) for name, extra in OPTIONAL.items() for requirement in extras[extra])
     for name in imported() - ros_packages - PEERS - OPTIONAL.keys():
         distribution, rosdep_key = FROM_PYPI[name]
-        assert distribution in required
-        assert rosdep_key in depends
-    assert not any(ROS.fullmatch(name) for name in required), "ROS is no PyPI requirement; it stands in the extra `ros`"
+        assert distribution in names_of(requirements)
+        assert rosdep_key in depends("exec_depend", "test_depend")
+    found = names_of(requirements)
+    assert not any(ROS.fullmatch(name) for name in found), "ROS is no PyPI requirement; it stands in the extra `ros`"
+
+
+def test_a_train_needs_ros_numpy_and_scipy_alone() -> None:
+    """YAML: what rclpy itself reads parameters with."""
+    assert names_of(setup_arguments()["install_requires"]) == {"numpy", "scipy", "pyyaml"}
+    keys = {name for name in depends("exec_depend") if not ROS.fullmatch(str(name))}
+    assert keys == {"python3-numpy", "python3-scipy", "python3-yaml"}
+    extras = setup_arguments()["extras_require"]
+    assert set(extras["tools"]) <= set(extras["test"])
 
 
 def test_rosdep_knows_every_key_and_the_documentation_those_by_pip() -> None:
-    keys = {depend.text for kind in ("exec_depend", "test_depend") for depend in manifest().findall(kind)}
-    assert {key for key in keys if not ROS.fullmatch(str(key))} == BY_APT | BY_PIP
+    assert {key for key in depends("exec_depend", "test_depend") if not ROS.fullmatch(str(key))} == BY_APT | BY_PIP
     assert {key for _, key in FROM_PYPI.values()} <= BY_APT | BY_PIP
     page = (ROOT / "doc" / "install.md").read_text(encoding="utf-8")
     skipped = re.search(r'^rosdep install .* --skip-keys "(.*)"$', page, re.MULTILINE)

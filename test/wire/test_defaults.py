@@ -14,10 +14,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 from conftest import ROOT
 from rclpy.context import Context
 from rclpy.node import Node
-from ruamel.yaml import YAML
 from test_offline import samples, write_run
 
 from adhesion_node.core import Config
@@ -40,7 +40,7 @@ NODES: dict[str, tuple[Callable[..., Node], tuple[Setting, ...]]] = {
 
 def sections(path: Path = DEFAULTS) -> dict[str, dict[str, Any]]:
     """Return the parameters of each node as ROS spells them: `train: {mass_kg: 1}` is train.mass_kg."""
-    document = YAML(typ="safe").load(path.read_text(encoding="utf-8"))
+    document = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert all(list(section) == ["ros__parameters"] for section in document.values())
     return {name: dict(spelled(section["ros__parameters"])) for name, section in document.items()}
 
@@ -117,12 +117,12 @@ def test_with_the_defaults_the_estimator_is_the_nominal_one(context: Context) ->
 
 def write_changed(path: Path) -> dict[str, Any]:
     """Write the file with every value of the estimator changed, and return the values."""
-    document = YAML(typ="safe").load(DEFAULTS.read_text(encoding="utf-8"))
+    document = yaml.safe_load(DEFAULTS.read_text(encoding="utf-8"))
     section = document["estimator"]["ros__parameters"]
     path.with_suffix(".csv").write_text("lat,lon\n47,8\n47.1,8\n", encoding="utf-8")
     document["estimator"]["ros__parameters"] = _changed(section) | {"track_line": str(path.with_suffix(".csv"))}
     with path.open("w", encoding="utf-8") as stream:
-        YAML(typ="safe").dump(document, stream)
+        yaml.safe_dump(document, stream)
     return sections(path)["estimator"]
 
 

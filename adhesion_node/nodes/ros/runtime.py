@@ -13,7 +13,6 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 
-import argcomplete
 import rclpy
 from rclpy.duration import Duration
 from rclpy.exceptions import NameValidationException, ParameterException
@@ -24,7 +23,7 @@ from rclpy.utilities import ok, try_shutdown
 
 from adhesion_node.command.signals import StopRequest, stop_on_signals
 
-from ...command.options import BAD_INPUT, DONE, FAILED, help_texts
+from ...command.options import BAD_INPUT, DONE, FAILED, complete, help_texts
 from ...core.setting import Setting, by_group
 from ...wire.parameter_file import unheeded
 
@@ -102,7 +101,7 @@ def _parser(
         parser.add_argument("--ros-args", action="store_true")
         parser.add_argument("-p", "--param", action="append", choices=[f"{one.name}:=" for one in parameters])
         parser.add_argument("--params-file", action="append")
-        argcomplete.autocomplete(parser)
+        complete(parser)
     return parser
 
 

@@ -1,0 +1,84 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""On a train there is ROS with numpy and scipy: the nodes run there, and every other program says what it lacks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from functools import cache
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+from test_package import console_scripts, names_of, setup_arguments
+
+ON_THE_TRAIN = ("estimator", "creep_estimator", "atp_monitor", "simulator", "slip_simulator")
+DEFAULTS = ROOT / "adhesion_node" / "nodes" / "defaults.yaml"
+
+BARE = """
+import sys
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in {refused}:
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+sys.meta_path.insert(0, Refuse())
+from adhesion_node import main
+sys.exit(main.{program}())
+"""
+"""A program where nothing is installed that setup.py has as an extra."""
+
+NO_PROGRAM = {"ros", "test", "lint", "docs", "build"}
+"""Extras that no program imports, and ROS itself."""
+
+
+@cache
+def refused() -> frozenset[str]:
+    """The modules that the extras bring."""
+    extras = setup_arguments()["extras_require"]
+    wanted = names_of(one for name, extra in extras.items() if name not in NO_PROGRAM for one in extra)
+    wanted = {name.lower().replace("_", "-") for name in wanted} - names_of(setup_arguments()["install_requires"])
+    there = packages_distributions().items()
+    return frozenset(name for name, of in there if {one.lower().replace("_", "-") for one in of} <= wanted)
+
+
+def on_bare(program: str, *arguments: str) -> subprocess.Popen[str]:
+    private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
+    environment = {name: value for name, value in os.environ.items() if name not in private}
+    code = BARE.format(refused=set(refused()), program=program)
+    command = [sys.executable, "-c", code, *arguments]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.mark.parametrize("program", ON_THE_TRAIN)
+def test_a_node_runs_with_ros_numpy_and_scipy_alone(program: str) -> None:
+    assert {"matplotlib", "mcap", "rosbags", "pyproj", "argcomplete"} <= refused()
+    with on_bare(program, "--ros-args", "--params-file", str(DEFAULTS)) as process:
+        try:
+            assert process.stderr is not None
+            told = next((line for line in process.stderr if "parameters: " in line), "")
+            process.send_signal(signal.SIGINT)
+            _, rest = process.communicate(timeout=60.0)
+        finally:
+            process.kill()
+    assert told, rest
+    assert process.returncode == 0, rest
+
+
+@pytest.mark.parametrize("program", sorted(console_scripts().keys() - set(ON_THE_TRAIN)))
+def test_any_other_program_says_what_to_install(program: str, tmp_path: Path) -> None:
+    given = ["--output", str(tmp_path / "run")] if program == "recorder" else ["--help"]
+    with on_bare(program, *given) as process:
+        _, told = process.communicate(timeout=60.0)
+    runs = program in ("bench", "live")
+    assert (process.returncode, told) == ((0, "") if runs else (2, "rosbags is missing: pip install '.[tools]'\n"))
+
+
+def test_the_estimator_drags_nothing_else_in() -> None:
+    """An optional package that is there is not loaded either: the start is as quick as ROS itself allows."""
+    code = "import sys, adhesion_node.nodes.estimator; print(*{name.partition('.')[0] for name in sys.modules})"
+    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    assert not set(loaded) & {*refused(), "numba", "pandas", "matplotlib"}
