@@ -4,7 +4,7 @@
 
 ::
 
-    adhesion/state, adhesion/braking_curve  ->  atp/status
+    adhesion/state, adhesion/braking_curve  ->  atp/status, /diagnostics
 
 It judges a state and the curve made of it as a pair. Two watchdogs judge when no pair comes, because silence is no
 message: one on the ROS clock, and one on the machine's own for the case that the ROS clock stands still.
@@ -24,11 +24,11 @@ from adhesion_node.core.atp.supervision import Decision, Level, Severity, decide
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Rejected
-from adhesion_node.wire.results import Status
-from adhesion_node.wire.settings import ATP_SETTINGS, Watchdogs
+from adhesion_node.wire.settings import ATP_SETTINGS, Telling, Watchdogs
 from adhesion_node.wire.topics import Topic
 
 from .ros import qos, runtime
+from .ros.diagnostics import Diagnostics, Finding, Told
 from .ros.params import declare
 from .ros.types import new
 
@@ -62,10 +62,11 @@ class AtpMonitor(Node):
         self.heard: Counter[Topic] = Counter()
         self.published: Counter[Topic] = Counter()
         self._now_ns = self._stamp_ns = self._seen_ns = 0
-        self._level: Level | None = None
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._moved_ns = self._steady.now().nanoseconds
+        self._decision: Decision | None = None
         self._status = qos.advertise(self, topics.ATP_STATUS)
+        self._diagnostics = Diagnostics(self, "supervision", make(Telling, values), self._told, self.published)
         qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve)
         qos.subscribe(self, topics.STATE, self._on_state)
         period_s = 1.0 / watchdogs.check_rate_hz
@@ -130,28 +131,37 @@ class AtpMonitor(Node):
             decision = unsafe(f"the clock has stood still for {stands_s:.3g} s; is /clock published?")
         else:
             decision = decide(self._config, now_ns, self._state, self._curve, self._level or Level.NORMAL)
-        self._status.publish(status_message(self._stamp_ns, self._config, decision))
+        changed = decision.level is not self._level
+        self._decision, self._judged = decision, True
+        status = self._diagnostics.status(*self._told())
+        self._status.publish(topics.ATP_STATUS.build(new, self._stamp_ns, status))
         self.published[topics.ATP_STATUS] += 1
-        self._judged = True
-        if decision.level is not self._level:
-            self._level = decision.level
+        if changed:
             _log(self, decision)
+            self._diagnostics.tell()
+
+    @property
+    def _level(self) -> Level | None:
+        return None if self._decision is None else self._decision.level
+
+    def _told(self) -> Told:
+        if self._decision is None:
+            return [Finding(Severity.ERROR, "nothing judged yet: does the clock run?")], {}
+        finding = Finding(self._decision.severity, self._decision.message)
+        return [finding], numbers(self._config, self._decision)
 
 
-def status_message(t_ns: int, config: SupervisionConfig, decision: Decision) -> Any:
-    """Build the message of the status: level and every number behind it; a number that is not known has no key."""
-    numbers = {
+def numbers(config: SupervisionConfig, decision: Decision) -> dict[str, str]:
+    """Return the level and every number behind it; a number that is not known has no key."""
+    values = {
         "target_position_m": config.target_position_m,
         "target_speed_mps": config.target_speed_mps,
         "curve_age_s": decision.curve_age_s,
         "state_age_s": decision.state_age_s,
         **({} if decision.reading is None else decision.reading._asdict()),
     }
-    known = {key: f"{value:.3f}" for key, value in numbers.items() if value is not None}
-    status = Status(
-        "atp_monitor/supervision", decision.severity, decision.message, {"level": decision.level.name, **known}
-    )
-    return topics.ATP_STATUS.build(new, t_ns, status)
+    known = {key: f"{value:.3f}" for key, value in values.items() if value is not None}
+    return {"level": decision.level.name, **known}
 
 
 def _log(node: Node, decision: Decision) -> None:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -93,22 +93,32 @@ def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read the value of `key` in a topic of diagnostics, as texts."""
-    return read_series(reader, topic, lambda read: next((status.values[key] for status in _with_key(read, key)), ""))
+    return _texts((t_ns, status.values[key]) for t_ns, status in _told(reader, topic, key))
 
 
 def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read what the statuses that have `key` say while they are not OK; "" while they are."""
-
-    def said(read: Statuses) -> str:
-        return "; ".join(status.message for status in _with_key(read, key) if status.level != 0)
-
-    return read_series(reader, topic, said)
+    return _texts((t_ns, status.message if status.level else "") for t_ns, status in _told(reader, topic, key))
 
 
 def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str]:
     """Read the last values, by their keys, of the status that has `key`; {} where there is none."""
     found = [status.values for sample in read_topic(reader, topic) for status in _with_key(sample.read, key)]
     return dict(found[-1]) if found else {}
+
+
+def _told(reader: BagReader, topic: Topic, key: str) -> Iterator[tuple[int, Status]]:
+    """Yield the statuses that have `key`, at the stamp of the estimate of which they tell, else at their own."""
+    for sample in read_topic(reader, topic):
+        for status in _with_key(sample.read, key):
+            stamp = status.values.get("stamp_ns", str(sample.t_ns))
+            if stamp != "none":  # of no estimate
+                yield int(stamp), status
+
+
+def _texts(rows: Iterable[tuple[int, str]]) -> Series:
+    ordered = sorted(rows, key=lambda row: row[0])
+    return Series(np.array([t for t, _ in ordered], dtype=np.int64), np.array([text for _, text in ordered]))
 
 
 def _with_key(read: Statuses, key: str) -> list[Status]:

@@ -72,9 +72,10 @@ def play(executor: SingleThreadedExecutor, task: Task, bag: Path, pace: Pace) ->
     simulator = Simulator(paced=False, parameter_overrides=happening, context=context)
     simulated = partial(_parameters, use_sim_time=True)
     recorder = Recorder(bag, by_log_time=True, parameter_overrides=simulated(), context=context)
-    identifying = simulated(**task.estimator, seed=task.seed, sensor_timeout_s=NEVER_S)
+    unasked = {"diagnostics_period_s": NEVER_S}
+    identifying = simulated(**task.estimator, seed=task.seed, sensor_timeout_s=NEVER_S, **unasked)
     estimator = Estimator(parameter_overrides=identifying, context=context)
-    supervising = simulated(**task.monitor, clock_timeout_s=NEVER_S)
+    supervising = simulated(**task.monitor, clock_timeout_s=NEVER_S, **unasked)
     monitor = AtpMonitor(parameter_overrides=supervising, context=context)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)

@@ -36,6 +36,8 @@ class Status(NamedTuple):
     level: int
     message: str
     values: Mapping[str, str]
+    hardware_id: str = ""
+    """The train."""
 
 
 class Statuses(NamedTuple):
@@ -116,6 +118,7 @@ def read_statuses(message: Any, _line: Line) -> Statuses:
             entry.level[0] if isinstance(entry.level, bytes) else int(entry.level),
             entry.message,
             {pair.key: pair.value for pair in entry.values},
+            entry.hardware_id,
         )
         for entry in message.status
     )
@@ -125,7 +128,7 @@ def read_statuses(message: Any, _line: Line) -> Statuses:
 def write_status(new: New, t_ns: int, status: Status) -> Fields:
     """Write a DiagnosticArray of one entry."""
     values = [new("diagnostic_msgs/msg/KeyValue", key=key, value=value) for key, value in status.values.items()]
-    fields = {**status._asdict(), "level": bytes([status.level]), "hardware_id": "", "values": values}
+    fields = {**status._asdict(), "level": bytes([status.level]), "values": values}
     return {"header": header(new, t_ns), "status": [new("diagnostic_msgs/msg/DiagnosticStatus", **fields)]}
 
 

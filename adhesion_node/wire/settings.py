@@ -51,8 +51,22 @@ SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group
 OF_LINE = settings_of(Line)
 FRAME_ID, AMBIENT, *_ = OF_LINE
 
+_TOLD = "diagnostics"
 _SILENCE = "Silence of the sensor after which /diagnostics says STALE"
 SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
+
+
+@dataclass(frozen=True, slots=True)
+class Telling:
+    """How a node speaks in /diagnostics. Raises ValueError naming what is out of range."""
+
+    hardware_id: str = setting("", "Name of the train in /diagnostics; empty: the namespace, else train", group=_TOLD)
+    diagnostics_period_s: float = setting(
+        1.0, "Time, by the machine's clock, between two /diagnostics at most", "s", 0.1, 3600.0, group=_TOLD
+    )
+
+    def __post_init__(self) -> None:
+        check_settings(self, "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,18 +84,23 @@ class Watchdogs:
 
 
 _OF_TRAIN = settings_of(Train, "train.", "train")
-SETTINGS = (SEED, *OF_LINE, SENSOR_TIMEOUT, *settings_of(Config), *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START)
+_OF_TELLING = settings_of(Telling)
+SETTINGS = (
+    *(SEED, *OF_LINE, SENSOR_TIMEOUT, *_OF_TELLING),
+    *(*settings_of(Config), *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
+)
 """All settings of the estimator."""
 
 CREEP_SETTINGS = (
     FRAME_ID,
     SENSOR_TIMEOUT,
+    *_OF_TELLING,
     *settings_of(Vehicle, group="vehicle"),
     *settings_of(CreepConfig, group="identification"),
 )
 """All settings of the creep estimator."""
 
-ATP_SETTINGS = (*settings_of(SupervisionConfig, group="supervision"), *settings_of(Watchdogs))
+ATP_SETTINGS = (*settings_of(SupervisionConfig, group="supervision"), *settings_of(Watchdogs), *_OF_TELLING)
 """All settings of the ATP monitor."""
 
 OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
@@ -98,6 +117,7 @@ class Setup(NamedTuple):
     line: Line
     sensor_timeout_s: float
     """Silence of the position after which /diagnostics says STALE; no result depends on it."""
+    telling: Telling = Telling()
 
 
 class CreepSetup(NamedTuple):
@@ -107,6 +127,7 @@ class CreepSetup(NamedTuple):
     line: Line
     sensor_timeout_s: float
     """Silence of the wheel speeds after which /diagnostics says STALE; no result depends on it."""
+    telling: Telling = Telling()
 
 
 def check_names(values: Mapping[str, Any], settings: Sequence[Setting]) -> None:
@@ -129,7 +150,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     if line is not None:
         profile = _with_grades(profile, line.grades(train.length_m))
     config = make(Config, values, train=train, track=profile)
-    return Setup(config, int(seed), make(Line, values, track=line), float(timeout_s))
+    return Setup(config, int(seed), make(Line, values, track=line), float(timeout_s), make(Telling, values))
 
 
 def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":
@@ -154,7 +175,7 @@ def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:
     check_names(values, CREEP_SETTINGS)
     timeout_s = SENSOR_TIMEOUT.check(values.get(SENSOR_TIMEOUT.name, SENSOR_TIMEOUT.default))
     config = make(CreepConfig, values, vehicle=make(Vehicle, values))
-    return CreepSetup(config, make(Line, values), float(timeout_s))
+    return CreepSetup(config, make(Line, values), float(timeout_s), make(Telling, values))
 
 
 def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:

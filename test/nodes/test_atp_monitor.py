@@ -171,7 +171,7 @@ def values(status: DiagnosticStatus) -> dict[str, str]:
 def test_the_level_follows_the_margin(line: Line, margin_m: float, level: str, diagnostic: bytes) -> None:
     line.send_pair(0.0)  # ends the emergency of the time without a curve
     status = line.send_pair(5000.0 - NEEDED_M - margin_m)
-    assert (status.name, status.level) == ("atp_monitor/supervision", diagnostic)
+    assert (status.name, status.level) == ("atp_test/atp_monitor/supervision", diagnostic)
     told = values(status)
     assert told["level"] == level
     assert float(told["margin_m"]) == pytest.approx(margin_m, abs=1.0)
@@ -205,7 +205,7 @@ def test_a_clock_that_stands_still_is_an_emergency(
     spin_until(executor, lambda: len(heard) >= 2)
     assert monitor.get_clock().now().nanoseconds == 0
     (status,) = heard[-1].status
-    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
+    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.ERROR)
     assert "the clock has stood still for" in status.message
 
 
@@ -239,7 +239,7 @@ def test_the_clock_moving_again_ends_the_emergency_of_its_standing(line: Line) -
 
 def test_without_a_curve_the_train_must_stop(line: Line) -> None:
     status = line.send_state(state(0.0))
-    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
+    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.ERROR)
     assert "braking curve: none received yet" in status.message
     assert not {"margin_m", "permitted_mps"} & set(values(status))
 
@@ -254,7 +254,7 @@ def test_the_watchdog_speaks_in_silence_and_says_what_has_expired(line: Line) ->
     assert float(values(status)["margin_m"]) == pytest.approx(5000.0 - 40.0 * 1.2 - NEEDED_M, abs=1.0)
     line.next_status(lambda: line.set_time(START_S + 1.7))
     status = line.next_status(lambda: line.set_time(START_S + 2.3))
-    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
+    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.ERROR)
     assert "state expired: 2.3 s old, valid for 2 s" in status.message
     stamps = [stamp_ns(message.header) for message in line.heard]
     assert stamps == sorted(set(stamps))
@@ -312,7 +312,7 @@ def test_a_curve_in_other_units_or_from_another_place_is_an_emergency(
         spoil(point)
     line.send_curve(impossible)
     status = line.send_state(state(3000.0))
-    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.STALE)
+    assert (values(status)["level"], status.level) == ("EMERGENCY_BRAKE", DiagnosticStatus.ERROR)
     assert message in status.message
 
 

@@ -16,12 +16,11 @@ from xml.etree import ElementTree
 
 import pytest
 from conftest import ROOT
+from rclpy.context import Context
 from rosbags.interfaces import Nodetype
 
 from adhesion_node.bag import typestore
-from adhesion_node.core.atp.config import SupervisionConfig
-from adhesion_node.core.atp.supervision import unsafe
-from adhesion_node.nodes.atp_monitor import status_message
+from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.wire.topics import BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RECORDED, RESULTS, SPEED
 
 LAYOUTS = ROOT / "adhesion_node" / "layouts"
@@ -141,8 +140,9 @@ def test_foxglove_accepts_the_layout() -> None:
         assert 0 < split["splitPercentage"] < 100
 
 
-def test_the_entry_of_the_atp_monitor_is_selected() -> None:
-    status = status_message(0, SupervisionConfig(), unsafe("")).status[0]
+def test_the_entry_of_the_atp_monitor_is_selected(context: Context) -> None:
+    monitor = AtpMonitor(context=context)
+    status = monitor._diagnostics
     config = foxglove["configById"]["DiagnosticStatusPanel!atp"]
     assert (config["selectedHardwareId"], config["selectedName"]) == (status.hardware_id, status.name)
 

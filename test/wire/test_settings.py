@@ -13,11 +13,11 @@ import pytest
 from adhesion_node.core import Config
 from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
-from adhesion_node.core.setting import Setting
+from adhesion_node.core.setting import Setting, settings_of
 from adhesion_node.wire.codecs import Line
-from adhesion_node.wire.settings import OF_LINE, SETTINGS, Setup, parse_setting, setup_of
+from adhesion_node.wire.settings import OF_LINE, SETTINGS, Setup, Telling, parse_setting, setup_of
 
-FREE_TEXTS = {"track", "frame", "track_line"}
+FREE_TEXTS = {"track", "frame", "track_line", "hardware_id"}
 """The settings that are neither a number nor one of a few words."""
 
 NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]
@@ -36,7 +36,7 @@ def another(setting: Setting) -> Any:
         return default - 1 if default > setting.low else default + 1
     if isinstance(default, float):
         return math.nextafter(default, setting.high)
-    free = {"track": "tunnel 0 1000", "frame": "map"}
+    free = {"track": "tunnel 0 1000", "frame": "map", "hardware_id": "194 101"}
     return free.get(setting.name) or next(choice for choice in setting.choices if choice != default)
 
 
@@ -46,6 +46,8 @@ def in_use(setup: Setup, name: str) -> Any:
         return getattr(setup, name)
     if name in {one.name for one in OF_LINE}:
         return getattr(setup.line, name)
+    if name in {one.name for one in settings_of(Telling)}:
+        return getattr(setup.telling, name)
     group, _, field = name.rpartition(".")
     return getattr(setup.config.train if group else setup.config, field)
 

@@ -153,4 +153,4 @@ def held(previous: Level, reading: Reading) -> Level:
 def unsafe(why: str, curve_age_s: float | None = None, state_age_s: float | None = None) -> Decision:
     """Decide on the emergency brake because something is missing that a safe distance would need."""
     message = f"no safe distance is known, emergency brake: {why}"
-    return Decision(Level.EMERGENCY_BRAKE, message, Severity.STALE, None, curve_age_s, state_age_s)
+    return Decision(Level.EMERGENCY_BRAKE, message, Severity.ERROR, None, curve_age_s, state_age_s)

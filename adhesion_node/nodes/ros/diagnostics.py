@@ -2,13 +2,22 @@
 
 """A node's entry in /diagnostics: what an operator must know, in words with the remedy, and the numbers behind it."""
 
-from collections.abc import Iterable, Mapping
-from typing import Any, NamedTuple
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
+
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
+from rclpy.node import Node
 
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.wire.codecs import TRAIN
 from adhesion_node.wire.results import Status
-from adhesion_node.wire.topics import DIAGNOSTICS
+from adhesion_node.wire.settings import Telling
+from adhesion_node.wire.topics import DIAGNOSTICS, Topic
 
+from . import qos
+from .qos_events import Tell
 from .types import new
 
 JUMP_NS = 60_000_000_000
@@ -22,11 +31,43 @@ class Finding(NamedTuple):
     text: str
 
 
-def status_message(t_ns: int, name: str, findings: Iterable[Finding], values: Mapping[str, str]) -> Any:
-    """Build the status of `name` at `t_ns`: as bad as the worst finding, which its message begins with."""
-    sorted_ = sorted(findings, key=lambda finding: -finding.severity)
-    text = "; ".join(finding.text for finding in sorted_)
-    return DIAGNOSTICS.build(new, t_ns, Status(name, sorted_[0].severity, text, values))
+Told = tuple[list[Finding], dict[str, str]]
+"""What there is to tell: findings, at least one, and numbers by name."""
+
+
+class Diagnostics:
+    """Speaks in /diagnostics of `part` of a node: by `tell`, and by a steady timer, so that no entry grows stale.
+
+    The stamps are the node's clock. `published` counts the messages; `hear` hears of the events of DDS.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        part: str,
+        telling: Telling,
+        told: Callable[[], Told],
+        published: Counter[Topic],
+        hear: Tell | None = None,
+    ) -> None:
+        self.name = f"{node.get_fully_qualified_name().lstrip('/')}/{part}"
+        self.hardware_id = telling.hardware_id or node.get_namespace().strip("/") or TRAIN
+        self._node, self._told, self._published, self._stamp_ns = node, told, published, 0
+        self._output = qos.advertise(node, DIAGNOSTICS, tell=hear)
+        node.create_timer(telling.diagnostics_period_s, self.tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def tell(self) -> None:
+        """Publish what there is to tell."""
+        self._stamp_ns = next_stamp(self._node.get_clock().now().nanoseconds, self._stamp_ns)
+        status = self.status(*self._told())
+        self._output.publish(DIAGNOSTICS.build(new, self._stamp_ns, status))
+        self._published[DIAGNOSTICS] += 1
+
+    def status(self, findings: Iterable[Finding], values: Mapping[str, str]) -> Status:
+        """Return the entry: as bad as the worst finding, which its message begins with."""
+        ranked = sorted(findings, key=lambda finding: -finding.severity)
+        text = "; ".join(finding.text for finding in ranked)
+        return Status(self.name, ranked[0].severity, text, values, self.hardware_id)
 
 
 def next_stamp(t_ns: int, before_ns: int) -> int:

@@ -5,7 +5,7 @@
 Stamps drive the work. The one timer watches for silence: it ends waits and speaks in /diagnostics, no more.
 """
 
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
 
@@ -18,16 +18,20 @@ from adhesion_node.core.setting import Setting
 from adhesion_node.run.engine import EstimatorPipeline
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import Line, Rejected
+from adhesion_node.wire.codecs import NS, Line, Rejected
+from adhesion_node.wire.settings import Telling
 from adhesion_node.wire.topics import Topic
 
 from . import qos
-from .diagnostics import Finding, next_stamp, status_message
+from .diagnostics import Diagnostics, Finding, Told
 from .intake import Intake
 from .params import declare
 from .types import new
 
 P = TypeVar("P", bound=EstimatorPipeline[Any, Any, Any])
+
+OFTEN, OFTEN_NS = 2, 60_000_000_000
+"""So many resets within this time, by the node's clock, are a fault."""
 
 
 class SetUp(NamedTuple, Generic[P]):
@@ -36,6 +40,7 @@ class SetUp(NamedTuple, Generic[P]):
     pipeline: P
     line: Line
     sensor_timeout_s: float
+    telling: Telling
 
 
 class Kind(NamedTuple, Generic[P]):
@@ -60,14 +65,16 @@ class EstimatingNode(Node, Generic[P]):
     def __init__(self, kind: Kind[P], **kwargs: Any) -> None:
         super().__init__(kind.name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self._kind = kind
-        self.pipeline, line, timeout_s = kind.set_up(declare(self, kind.parameters))
-        self._reported_ns = 0
-        self._entry = f"{self.get_fully_qualified_name().lstrip('/')}/{kind.entry}"
+        self.pipeline, line, timeout_s, telling = kind.set_up(declare(self, kind.parameters))
+        self._resets: deque[int] = deque(maxlen=OFTEN)
+        """When the latest ones were seen."""
+        self._seen_resets = 0
         self.published: Counter[Topic] = Counter()
         self._reader = Reader(kind.inputs, line)
         self._intake = Intake(self, self, self._reader, timeout_s)
-        outputs = (*kind.results, topics.DIAGNOSTICS)
-        self._outputs = {topic: qos.advertise(self, topic, tell=self._intake.tell) for topic in outputs}
+        hear = self._intake.tell
+        self._outputs = {topic: qos.advertise(self, topic, tell=hear) for topic in kind.results}
+        self._diagnostics = Diagnostics(self, kind.entry, telling, self._told, self.published, hear)
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(SetBool, "~/set_enabled", self._on_set_enabled)
 
@@ -115,18 +122,28 @@ class EstimatingNode(Node, Generic[P]):
 
     def report(self) -> None:
         """Publish the state of affairs in /diagnostics."""
-        self._report(self._intake.now_ns)
+        self._diagnostics.tell()
 
-    def _report(self, t_ns: int) -> None:
-        self._reported_ns = next_stamp(t_ns, self._reported_ns)
-        found = [*self._intake.findings(), *self._kind.findings(self.pipeline)]
+    def _told(self) -> Told:
+        """What is wrong, the worst of it said first, and the numbers; `stamp_ns` is that of the newest estimate."""
+        found = [*self._intake.findings(), *self._kind.findings(self.pipeline), *self._often_reset()]
         for suspect in self.pipeline.state.inbox.suspects:
             text = f"{type(suspect).__name__} of {suspect.t_ns * 1e-9:.12g} s is set aside until a second stamp agrees"
             found.append(Finding(Severity.WARN, text))
         source = self._reader.source
         chosen = {"position_source": source.name} if source in topics.POSITIONS else {}
-        message = status_message(self._reported_ns, self._entry, found, self._kind.values(self.pipeline) | chosen)
-        self._send(topics.DIAGNOSTICS, message)
+        stamp = {"stamp_ns": str(self.latest.t_ns) if self.latest is not None else "none"}
+        return found, stamp | self._kind.values(self.pipeline) | chosen
+
+    def _often_reset(self) -> list[Finding]:
+        """Say when it starts anew again and again."""
+        resets, now_ns = self.pipeline.resets, self.get_clock().now().nanoseconds
+        self._resets.extend([now_ns] * min(resets - self._seen_resets, OFTEN))
+        self._seen_resets = resets
+        if len(self._resets) < OFTEN or any(abs(now_ns - t_ns) > OFTEN_NS for t_ns in self._resets):
+            return []
+        text = f"{resets} resets so far, {OFTEN} of them within {OFTEN_NS // NS} s: stamps or positions jump"
+        return [Finding(Severity.WARN, f"{text}; does a recording loop, is there a second publisher?")]
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         self._publish(self.pipeline.reset())
@@ -150,9 +167,6 @@ class EstimatingNode(Node, Generic[P]):
             for topic in self._kind.results:
                 message = topic.build(new, output)
                 if message is not None:
-                    self._send(topic, message)
-            self._report(self.pipeline.stamp_ns(output))
-
-    def _send(self, topic: Topic, message: Any) -> None:
-        self._outputs[topic].publish(message)
-        self.published[topic] += 1
+                    self._outputs[topic].publish(message)
+                    self.published[topic] += 1
+            self.report()

@@ -13,7 +13,7 @@ from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import NS, Reason, Rejected
+from adhesion_node.wire.codecs import Reason, Rejected
 from adhesion_node.wire.topics import Topic
 
 from . import qos
@@ -49,7 +49,6 @@ class Intake:
         self.heard: Counter[Topic] = Counter()
         self.enabled = True
         self._node, self._listener, self._reader = node, listener, reader
-        self._newest_ns = 0
         self._counts: Counter[str] = Counter()
         self._refusals: dict[str, str] = {}
         self._events: dict[str, str] = {}
@@ -57,11 +56,6 @@ class Intake:
         for topic in reader.inputs:
             qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
         node.get_logger().info(f"ready: waiting for {' or '.join(self._watched)}")
-
-    @property
-    def now_ns(self) -> int:
-        """The newest stamp, moved on by the silence since."""
-        return self._newest_ns + round((self._silence.for_s or 0.0) * NS)
 
     def note(self, reason: str, text: str) -> None:
         """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of a reason is told at once."""
@@ -92,17 +86,25 @@ class Intake:
             found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
-        clock, name = self._node.get_clock(), topics.CLOCK.name
-        clocks = self._node.count_publishers(name) if isinstance(clock, ROSClock) and clock.ros_time_is_active else 0
-        if clocks > 1:
-            found.append(Finding(Severity.WARN, f"{clocks} publishers of {name}: time jumps, stop all but one"))
-        return found
+        return found + self._doubled()
 
     @property
     def _watched(self) -> list[str]:
         """The full names of what must not fall silent: of the anchor, before that is known of all that may be it."""
         source = self._reader.source
         return [self._node.resolve_topic_name(one.name) for one in ((source,) if source else self._reader.anchors)]
+
+    def _doubled(self) -> list[Finding]:
+        """Name what is published by more than one: sensors that get mixed up, a time that jumps."""
+        clock = self._node.get_clock()
+        clocks = (topics.CLOCK,) if isinstance(clock, ROSClock) and clock.ros_time_is_active else ()
+        names = [self._node.resolve_topic_name(topic.name) for topic in (*self._reader.inputs, *clocks)]
+        counts = {name: self._node.count_publishers(name) for name in names}
+        return [
+            Finding(Severity.WARN, f"{count} publishers of {name}: stop all but one")
+            for name, count in counts.items()
+            if count > 1
+        ]
 
     def _silent(self, for_s: float) -> str:
         names = self._watched
@@ -129,7 +131,6 @@ class Intake:
                 if refusal.reason != Reason.OTHER_SOURCE.name:  # nothing is wrong: it is counted
                     self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
             else:
-                self._newest_ns = sample.t_ns
                 for event in self._listener.take(sample):
                     if event.is_told:
                         self.note(event.outcome.name, str(event))

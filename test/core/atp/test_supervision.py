@@ -207,7 +207,7 @@ def test_whatever_is_missing_old_or_not_covered_is_an_emergency_that_says_why(
 ) -> None:
     decision = decide(CONFIG, NOW_NS, state, curve)
     assert decision.level is Level.EMERGENCY_BRAKE
-    assert decision.severity is Severity.STALE
+    assert decision.severity is Severity.ERROR
     assert message in decision.message
     assert decision.reading is None
 

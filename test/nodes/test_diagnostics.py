@@ -1,0 +1,145 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""/diagnostics of every node: steady in silence too, by the node's clock, under a name that tells trains apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import messages
+import pytest
+from conftest import SpinUntil
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from adhesion_node.nodes.atp_monitor import AtpMonitor
+from adhesion_node.nodes.creep_estimator import CreepEstimator
+from adhesion_node.nodes.estimator import Estimator
+from adhesion_node.nodes.ros import qos
+from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import stamp_ns
+from adhesion_node.wire.topics import Topic
+
+S = 10**9
+NODES: dict[str, Callable[..., Node]] = {
+    "estimator/adhesion": Estimator,
+    "creep_estimator/peak": CreepEstimator,
+    "atp_monitor/supervision": AtpMonitor,
+}
+
+
+class Line:
+    """A node, what it says, and a driver that publishes to it."""
+
+    def __init__(
+        self, executor: SingleThreadedExecutor, spin_until: SpinUntil, make: Callable[..., Node], **given: Any
+    ) -> None:
+        context, namespace = executor.context, given.pop("namespace", None)
+        overrides = [Parameter(name, value=value) for name, value in given.items()]
+        self.executor, self.spin_until = executor, spin_until
+        self.node: Any = make(context=context, namespace=namespace, parameter_overrides=overrides)
+        self.driver = Node("driver", context=context, namespace=namespace)
+        self.told: list[DiagnosticArray] = []
+        qos.subscribe(self.driver, topics.DIAGNOSTICS, self.told.append)
+        for node in (self.node, self.driver):
+            executor.add_node(node)
+        spin_until(executor, lambda: self.node.count_subscribers(topics.DIAGNOSTICS.name) == 1)
+
+    def outlet(self, topic: Topic) -> Any:
+        output = qos.advertise(self.driver, topic)
+        self.spin_until(self.executor, output.get_subscription_count)
+        return output
+
+    def wait(self, done: Callable[[], object], timeout_s: float = 10.0) -> None:
+        self.spin_until(self.executor, done, timeout_s)
+
+    def wait_until_said(self, words: str) -> None:
+        """Wait for a message with these words that is said from now on."""
+        self.told.clear()
+        self.wait(lambda: any(words in array.status[0].message for array in self.told))
+
+    @property
+    def last(self) -> DiagnosticStatus:
+        (status,) = self.told[-1].status
+        return status
+
+
+@pytest.fixture
+def make_line(executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Callable[..., Line]:
+    return lambda make, **given: Line(executor, spin_until, make, **given)
+
+
+@pytest.mark.parametrize("use_sim_time", [False, True], ids=["system time", "no /clock"])
+@pytest.mark.parametrize("entry", NODES)
+def test_every_node_speaks_without_being_spoken_to(
+    make_line: Callable[..., Line], entry: str, use_sim_time: bool
+) -> None:
+    """No sensor ever, a /clock that is not there; the silence of the sensors alone would be told once an hour."""
+    own = {} if entry.startswith("atp") else {"sensor_timeout_s": 3600.0}
+    line = make_line(NODES[entry], use_sim_time=use_sim_time, diagnostics_period_s=0.1, namespace="/train1", **own)
+    line.wait(lambda: len(line.told) > 5, 2.0)
+    assert (line.last.name, line.last.hardware_id) == (f"train1/{entry}", "train1")
+    assert line.last.message
+
+
+@pytest.mark.parametrize(("given", "hardware_id"), [({}, "train"), ({"hardware_id": "194 101"}, "194 101")])
+def test_the_train_has_a_name(make_line: Callable[..., Line], given: dict[str, str], hardware_id: str) -> None:
+    line = make_line(Estimator, diagnostics_period_s=0.1, **given)
+    line.wait(lambda: line.told)
+    assert (line.last.name, line.last.hardware_id) == ("estimator/adhesion", hardware_id)
+
+
+def test_stamps_are_the_clock_of_the_node_and_those_of_the_data_are_values(make_line: Callable[..., Line]) -> None:
+    line = make_line(Estimator, use_sim_time=True, diagnostics_period_s=0.1)
+    clock, position = line.outlet(topics.CLOCK), line.outlet(topics.POSITION)
+    clock.publish(messages.clock(1000 * S))
+    line.wait(lambda: line.node.get_clock().now().nanoseconds == 1000 * S)
+    line.told.clear()
+    line.wait(lambda: len(line.told) > 1)
+    values = {pair.key: pair.value for pair in line.last.values}
+    assert values["stamp_ns"] == "none"
+    for step in range(20):
+        position.publish(messages.position(7 * S + step * S // 10, 3.0 * step, 0.5))
+    line.wait(lambda: line.node.latest is not None)
+    line.told.clear()
+    line.wait(lambda: line.told)
+    values = {pair.key: pair.value for pair in line.last.values}
+    assert values["stamp_ns"] == str(line.node.latest.t_ns)
+    assert 7 * S < line.node.latest.t_ns < 10 * S
+    assert all(1000 * S <= stamp_ns(array.header) < 1000 * S + 1000 for array in line.told)
+
+
+def test_an_emergency_of_the_monitor_is_an_error(make_line: Callable[..., Line]) -> None:
+    line = make_line(AtpMonitor, diagnostics_period_s=0.1)
+    line.wait_until_said("no safe distance is known")
+    assert line.last.level == DiagnosticStatus.ERROR
+    assert {pair.key: pair.value for pair in line.last.values}["level"] == "EMERGENCY_BRAKE"
+
+
+def test_two_publishers_of_a_sensor_are_told(make_line: Callable[..., Line]) -> None:
+    line = make_line(Estimator, diagnostics_period_s=0.1, namespace="/train1")
+    _outputs = [line.outlet(topics.POSITION) for _ in range(2)]
+    line.wait_until_said("2 publishers of /train1/position: stop all but one")
+    assert line.last.level != DiagnosticStatus.OK
+
+
+def test_resets_again_and_again_are_told(make_line: Callable[..., Line]) -> None:
+    """One reset may happen, a second one is told."""
+    line = make_line(Estimator, diagnostics_period_s=0.1)
+    position = line.outlet(topics.POSITION)
+
+    def play(from_s: int) -> None:
+        for step in range(20):
+            position.publish(messages.position(from_s * S + step * S // 10, 3.0 * step, 0.5))
+
+    play(1000)
+    play(700)
+    line.wait(lambda: line.node.pipeline.resets == 1)
+    line.told.clear()
+    line.wait(lambda: len(line.told) > 1)
+    assert "resets so far" not in line.last.message
+    play(400)
+    line.wait_until_said("2 resets so far, 2 of them within 60 s: stamps or positions jump")
