@@ -9,6 +9,7 @@ import importlib
 import inspect
 import re
 import runpy
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterable
@@ -94,9 +95,44 @@ def imported() -> set[str]:
 
 def test_versions_agree() -> None:
     changelog = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
-    newest = re.search(r"^(\d+\.\d+\.\d+) \(.+\)\n-+$", changelog, re.MULTILINE)
-    assert newest is not None, "CHANGELOG.rst has no heading `x.y.z (date)`"
-    assert newest[1] == manifest().findtext("version") == setup_arguments()["version"]
+    version = manifest().findtext("version")
+    assert version == setup_arguments()["version"]
+    newest, *released = re.findall(r"^(\S.*)\n-+$", changelog, re.MULTILINE)
+    assert newest == "Forthcoming" or newest.partition(" ")[0] == version
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+ \(\d{4}-\d\d-\d\d\)", heading) for heading in released)
+
+
+def test_a_release_can_be_prepared(tmp_path: Path) -> None:
+    """By what `catkin_prepare_release` does of it, where that is installed."""
+    packages, releases = (pytest.importorskip(f"catkin_pkg.{name}") for name in ("package", "package_version"))
+    for name in ("package.xml", "setup.py"):
+        shutil.copy(ROOT / name, tmp_path)
+    releases.update_versions({str(tmp_path): packages.parse_package(str(tmp_path))}, "7.8.9")
+    assert packages.parse_package(str(tmp_path)).version == "7.8.9"
+    assert 'version="7.8.9",' in (tmp_path / "setup.py").read_text()
+    changelog = (ROOT / "CHANGELOG.rst").read_text(encoding="utf-8")
+    assert releases.get_forthcoming_label(changelog) == "Forthcoming"
+
+
+def test_the_manifest_names_somebody_and_a_place() -> None:
+    maintainer = manifest().find("maintainer")
+    assert maintainer is not None
+    addresses = [maintainer.attrib["email"], *(str(url.text) for url in manifest().findall("url"))]
+    assert len(addresses) > 1
+    assert not [address for address in addresses if ".example" in address]
+    licensed = manifest().find("license")
+    assert licensed is not None
+    assert (ROOT / licensed.attrib["file"]).is_file()
+
+
+def test_contributions_come_under_the_license() -> None:
+    """In its own words, as ament_copyright asks for."""
+    license_, contributing = (
+        " ".join((ROOT / name).read_text(encoding="utf-8").split()) for name in ("LICENSE", "CONTRIBUTING.md")
+    )
+    clause = re.search(r"5\. Submission of Contributions\. .* regarding such Contributions\.", license_)
+    assert clause is not None
+    assert clause[0] in contributing
 
 
 def test_the_ament_index_finds_the_package() -> None:
