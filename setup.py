@@ -16,7 +16,7 @@ PROGRAMS = (
     *("import_csv", "recover", "demo", "report", "study", "bench"),
 )
 
-# Recordings, pictures, geographic positions, completion in the shell. The nodes of a train run without.
+# Recordings, frames, pictures, geographic positions, completion in the shell. The nodes of a train run without.
 TOOLS = [
     "mcap>=1.5,<2",
     "zstandard>=0.22,<1",
@@ -24,6 +24,7 @@ TOOLS = [
     "matplotlib>=3.6,<4",
     "pyproj>=3.4,<4",
     "argcomplete>=3,<4",
+    "pandas>=2.1,<4",
 ]
 
 # Tables as Parquet: small files with types, which pandas, Spark and DuckDB read alike. Only where one is asked for.

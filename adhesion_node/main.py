@@ -14,7 +14,7 @@ from .command.signals import stop_on_signals
 
 Program = Callable[[], int]
 
-_EXTRAS = {"aiohttp": "live", "distributed": "cluster", "rclpy": "ros"}
+_EXTRAS = {"aiohttp": "live", "distributed": "cluster"}
 """What brings a package; the others come with `tools`."""
 
 
@@ -54,7 +54,15 @@ def _saying_what_is_missing(program: Program) -> Program:
             name = (error.name or "").partition(".")[0]
             if name in ("", __package__, "sim_node"):
                 raise
-            print(f"{name} is missing: pip install '.[{_EXTRAS.get(name, 'tools')}]'", file=sys.stderr)
+            from .command import without_ros  # only here: nothing comes before the signals that is not needed
+
+            if without_ros.is_of_ros(name) and without_ros.is_help_asked():
+                with without_ros.stand_ins():
+                    return program()
+            remedy = (
+                without_ros.REMEDY if without_ros.is_of_ros(name) else f"pip install '.[{_EXTRAS.get(name, 'tools')}]'"
+            )
+            print(f"{name} is missing: {remedy}", file=sys.stderr)
             return 2
 
     return main

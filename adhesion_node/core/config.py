@@ -247,6 +247,10 @@ class Config:
 
     def __post_init__(self) -> None:
         check_settings(self, "")
+        if not isinstance(self.train, Train):
+            raise ValueError(f"train = {self.train!r}: give a Train, such as Train(mass_kg=400e3)")
+        if not isinstance(self.track, Track):
+            raise ValueError(f"track = {self.track!r}: give a Track, such as Track((Grade(0.0, 2000.0, 10.0),))")
         if self.step >= self.window:
             raise ValueError(f"step = {self.step}: choose less than the window, {self.window}")
 

@@ -8,6 +8,7 @@ A dataclass declares its settings as fields made by `setting`; `settings_of` lis
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import Field, field, fields
+from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeVar
 
 Value = bool | int | float | str
@@ -43,7 +44,7 @@ class Setting(NamedTuple):
         """
         kind: Any = type(self.default)
         what = f"{owner}{self.name} = {value!r}"
-        accepted = (int, float) if kind is float else kind
+        accepted = {float: Real, int: Integral}.get(kind, kind)  # numbers of numpy are numbers
         if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
             raise ValueError(f"{what}: give a value of type {kind.__name__} ({self.allowed()})")
         if self.choices and value not in self.choices:

@@ -176,7 +176,7 @@ def examples(page: Path) -> list[str]:
 )
 def test_a_python_example_runs(code: str) -> None:
     three = "pressure_pa in log" in code
-    log = [(k * 10**8, 80.0 * 0.1 * k, *([0.0] if three else [])) for k in range(20)]
+    log = [(k * 10**8 if three else 0.1 * k, 80.0 * 0.1 * k, *([0.0] if three else [])) for k in range(20)]
     exec(compile(code, "example", "exec"), {"log": log})
 
 

@@ -30,7 +30,7 @@ OPTIONAL = {"distributed": "cluster", "pyarrow": "parquet"}
 
 BY_APT = {
     *("python3-numpy", "python3-scipy", "python3-yaml", "python3-matplotlib", "python3-argcomplete", "python3-aiohttp"),
-    *("python3-pyproj", "python3-hypothesis", "python3-pytest"),
+    *("python3-pyproj", "python3-pandas", "python3-hypothesis", "python3-pytest"),
 }
 BY_PIP = {"python3-rosbags-pip", "mcap-ros2-support"}
 """What the keys of rosdep/python.yaml install on Ubuntu 24.04; those by pip take a venv."""
@@ -41,6 +41,7 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "argcomplete": ("argcomplete", "python3-argcomplete"),
     "pyproj": ("pyproj", "python3-pyproj"),
+    "pandas": ("pandas", "python3-pandas"),
     "rosbags": ("rosbags", "python3-rosbags-pip"),
     "yaml": ("pyyaml", "python3-yaml"),
     "mcap": ("mcap", "mcap-ros2-support"),

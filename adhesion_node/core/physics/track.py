@@ -7,6 +7,7 @@ All resistances are per weight (N/N), so that they do not depend on the train's 
 
 import math
 from dataclasses import astuple, dataclass, field
+from numbers import Real
 
 import numpy as np
 
@@ -70,6 +71,9 @@ class Tunnel:
 
 Section = Grade | Curve | Tunnel
 
+STEEPEST, TIGHTEST_M = 0.15, 10.0
+"""Grade and radius of trams in Lisbon and Toronto, rounded outwards: beyond them a profile is a slip of the pen."""
+
 MANY = 1000
 """Positions for which a look at their ends pays: most often they all lie between the same two borders."""
 
@@ -78,7 +82,8 @@ MANY = 1000
 class Track:
     """A track profile: sections may overlap; outside them the track is level, straight and open.
 
-    Raises ValueError naming the section when it does not end beyond its start or has no radius.
+    Raises ValueError naming the section when it is none, does not end beyond its start, or is steeper or tighter than
+    any train could pass.
     """
 
     sections: tuple[Section, ...] = ()
@@ -87,11 +92,21 @@ class Track:
     _levels: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
+        if not (isinstance(self.train_length_m, Real) and 0.0 < self.train_length_m < math.inf):
+            raise ValueError(f"track train_length_m = {self.train_length_m!r}: give a length above 0 m")
         for section in self.sections:
+            if not isinstance(section, Section):
+                raise ValueError(f"track section {section!r}: give a Grade, a Curve or a Tunnel")
             if not (all(map(math.isfinite, astuple(section))) and section.end_m > section.start_m):
                 raise ValueError(f"track section {section}: give finite numbers and an end_m beyond start_m")
-            if isinstance(section, Curve) and not section.radius_m > 0:
-                raise ValueError(f"track section {section}: radius_m must be above 0")
+            if isinstance(section, Curve) and not section.radius_m >= TIGHTEST_M:
+                raise ValueError(f"track section {section}: give a radius_m of at least {TIGHTEST_M:g} m")
+            if isinstance(section, Grade) and abs(section.resistance(0.0)) > STEEPEST:
+                steep = f"{100.0 * section.resistance(0.0):.3g} %"
+                raise ValueError(
+                    f"track section {section}: rises by {steep}, and trains climb {100.0 * STEEPEST:g} % at most: "
+                    "rise_m is the height gained between both ends, in m"
+                )
         ends = [end for s in self.sections for end in (s.start_m, s.end_m)]
         breaks = np.unique(np.array(ends, dtype=np.float64))
         levels = np.zeros(breaks.size + 1)

@@ -100,7 +100,7 @@ def test_refuses_a_text_it_cannot_read(text: str) -> None:
         (Tunnel(5.0, 5.0), r"Tunnel\(start_m=5\.0, end_m=5\.0\): give finite numbers and an end_m beyond"),
         (Grade(0.0, math.inf, 1.0), "give finite numbers"),
         (Grade(0.0, 100.0, math.nan), "give finite numbers"),
-        (Curve(0.0, 100.0, 0.0, 1.0), "radius_m must be above 0"),
+        (Curve(0.0, 100.0, 0.0, 1.0), "give a radius_m of at least 10 m"),
     ],
 )
 def test_refuses_an_impossible_section(section: Section, message: str) -> None:

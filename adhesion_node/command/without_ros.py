@@ -1,0 +1,70 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""A machine without ROS: what to install, and stand-ins for its modules, so that --help and completion work."""
+
+import os
+import re
+import sys
+from abc import ABCMeta
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from types import ModuleType
+from typing import Any
+
+REMEDY = "source /opt/ros/jazzy/setup.bash (apt install ros-jazzy-ros-base), or pip install '.[ros]' for wheels"
+
+_OF_ROS = re.compile(r"rclpy|\w+_(msgs|srvs|interfaces)")
+
+
+def is_of_ros(module: str) -> bool:
+    """Whether ROS brings a module."""
+    return _OF_ROS.fullmatch(module.partition(".")[0]) is not None
+
+
+def is_help_asked() -> bool:
+    """Whether the program is to answer for its options alone, before it asks anything of ROS."""
+    return bool({"-h", "--help"} & set(sys.argv[1:])) or "_ARGCOMPLETE" in os.environ
+
+
+class _Anything(ABCMeta):
+    """A class, abstract or not, whose every attribute is that class again."""
+
+    def __getattr__(cls, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        return StandIn
+
+
+class StandIn(metaclass=_Anything):
+    """In the place of any class or constant of ROS; it can be named and inherited from, no more."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        """Take whatever the class would."""
+
+
+class _Finder(MetaPathFinder, Loader):
+    """Gives empty modules whose names are all stand-ins."""
+
+    def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> ModuleSpec | None:
+        return ModuleSpec(fullname, self, is_package=True) if is_of_ros(fullname) else None
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        module = ModuleType(spec.name)
+        module.__dict__["__getattr__"] = lambda name: getattr(StandIn, name)
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Nothing is to be done."""
+
+
+@contextmanager
+def stand_ins() -> Iterator[None]:
+    """Let the modules of ROS be imported, of which nothing is used."""
+    finder = _Finder()
+    sys.meta_path.insert(0, finder)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(finder)

@@ -1,0 +1,164 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""`adhesion_node.estimate`: frame in, frame out, the same numbers as a log's; every slip of the pen is named."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from conftest import ROOT
+from test_offline import samples
+
+import adhesion_node
+from adhesion_node import Config, Curve, Grade, Measurement, Track, Train, Tunnel, estimate, finish, init, step
+from adhesion_node.nodes import replay
+from adhesion_node.run.results import COLUMNS
+from adhesion_node.tools import import_csv
+
+
+@cache
+def measured() -> pd.DataFrame:
+    """Return 18 s of a train, a full brake from the fifth second on."""
+    rows = [(t.t_ns / 1e9, r.position_m, max(round(r.pressure_pa - 101_325.0, 3), 0.0)) for t, r in samples()]
+    return pd.DataFrame(rows, columns=["time", "position", "brake_pressure"])
+
+
+def with_everything() -> pd.DataFrame:
+    """Return the same with other sensors beside it, each with gaps."""
+    frame = measured().assign(speed=80.0, speed_std=20.0, acceleration=0.0, brake_demand=measured()["brake_pressure"])
+    frame["wheel_speed_1"] = frame["wheel_speed_2"] = 80.0 / 0.46
+    frame.loc[frame.index % 3 > 0, ["speed", "speed_std", "wheel_speed_2"]] = np.nan
+    frame.loc[frame.index % 5 > 0, "position"] = np.nan
+    return frame
+
+
+@pytest.mark.parametrize("frame", [measured(), with_everything()], ids=["positions", "everything"])
+def test_a_frame_gives_what_its_log_gives_to_the_bit(frame: pd.DataFrame, tmp_path: Path) -> None:
+    log, bag, result = tmp_path / "log.csv", tmp_path / "run", tmp_path / "result.json"
+    frame.to_csv(log, index=False)
+    assert import_csv.main([str(log), "--output", str(bag)]) == 0
+    assert replay.main([str(bag), "--offline", "--json", str(result)]) == 0
+    expected = json.loads(result.read_text(encoding="utf-8"))
+    found = estimate(frame)
+    assert found.attrs["digest"] == expected["digest"]
+    assert {name: found.attrs[name] for name in ("measurements", "accepted", "dropped")} == {
+        name: expected[name] for name in ("measurements", "accepted", "dropped")
+    }
+    assert found["mu"].iloc[-1] == expected["mu_final"]
+
+
+def test_the_result_has_the_columns_of_a_file_and_the_time_of_the_frame() -> None:
+    frame = measured()
+    found = estimate(frame)
+    assert list(found.columns) == ["time", *COLUMNS]
+    assert set(found["time"]) <= set(frame["time"])
+    assert (found["t_ns"] == (found["time"] * 1e9).round()).all()
+    assert found["regime"].isin(["COASTING", "ADHESION_LIMITED", "BRAKE_LIMITED"]).all()
+    assert found.dtypes["t_ns"] == np.int64
+    assert (found.dtypes[["mu", "mu_lower", "safe_m"]] == np.float64).all()
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_datetimes_stay_datetimes(zone: str | None) -> None:
+    frame = measured()
+    times = pd.Timestamp("2024-11-21 08:15", tz=zone) + pd.to_timedelta(frame["time"], unit="s")
+    found = estimate(frame.assign(time=times))
+    assert found["time"].isin(times).all()
+    assert np.allclose(found["mu"], estimate(frame)["mu"])
+
+
+def test_a_method_of_windows_and_another_train_are_a_config_away() -> None:
+    config = Config(method="rail_condition", train=Train(mass_kg=400e3), track=Track((Grade(0.0, 1e4, 20.0),)))
+    found = estimate(measured(), config, seed=3)
+    assert found["brake_factor"].isna().all()
+    assert (found["mu"] > 0.0).all()
+
+
+def test_the_stepwise_surface_gives_the_same() -> None:
+    config, found = Config(), estimate(measured())
+    state, estimates = init(config, 1), []
+    for time, position_m, pressure_pa in measured().itertuples(index=False):
+        measurement = Measurement(round(time * 1e9), position_m, 0.25, pressure_pa)
+        state, made = step(config, state, measurement)
+        estimates += [] if made is None else [made]
+    estimates += finish(config, state)[1]
+    assert [each.mu for each in estimates] == pytest.approx(found["mu"].tolist())
+
+
+def test_numbers_of_numpy_are_numbers() -> None:
+    config = Config(window=int(np.int64(40)), start_mu=slip(np.float32(0.125)), train=Train(mass_kg=np.float64(4e5)))
+    assert Config(window=slip(np.int64(40)), start_mu=0.125, train=Train(mass_kg=4e5)) == config
+
+
+def slip(value: Any) -> Any:
+    """Return a value of which the type checker knows nothing."""
+    return value
+
+
+def slipped(**changes: Any) -> pd.DataFrame:
+    return measured().assign(**changes)
+
+
+@pytest.mark.parametrize(
+    ("frame", "message"),
+    [
+        ([1, 2], "frame = list: give a pandas DataFrame"),
+        (measured().rename(columns={"brake_pressure": "pressure"}), "column 'pressure': did you mean 'brake_pressure'"),
+        (slipped(notes="wet"), "column 'notes': rename it to one of time, position, .*, or drop it"),
+        (measured().drop(columns="time"), r"has the columns \['position', 'brake_pressure'\]: give 'time' and"),
+        (measured().drop(columns="position"), "give 'time' and 'position' or 'speed'"),
+        (slipped(brake_pressure="4,1"), "column 'brake_pressure': .*: give numbers, NaN where nothing was measured"),
+        (slipped(time="08:15:03"), "column 'time' is of .*: give seconds, or datetimes by pandas.to_datetime"),
+        (measured().iloc[::-1], r"column 'time', row 1: 32\.8 falls: frame.sort_values\('time'\) mends it"),
+        (measured().replace({"time": {15.3: np.nan}}), "column 'time', row 3: no time: drop the row"),
+        (slipped(position=1e9), "nothing to estimate from in 180 rows; dropped: {'INVALID': 180}"),
+    ],
+)
+def test_a_frame_that_cannot_be_right_is_refused_with_the_remedy(frame: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        estimate(frame)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: estimate(measured(), slip({"start_mu": 0.1})), "config = {'start_mu': 0.1}: give a Config"),
+        (lambda: estimate(measured(), seed=-1), "seed = -1: give an integer of at least 0"),
+        (lambda: estimate(measured(), std_m=0.0), r"std_m = 0\.0: give the positions' standard deviation"),
+        (lambda: Config(train=slip("CRH3")), "train = 'CRH3': give a Train"),
+        (lambda: Config(track=slip("grade 0 1 2")), "track = 'grade 0 1 2': give a Track"),
+        (lambda: Train(mass_kg=slip("536 t")), "train.mass_kg = '536 t': give a value of type float"),
+        (
+            lambda: Track((slip(("grade", 0, 1, 2)),)),
+            r"track section \('grade', 0, 1, 2\): give a Grade, a Curve or a Tunnel",
+        ),
+        (lambda: Track((), -200.0), r"track train_length_m = -200\.0: give a length above 0 m"),
+        (lambda: Track((Grade(0.0, 1e6, 5e6),)), "rises by 500 %, and trains climb 15 % at most"),
+        (lambda: Track((Tunnel(0.0, 1e3), Curve(0.0, 1e3, 2.0, 1.0))), "radius_m of at least 10 m"),
+    ],
+)
+def test_what_is_no_setting_is_refused_by_name_value_and_remedy(make: Any, message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+def test_drops_that_matter_are_warned_of() -> None:
+    frame = slipped(position=measured()["position"].where(measured().index % 2 == 0, 5e7))
+    with pytest.warns(UserWarning, match="90 of 180 positions were used, dropped: {'INVALID': 90}: are units"):
+        estimate(frame)
+
+
+def test_every_public_name_is_there_and_documented() -> None:
+    page = (ROOT / "doc" / "python.md").read_text(encoding="utf-8")
+    for name in adhesion_node.__all__:
+        assert getattr(adhesion_node, name).__doc__, name
+        assert f"`{name}" in page, name
+    assert sorted(adhesion_node.__all__) == dir(adhesion_node)
+    with pytest.raises(AttributeError, match="no attribute 'guess'"):
+        getattr(adhesion_node, slip("guess"))
