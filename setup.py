@@ -61,8 +61,9 @@ setup(
     data_files=shared_files(),
     zip_safe=False,
     python_requires=">=3.11",
+    # numba: compiles the inner loops where they run, so that no compiler is needed to install.
     # pyyaml: parameter files; rclpy itself has it from the distribution.
-    install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "pyyaml>=6,<7"],
+    install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "numba>=0.58,<1", "pyyaml>=6,<7"],
     extras_require={
         # ROS 2 itself where no ROS 2 is sourced. The distribution names `rclpy` and `*_msgs` are not on PyPI.
         "ros": ["ros-jazzy-rclpy[fastrtps]==7.1.6", "ros-jazzy-common-interfaces==5.3.6"],

@@ -3,7 +3,7 @@
 """The programs. A node first takes the signals over, then its module, with numpy and ROS, is imported.
 
 So a Ctrl-C ends a program that is still importing as cleanly as one that spins. A program that needs a package which
-is not installed says how to get it: the nodes of a train run with rclpy, numpy and scipy alone.
+is not installed says how to get it: the nodes of a train run with rclpy, numpy, scipy and numba.
 """
 
 import sys
@@ -14,6 +14,7 @@ from .command.signals import stop_on_signals
 
 Program = Callable[[], int]
 
+_ALWAYS = ("numpy", "scipy", "numba", "yaml")
 _EXTRAS = {"aiohttp": "live", "distributed": "cluster"}
 """What brings a package; the others come with `tools`."""
 
@@ -59,9 +60,8 @@ def _saying_what_is_missing(program: Program) -> Program:
             if without_ros.is_of_ros(name) and without_ros.is_help_asked():
                 with without_ros.stand_ins():
                     return program()
-            remedy = (
-                without_ros.REMEDY if without_ros.is_of_ros(name) else f"pip install '.[{_EXTRAS.get(name, 'tools')}]'"
-            )
+            what = "." if name in _ALWAYS else f"'.[{_EXTRAS.get(name, 'tools')}]'"
+            remedy = without_ros.REMEDY if without_ros.is_of_ros(name) else f"pip install {what}"
             print(f"{name} is missing: {remedy}", file=sys.stderr)
             return 2
 

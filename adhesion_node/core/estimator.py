@@ -90,6 +90,18 @@ def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     return state, estimates + last
 
 
+def warm_up(config: Config) -> None:
+    """Brake once on made up measurements: what is compiled when first used is so before a train brakes."""
+    state, speed = init(config, seed=0), 30.0
+    for k in range(40):
+        t_ns, pressure = k * 100_000_000, 0.0 if k < 20 else config.train.full_pressure_pa
+        wheels = WheelSample(t_ns, (speed / config.train.wheel_radius_m,))
+        others = PressureSample(t_ns, pressure), SpeedSample(t_ns, speed, 0.01), ImuSample(t_ns, 0.0, 0.01), wheels
+        for sample in (*others, PositionSample(t_ns, 3.0 * k, 1.0)):
+            state, _ = advance(config, state, sample)
+    finish(config, state)
+
+
 def paired(config: Config, samples: Iterable[Sample]) -> Iterator[Measurement]:
     """The measurements that samples make, in order: for estimators that do no more than the gate did."""
     by, inbox = gate_of(config), Inbox()

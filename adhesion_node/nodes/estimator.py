@@ -14,6 +14,7 @@ from typing import Any
 from adhesion_node.core import Config, Estimate, Outcome, Regime
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.bank.learnt import learnt
+from adhesion_node.core.estimator import warm_up
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import SETTINGS, setup_of
@@ -48,6 +49,7 @@ class Estimator(EstimatingNode[Pipeline]):
 
 def _set_up(values: Mapping[str, Any]) -> SetUp[Pipeline]:
     setup = setup_of(values)
+    warm_up(setup.config)
     return SetUp(Pipeline(setup.config, setup.seed), setup.line, setup.sensor_timeout_s, setup.telling)
 
 

@@ -30,7 +30,7 @@ OPTIONAL = {"distributed": "cluster", "pyarrow": "parquet"}
 
 BY_APT = {
     *("python3-numpy", "python3-scipy", "python3-yaml", "python3-matplotlib", "python3-argcomplete", "python3-aiohttp"),
-    *("python3-pyproj", "python3-pandas", "python3-hypothesis", "python3-pytest"),
+    *("python3-numba", "python3-pyproj", "python3-pandas", "python3-hypothesis", "python3-pytest"),
 }
 BY_PIP = {"python3-rosbags-pip", "mcap-ros2-support"}
 """What the keys of rosdep/python.yaml install on Ubuntu 24.04; those by pip take a venv."""
@@ -38,6 +38,7 @@ BY_PIP = {"python3-rosbags-pip", "mcap-ros2-support"}
 FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "numpy": ("numpy", "python3-numpy"),
     "scipy": ("scipy", "python3-scipy"),
+    "numba": ("numba", "python3-numba"),
     "matplotlib": ("matplotlib", "python3-matplotlib"),
     "argcomplete": ("argcomplete", "python3-argcomplete"),
     "pyproj": ("pyproj", "python3-pyproj"),
@@ -202,11 +203,11 @@ def test_what_is_imported_is_declared() -> None:
     assert not any(ROS.fullmatch(name) for name in found), "ROS is no PyPI requirement; it stands in the extra `ros`"
 
 
-def test_a_train_needs_ros_numpy_and_scipy_alone() -> None:
+def test_a_train_needs_ros_numpy_scipy_and_numba_alone() -> None:
     """YAML: what rclpy itself reads parameters with."""
-    assert names_of(setup_arguments()["install_requires"]) == {"numpy", "scipy", "pyyaml"}
+    assert names_of(setup_arguments()["install_requires"]) == {"numpy", "scipy", "numba", "pyyaml"}
     keys = {name for name in depends("exec_depend") if not ROS.fullmatch(str(name))}
-    assert keys == {"python3-numpy", "python3-scipy", "python3-yaml"}
+    assert keys == {"python3-numpy", "python3-scipy", "python3-numba", "python3-yaml"}
     extras = setup_arguments()["extras_require"]
     assert set(extras["tools"]) <= set(extras["test"])
 

@@ -15,8 +15,10 @@ import numpy as np
 from scipy.special import ndtr
 
 from ..physics.train import Array
+from .kernels import weighing
+from .kernels.weighing import Pruning
 from .kinds import FREE, FREE_STD, HELD, KINDS, SLIDES, SLIDING
-from .layout import BRAKE, MU, ROUGH, SPEED, Bank, joined
+from .layout import BRAKE, MU, ROUGH, Bank, joined
 from .motion import Braking, laws_of, resistance, use
 
 if TYPE_CHECKING:
@@ -140,38 +142,9 @@ def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, 
 
 
 def pruned(bank: Bank) -> Bank:
-    """Without the unlikely, and with what says the same said once."""
-    bank = _united(bank.part(bank.log_weight > math.log(LEAST)).normalised())
-    if bank.log_weight.size > MOST:
-        bank = bank.part(np.sort(np.argsort(-bank.log_weight, kind="stable")[:MOST]))
-    return bank.normalised()
-
-
-def _united(bank: Bank) -> Bank:
-    """Unite hypotheses of one label that say the same, the likelier one first."""
-    order = np.argsort(-bank.log_weight, kind="stable")
-    bank = bank.part(order)
-    same = (bank.noise[:, None] == bank.noise) & (bank.law[:, None] == bank.law) & (bank.kind[:, None] == bank.kind)
-    for component in (MU, SPEED):
-        std = np.sqrt(bank.covariance[:, component, component])
-        mean = bank.mean[:, component]
-        ratio = std / std[:, None]
-        same &= np.abs(mean - mean[:, None]) < ALIKE * std[:, None] + 1e-9
-        same &= (ratio < ALIKE_STD) & (ratio > 1.0 / ALIKE_STD)
-    gone = np.zeros(order.size, dtype=np.bool_)
-    mean, covariance, log_weight = bank.mean.copy(), bank.covariance.copy(), bank.log_weight.copy()
-    for index in range(order.size):
-        if gone[index]:
-            continue
-        group = same[index] & ~gone
-        group[:index] = False
-        if np.count_nonzero(group) > 1:
-            part = bank.part(group)
-            mean[index], covariance[index] = part.moments()
-            log_weight[index] = np.logaddexp.reduce(part.log_weight)
-            group[index] = False
-            gone |= group
-    return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight).part(~gone)
+    """Without the unlikely, and with what says the same said once: it is united, the likelier one first."""
+    kept, mean, covariance, log_weight = weighing.pruned(bank, Pruning(math.log(LEAST), MOST, ALIKE, ALIKE_STD))
+    return bank.part(kept)._replace(mean=mean, covariance=covariance, log_weight=log_weight)
 
 
 def unlikely_kept(bank: Bank, least: float) -> Bank:

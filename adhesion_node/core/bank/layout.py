@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.train import Array
+from .kernels import weighing
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -22,7 +23,6 @@ leaves open, with the error of the resistance; slow error of the positions, m; b
 pitch per deceleration over g; scale error of the speeds."""
 
 SIZE = 10
-EACH = np.arange(SIZE)
 
 
 class Bank(NamedTuple):
@@ -53,12 +53,11 @@ class Bank(NamedTuple):
 
     def is_sound(self) -> bool:
         """Whether every number is finite and no variance below 0."""
-        finite = all(bool(np.isfinite(numbers).all()) for numbers in (self.mean, self.covariance, self.log_weight))
-        return finite and bool((self.covariance[:, EACH, EACH] >= 0.0).all())
+        return weighing.is_sound(self.mean, self.covariance, self.log_weight)
 
     def normalised(self) -> Bank:
         """With probabilities that sum to 1."""
-        return self._replace(log_weight=self.log_weight - np.logaddexp.reduce(self.log_weight))
+        return self._replace(log_weight=weighing.normalised(self.log_weight))
 
     def part(self, chosen: Mask | Indices) -> Bank:
         """A copy of the chosen hypotheses, with the weights that they have."""
@@ -66,10 +65,7 @@ class Bank(NamedTuple):
 
     def moments(self) -> tuple[Array, Array]:
         """Mean and covariance over all hypotheses, shapes (SIZE,) and (SIZE, SIZE)."""
-        weight = np.exp(self.log_weight - np.logaddexp.reduce(self.log_weight))
-        mean = weight @ self.mean
-        apart = self.mean - mean
-        return mean, np.einsum("h,hij->ij", weight, self.covariance) + (apart.T * weight) @ apart
+        return weighing.moments(self.log_weight, self.mean, self.covariance)
 
     def with_fresh(self, component: int, mean: float | Array, std: float | Array) -> Bank:
         """With a component that is known anew, apart from all others."""

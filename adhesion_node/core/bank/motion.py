@@ -11,15 +11,18 @@ Roughness rho and grade gamma fade with the way, the slow error of the positions
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..physics.adhesion import SpeedLaw
-from ..physics.train import GRAVITY, Array
+from ..physics.train import Array
 from . import kinds
-from .kinds import FREE, SLIDES
-from .layout import BIAS, BRAKE, EACH, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank, Mask
+from .kernels import moving
+from .kernels.weighing import variances
+from .kinds import SLIDES
+from .layout import POSITION, SPEED, Bank, Mask
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -55,8 +58,7 @@ class Use(NamedTuple):
 
     def std(self, bank: Bank) -> Array:
         """Standard deviations, shape (H,)."""
-        variance = np.einsum("hi,hij,hj->h", self.slope, bank.covariance, self.slope)
-        return np.asarray(np.sqrt(np.maximum(variance, 1e-12)))
+        return np.asarray(np.sqrt(np.maximum(variances(self.slope, bank.covariance), 1e-12)))
 
 
 def laws_of(config: Config) -> tuple[tuple[SpeedLaw, float], ...]:
@@ -72,44 +74,40 @@ def resistance(config: Config, bank: Bank) -> Array:
 
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
-    mean, rotating = bank.mean, config.train.rotating_mass_fraction
-    needed = (mean[:, BRAKE] * braking.applied - rotating * resisting) / (1.0 + rotating)
-    rail = mean[:, MU] * (1.0 + mean[:, ROUGH])
-    free = bank.kind == FREE
-    slides = SLIDES[bank.kind] & ((rail < needed) | (braking.told > 0.0))
-    sliding = np.where(slides, braking.share, 0.0)
-    slope = np.zeros(mean.shape)
-    slope[:, MU] = np.where(free, 1.0, sliding * (1.0 + mean[:, ROUGH]))
-    slope[:, ROUGH] = sliding * mean[:, MU]
-    held = np.where(free, 0.0, (1.0 - sliding) / (1.0 + rotating))
-    slope[:, BRAKE] = held * braking.applied
-    slope[:, SPEED] = -held * rotating * config.train.resistance_slope(mean[:, SPEED])
-    return Use(np.where(free, mean[:, MU], sliding * rail + (1.0 - sliding) * needed), slope, slides)
+    return Use(*moving.used(model_of(config), bank, resisting, _step(0.0, braking, 0.0)))
 
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:
     """The beliefs after `dt_s`; `declared_m` is the standard deviation that the positions declare."""
-    mean, speed = bank.mean, bank.mean[:, SPEED]
-    resisting = resistance(config, bank)
-    used = use(config, bank, braking, resisting)
-    slower = speed - dt_s * GRAVITY * (used.value + resisting + mean[:, GRADE])
-    lasting, noise = _lasting(config, bank, slower, dt_s, declared_m)
-    if braking.rising:
-        noise[:, SPEED] += np.square(BUILDING_UP * GRAVITY * used.value) * dt_s
-    means = mean * lasting
-    means[:, SPEED] = slower
-    means[:, POSITION] = mean[:, POSITION] + 0.5 * dt_s * (speed + slower)
-    effect = used.slope
-    effect[:, GRADE] = 1.0
-    effect[:, SPEED] += config.train.resistance_slope(speed)
-    step = np.zeros(bank.covariance.shape)
-    step[:, EACH, EACH] = lasting
-    step[:, SPEED] -= dt_s * GRAVITY * effect
-    step[:, POSITION] -= 0.5 * dt_s**2 * GRAVITY * effect
-    step[:, POSITION, SPEED] += dt_s
-    covariance = step @ bank.covariance @ step.transpose(0, 2, 1)
-    covariance[:, EACH, EACH] += noise
-    return bank._replace(mean=means, covariance=covariance)
+    mean, covariance = moving.moved(model_of(config), bank, _step(dt_s, braking, declared_m))
+    return bank._replace(mean=mean, covariance=covariance)
+
+
+def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.Step:
+    applied, share, told = float(braking.applied), float(braking.share), float(braking.told)
+    return moving.Step(float(dt_s), applied, share, bool(braking.rising), told, float(declared_m))
+
+
+@lru_cache(maxsize=16)
+def model_of(config: Config) -> moving.Model:
+    """What the kernels need to know of train, track and labels."""
+    train = config.train
+    breaks, levels = config.track.steps
+    return moving.Model(
+        rotating=float(train.rotating_mass_fraction),
+        resistance=np.array(train.resistance_si),
+        breaks=breaks,
+        levels=levels,
+        laws=np.array([(law.floor, law.gain_kmh, law.offset_kmh, law.scale) for law, _ in laws_of(config)]),
+        kinds=np.column_stack((SLIDES, kinds.DRIFT, kinds.ROUGHNESS, kinds.RESTLESSNESS)).astype(np.float64),
+        noises=np.column_stack((kinds.WHITE, kinds.SLOW, kinds.LASTS)),
+        lengths=np.array([kinds.ROUGHNESS_M, kinds.GRADE_M]),
+        free=np.array([kinds.FREE_STD, kinds.FREE_S]),
+        rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2]),
+        grade_error=float(config.grade_error),
+        resistance_error=float(config.resistance_std),
+        building_up=BUILDING_UP,
+    )
 
 
 def open_variance(config: Config, bank: Bank) -> Array:
@@ -126,26 +124,3 @@ def white_variance(bank: Bank, declared_m: float) -> Array:
 def slow_variance(bank: Bank, declared_m: float) -> Array:
     """Variance of their slow part."""
     return np.asarray(np.square(np.maximum(kinds.SLOW[:, 0] * declared_m, kinds.SLOW[:, 1]))[bank.noise])
-
-
-def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m: float) -> tuple[Array, Array]:
-    """What lasts of each component over a step, and the variance that is added, shapes (H, SIZE)."""
-    kind, speed = bank.kind, bank.mean[:, SPEED]
-    way_m = np.maximum(speed, 0.1) * dt_s
-    by_law = [law(slower) / law(speed) for law, _ in laws_of(config)]
-    free = np.exp(-dt_s / kinds.FREE_S)
-    lasting, noise = np.ones(bank.mean.shape), np.zeros(bank.mean.shape)
-    lasting[:, MU] = np.where(kind == FREE, free, np.where(SLIDES[kind], np.choose(bank.law, by_law), 1.0))
-    lasting[:, ROUGH] = np.exp(-way_m / kinds.ROUGHNESS_M)
-    lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
-    lasting[:, OFFSET] = np.exp(-dt_s / kinds.LASTS[bank.noise])
-    drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
-    noise[:, POSITION] = config.motion.position_noise_rate * dt_s
-    noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s
-    noise[:, MU] = np.where(kind == FREE, kinds.FREE_STD**2 * (1.0 - free**2), drift)
-    noise[:, ROUGH] = np.square(kinds.ROUGHNESS[kind]) * (1.0 - lasting[:, ROUGH] ** 2)
-    noise[:, BRAKE] = config.brake_drift**2 * dt_s
-    noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)
-    noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
-    noise[:, BIAS] = BIAS_DRIFT**2 * dt_s
-    return lasting, noise

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..physics.train import GRAVITY, Array
+from .kernels import weighing
 from .layout import BIAS, OFFSET, PITCH, POSITION, SCALE, SPEED, Bank
 from .motion import BUILDING_UP, Braking, use, white_variance
 
@@ -34,7 +35,7 @@ class Observation(NamedTuple):
 
     def apart(self, bank: Bank) -> Array:
         """Innovations in standard deviations, shape (H,)."""
-        foreseen = np.einsum("hi,hij,hj->h", self.slope, bank.covariance, self.slope)
+        foreseen = weighing.variances(self.slope, bank.covariance)
         result: Array = np.abs(self.innovation) / np.sqrt(foreseen + self.variance)
         return result
 
@@ -71,17 +72,9 @@ def acceleration_seen(
 
 def corrected(bank: Bank, seen: Observation) -> Bank:
     """Take an observation in; the weights are not normalised."""
-    gain = np.einsum("hij,hj->hi", bank.covariance, seen.slope)
-    variance = np.einsum("hi,hi->h", gain, seen.slope) + seen.variance
-    squared = seen.innovation**2 / variance
-    clipped = CLIPPED * np.sqrt(squared) - 0.5 * CLIPPED**2
-    evidence = -0.5 * np.log(variance) - np.where(squared > CLIPPED**2, clipped, 0.5 * squared)
-    pull = gain / (variance * np.maximum(np.sqrt(squared) / CLIPPED, 1.0))[:, None]
-    return bank._replace(
-        mean=bank.mean + pull * seen.innovation[:, None],
-        covariance=bank.covariance - pull[:, :, None] * gain[:, None, :],
-        log_weight=bank.log_weight + evidence,
-    )
+    variance = np.asarray(np.broadcast_to(seen.variance, seen.innovation.shape), np.float64, order="C", copy=True)
+    mean, covariance, log_weight = weighing.corrected(bank, seen.innovation, seen.slope, variance, CLIPPED)
+    return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight)
 
 
 def not_slower(bank: Bank, rim_mps: float, std_mps: float) -> Bank:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from ..belief.gaussian import Gaussian
 from ..belief.rail import Rail
@@ -16,6 +15,8 @@ from ..belief.regime import Regime
 from ..physics.train import GRAVITY, Array
 from . import kinds
 from .following import SPEED_ERROR_MPS, Memory, S
+from .kernels import mixture
+from .kernels.weighing import variances
 from .layout import GRADE, MU, ROUGH, SPEED, Bank
 from .motion import Braking, laws_of, open_variance, resistance, use
 
@@ -28,8 +29,6 @@ SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
 
 COUNTED_RISE = 0.5
 """Power of what a law promises for lower speeds that is counted on: slide protection uses less of it."""
-
-BISECTIONS = 30
 
 TWO_SIDED_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
@@ -148,7 +147,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> A
     slope[:, GRADE] = grade_kept
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
     roughness = kinds.ROUGHNESS[bank.kind] ** 2 * rough_added + kinds.DRIFT[bank.kind] ** 2 * time_s / 3.0
-    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added
+    variance = variances(slope, bank.covariance) + open_variance(config, bank) * grade_added
     variance += np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
     speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
@@ -167,16 +166,10 @@ def _mean_ahead(way_m: Array, length_m: float) -> tuple[Array, Array]:
 
 
 def quantiles(weights: Array, means: Array, stds: Array, probabilities: Sequence[float]) -> Array:
-    """Quantiles of mixtures of Gaussians by bisection.
+    """Quantiles of mixtures of Gaussians.
 
     `weights` has the shape (H,), `means` and `stds` (..., H); the result (..., P) for P probabilities.
     """
-    wanted = np.array(probabilities)
-    size = (*means.shape[:-1], wanted.size)
-    low = np.broadcast_to((means - 8.0 * stds).min(axis=-1, keepdims=True), size)
-    high = np.broadcast_to((means + 8.0 * stds).max(axis=-1, keepdims=True), size)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = ndtr((middle[..., None] - means[..., None, :]) / stds[..., None, :]) @ weights < wanted
-        low, high = np.where(below, middle, low), np.where(below, high, middle)
-    return np.asarray(0.5 * (low + high))
+    mean, std = (np.ascontiguousarray(np.atleast_2d(each)) for each in (means, stds))
+    rows = mixture.quantiles(weights, mean, std, np.array(probabilities))
+    return rows.reshape(*means.shape[:-1], len(probabilities))

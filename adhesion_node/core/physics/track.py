@@ -126,6 +126,11 @@ class Track:
                 return np.full(position_m.shape, self._levels[first])
         return self._levels[self._breaks.searchsorted(position_m, side="right")]
 
+    @property
+    def steps(self) -> tuple[Array, Array]:
+        """Where the resistance changes, m, and its values before, between and behind, N/N."""
+        return self._breaks, self._levels
+
     def least_resistance(self, from_m: float) -> float:
         """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""
         return float(self._levels[np.searchsorted(self._breaks, from_m, side="right") :].min())

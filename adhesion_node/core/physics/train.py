@@ -76,9 +76,13 @@ class Train:
 
     def specific_resistance(self, speed_mps: Array) -> Array:
         """Basic running resistance per weight, N/N (6): (c0 + c1 v + c2 v^2) 1e-3 with v in km/h."""
-        # Coefficients are brought to m/s first: one multiplication less per particle and step.
-        c0, c1, c2 = 1e-3 * self.resistance_c0, 3.6e-3 * self.resistance_c1, 12.96e-3 * self.resistance_c2
+        c0, c1, c2 = self.resistance_si  # one multiplication less per particle and step
         return c0 + speed_mps * (c1 + c2 * speed_mps)
+
+    @property
+    def resistance_si(self) -> tuple[float, float, float]:
+        """Coefficients of (6) per weight, N/N, of a speed in m/s."""
+        return 1e-3 * self.resistance_c0, 3.6e-3 * self.resistance_c1, 12.96e-3 * self.resistance_c2
 
     def resistance_slope(self, speed_mps: Array) -> Array:
         """Derivative of `specific_resistance` with respect to the speed, s/m."""

@@ -1,0 +1,174 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Adhesion that is used, and the prediction over a step, one hypothesis after the other."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import kernel
+
+if TYPE_CHECKING:
+    from ..layout import Bank
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+GRAVITY = 9.8
+POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10
+
+
+class Model(NamedTuple):
+    """Train, track and what the labels of the hypotheses mean, as numbers."""
+
+    rotating: float
+    resistance: Array
+    """Of the speed in m/s: c0, c1, c2, N/N."""
+    breaks: Array
+    """Where the track's profile changes, m."""
+    levels: Array
+    """Its resistance before, between and behind them, N/N."""
+    laws: Array
+    """floor, gain, offset, scale of each law, shape (L, 4)."""
+    kinds: Array
+    """Whether it slides, drift, roughness, restlessness of each kind, shape (K, 4); the first one is free."""
+    noises: Array
+    """White part, least white one, slow part, least slow one, time that lasts, shape (N, 5)."""
+    lengths: Array
+    """Correlation lengths of roughness and grade, m."""
+    free: Array
+    """Deviation of what is used without brakes, and how long it lasts, s."""
+    rates: Array
+    """Variances per second of position, brake and bias."""
+    grade_error: float
+    resistance_error: float
+    building_up: float
+
+
+class Step(NamedTuple):
+    """A step in time, and the brake over it."""
+
+    dt_s: float
+    applied: float
+    share: float
+    rising: bool
+    told: float
+    declared_m: float
+
+
+@kernel
+def _basic(model: Model, v: float) -> float:
+    c = model.resistance
+    return float(c[0] + v * (c[1] + c[2] * v))
+
+
+@kernel
+def _resistance(model: Model, s: float, v: float) -> float:
+    section = 0
+    while section < model.breaks.size and s >= model.breaks[section]:
+        section += 1
+    return float(_basic(model, v) + model.levels[section])
+
+
+@kernel
+def _law(model: Model, law: int, v: float) -> float:
+    row = model.laws[law]
+    return float(row[3] * (row[0] + row[1] / (row[2] + max(v, 0.0) * 3.6)))
+
+
+@kernel
+def _used(
+    model: Model, x: Array, kind: int, resisting: float, step: Step
+) -> tuple[float, bool, float, float, float, float]:
+    """u, whether the adhesion limits, and du/d(mu, rho, beta, v)."""
+    if kind == 0:
+        return x[MU], False, 1.0, 0.0, 0.0, 0.0
+    rotating = model.rotating
+    needed = (x[BRAKE] * step.applied - rotating * resisting) / (1.0 + rotating)
+    rail = x[MU] * (1.0 + x[ROUGH])
+    slides = model.kinds[kind, 0] > 0.0 and (rail < needed or step.told > 0.0)
+    f = step.share if slides else 0.0
+    held = (1.0 - f) / (1.0 + rotating)
+    by_speed = -held * rotating * (model.resistance[1] + 2.0 * model.resistance[2] * x[SPEED])
+    return f * rail + (1.0 - f) * needed, slides, f * (1.0 + x[ROUGH]), f * x[MU], held * step.applied, by_speed
+
+
+@kernel
+def used(model: Model, bank: Bank, resisting: Array, step: Step) -> tuple[Array, Array, Mask]:
+    """Adhesion used, shape (H,), its derivatives, shape (H, SIZE), and whether the adhesion limits, shape (H,)."""
+    count = resisting.size
+    value, slope, slides = np.empty(count), np.zeros((count, SIZE)), np.empty(count, dtype=np.bool_)
+    for h in range(count):
+        u = _used(model, bank.mean[h], bank.kind[h], resisting[h], step)
+        value[h], slides[h] = u[0], u[1]
+        slope[h, MU], slope[h, ROUGH], slope[h, BRAKE], slope[h, SPEED] = u[2], u[3], u[4], u[5]
+    return value, slope, slides
+
+
+@kernel
+def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
+    """Means and covariances after a step: x' = f(x), P' = F P F^T + Q.
+
+    F is diagonal, what lasts of each component, but for the rows of speed and position.
+    """
+    dt, mean, covariance = step.dt_s, bank.mean, bank.covariance
+    means, covariances = np.empty_like(mean), np.empty_like(covariance)
+    lasting, added = np.ones(SIZE), np.zeros(SIZE)
+    fall, way, by_fall, by_way = np.zeros(SIZE), np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
+    free = np.exp(-dt / model.free[1])
+    added[POSITION], added[BRAKE], added[BIAS] = dt * model.rates[0], dt * model.rates[1], dt * model.rates[2]
+    for h in range(bank.kind.size):
+        x, p, k = mean[h], covariance[h], bank.kind[h]
+        v, n = x[SPEED], model.noises[bank.noise[h]]
+        resisting, basic = _resistance(model, x[POSITION], v), _basic(model, v)
+        u, _, by_mu, by_rough, by_brake, by_speed = _used(model, x, k, resisting, step)
+        slower = v - dt * GRAVITY * (u + resisting + x[GRADE])
+        way_m = max(v, 0.1) * dt
+        if k == 0:
+            lasting[MU], added[MU] = free, model.free[0] ** 2 * (1.0 - free**2)
+        else:
+            bent = _law(model, bank.law[h], slower) / _law(model, bank.law[h], v)
+            lasting[MU] = bent if model.kinds[k, 0] > 0.0 else 1.0
+            added[MU] = (model.kinds[k, 1] * x[MU]) ** 2 * dt
+        lasting[ROUGH], lasting[GRADE] = np.exp(-way_m / model.lengths[0]), np.exp(-way_m / model.lengths[1])
+        lasting[OFFSET] = np.exp(-dt / n[4])
+        added[SPEED] = model.kinds[k, 3] ** 2 * dt
+        if step.rising:
+            added[SPEED] += (model.building_up * GRAVITY * u) ** 2 * dt
+        added[ROUGH] = model.kinds[k, 2] ** 2 * (1.0 - lasting[ROUGH] ** 2)
+        left = model.grade_error**2 + (model.resistance_error * basic) ** 2
+        added[GRADE] = left * (1.0 - lasting[GRADE] ** 2)
+        added[OFFSET] = max(n[2] * step.declared_m, n[3]) ** 2 * (1.0 - lasting[OFFSET] ** 2)
+        for i in range(SIZE):
+            means[h, i] = lasting[i] * x[i]
+        means[h, SPEED], means[h, POSITION] = slower, x[POSITION] + 0.5 * dt * (v + slower)
+        # rows of F: v' = v - dt g (u + r + gamma), s' = s + dt (v + v')/2
+        by_speed += model.resistance[1] + 2.0 * model.resistance[2] * v
+        fall[MU], fall[ROUGH], fall[BRAKE], fall[GRADE] = by_mu, by_rough, by_brake, 1.0
+        fall[SPEED] = by_speed
+        for i in range(SIZE):
+            way[i], fall[i] = -0.5 * dt**2 * GRAVITY * fall[i], -dt * GRAVITY * fall[i]
+        fall[SPEED] += 1.0
+        way[SPEED] += dt
+        way[POSITION] = 1.0
+        fall_fall, way_fall, way_way = 0.0, 0.0, 0.0
+        for i in range(SIZE):
+            by_fall[i], by_way[i] = 0.0, 0.0
+            for j in range(SIZE):
+                by_fall[i] += p[i, j] * fall[j]
+                by_way[i] += p[i, j] * way[j]
+                covariances[h, i, j] = lasting[i] * lasting[j] * p[i, j]
+            fall_fall += fall[i] * by_fall[i]
+            way_fall += way[i] * by_fall[i]
+            way_way += way[i] * by_way[i]
+        for i in range(SIZE):
+            covariances[h, SPEED, i] = covariances[h, i, SPEED] = lasting[i] * by_fall[i]
+            covariances[h, POSITION, i] = covariances[h, i, POSITION] = lasting[i] * by_way[i]
+        covariances[h, SPEED, SPEED], covariances[h, POSITION, POSITION] = fall_fall, way_way
+        covariances[h, POSITION, SPEED] = covariances[h, SPEED, POSITION] = way_fall
+        for i in range(SIZE):
+            covariances[h, i, i] += added[i]
+    return means, covariances

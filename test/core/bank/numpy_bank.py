@@ -1,0 +1,165 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The bank's arithmetic in NumPy, all hypotheses at once: what the compiled loops are held against."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import ndtr
+
+from adhesion_node.core.bank import branching, kinds, motion
+from adhesion_node.core.bank.kinds import FREE, SLIDES
+from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank
+from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance
+from adhesion_node.core.bank.seeing import CLIPPED, Observation
+from adhesion_node.core.config import Config
+from adhesion_node.core.physics.train import GRAVITY, Array
+
+EACH = np.arange(10)
+
+
+def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> motion.Use:
+    """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
+    mean, rotating = bank.mean, config.train.rotating_mass_fraction
+    needed = (mean[:, BRAKE] * braking.applied - rotating * resisting) / (1.0 + rotating)
+    rail = mean[:, MU] * (1.0 + mean[:, ROUGH])
+    free = bank.kind == FREE
+    slides = SLIDES[bank.kind] & ((rail < needed) | (braking.told > 0.0))
+    sliding = np.where(slides, braking.share, 0.0)
+    slope = np.zeros(mean.shape)
+    slope[:, MU] = np.where(free, 1.0, sliding * (1.0 + mean[:, ROUGH]))
+    slope[:, ROUGH] = sliding * mean[:, MU]
+    held = np.where(free, 0.0, (1.0 - sliding) / (1.0 + rotating))
+    slope[:, BRAKE] = held * braking.applied
+    slope[:, SPEED] = -held * rotating * config.train.resistance_slope(mean[:, SPEED])
+    return motion.Use(np.where(free, mean[:, MU], sliding * rail + (1.0 - sliding) * needed), slope, slides)
+
+
+def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:
+    """The beliefs after `dt_s`; `declared_m` is the standard deviation that the positions declare."""
+    mean, speed = bank.mean, bank.mean[:, SPEED]
+    resisting = resistance(config, bank)
+    used = use(config, bank, braking, resisting)
+    slower = speed - dt_s * GRAVITY * (used.value + resisting + mean[:, GRADE])
+    lasting, noise = _lasting(config, bank, slower, dt_s, declared_m)
+    if braking.rising:
+        noise[:, SPEED] += np.square(motion.BUILDING_UP * GRAVITY * used.value) * dt_s
+    means = mean * lasting
+    means[:, SPEED] = slower
+    means[:, POSITION] = mean[:, POSITION] + 0.5 * dt_s * (speed + slower)
+    effect = used.slope
+    effect[:, GRADE] = 1.0
+    effect[:, SPEED] += config.train.resistance_slope(speed)
+    step = np.zeros(bank.covariance.shape)
+    step[:, EACH, EACH] = lasting
+    step[:, SPEED] -= dt_s * GRAVITY * effect
+    step[:, POSITION] -= 0.5 * dt_s**2 * GRAVITY * effect
+    step[:, POSITION, SPEED] += dt_s
+    covariance = step @ bank.covariance @ step.transpose(0, 2, 1)
+    covariance[:, EACH, EACH] += noise
+    return bank._replace(mean=means, covariance=covariance)
+
+
+def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m: float) -> tuple[Array, Array]:
+    """What lasts of each component over a step, and the variance that is added, shapes (H, SIZE)."""
+    kind, speed = bank.kind, bank.mean[:, SPEED]
+    way_m = np.maximum(speed, 0.1) * dt_s
+    by_law = [law(slower) / law(speed) for law, _ in laws_of(config)]
+    free = np.exp(-dt_s / kinds.FREE_S)
+    lasting, noise = np.ones(bank.mean.shape), np.zeros(bank.mean.shape)
+    lasting[:, MU] = np.where(kind == FREE, free, np.where(SLIDES[kind], np.choose(bank.law, by_law), 1.0))
+    lasting[:, ROUGH] = np.exp(-way_m / kinds.ROUGHNESS_M)
+    lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
+    lasting[:, OFFSET] = np.exp(-dt_s / kinds.LASTS[bank.noise])
+    drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
+    noise[:, POSITION] = config.motion.position_noise_rate * dt_s
+    noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s
+    noise[:, MU] = np.where(kind == FREE, kinds.FREE_STD**2 * (1.0 - free**2), drift)
+    noise[:, ROUGH] = np.square(kinds.ROUGHNESS[kind]) * (1.0 - lasting[:, ROUGH] ** 2)
+    noise[:, BRAKE] = config.brake_drift**2 * dt_s
+    noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)
+    noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
+    noise[:, BIAS] = motion.BIAS_DRIFT**2 * dt_s
+    return lasting, noise
+
+
+def corrected(bank: Bank, seen: Observation) -> Bank:
+    """Take an observation in; the weights are not normalised."""
+    gain = np.einsum("hij,hj->hi", bank.covariance, seen.slope)
+    variance = np.einsum("hi,hi->h", gain, seen.slope) + seen.variance
+    squared = seen.innovation**2 / variance
+    clipped = CLIPPED * np.sqrt(squared) - 0.5 * CLIPPED**2
+    evidence = -0.5 * np.log(variance) - np.where(squared > CLIPPED**2, clipped, 0.5 * squared)
+    pull = gain / (variance * np.maximum(np.sqrt(squared) / CLIPPED, 1.0))[:, None]
+    return bank._replace(
+        mean=bank.mean + pull * seen.innovation[:, None],
+        covariance=bank.covariance - pull[:, :, None] * gain[:, None, :],
+        log_weight=bank.log_weight + evidence,
+    )
+
+
+def normalised(bank: Bank) -> Bank:
+    """With probabilities that sum to 1."""
+    return bank._replace(log_weight=bank.log_weight - np.logaddexp.reduce(bank.log_weight))
+
+
+def moments(bank: Bank) -> tuple[Array, Array]:
+    """Mean and covariance over all hypotheses."""
+    weight = normalised(bank).weight
+    mean = weight @ bank.mean
+    apart = bank.mean - mean
+    return mean, np.einsum("h,hij->ij", weight, bank.covariance) + (apart.T * weight) @ apart
+
+
+def pruned(bank: Bank) -> Bank:
+    """Without the unlikely, and with what says the same said once."""
+    bank = _united(normalised(bank.part(bank.log_weight > math.log(branching.LEAST))))
+    if bank.log_weight.size > branching.MOST:
+        bank = bank.part(np.sort(np.argsort(-bank.log_weight, kind="stable")[: branching.MOST]))
+    return normalised(bank)
+
+
+def _united(bank: Bank) -> Bank:
+    """Unite hypotheses of one label that say the same, the likelier one first."""
+    order = np.argsort(-bank.log_weight, kind="stable")
+    bank = bank.part(order)
+    same = (bank.noise[:, None] == bank.noise) & (bank.law[:, None] == bank.law) & (bank.kind[:, None] == bank.kind)
+    for component in (MU, SPEED):
+        std = np.sqrt(bank.covariance[:, component, component])
+        mean = bank.mean[:, component]
+        ratio = std / std[:, None]
+        same &= np.abs(mean - mean[:, None]) < branching.ALIKE * std[:, None] + 1e-9
+        same &= (ratio < branching.ALIKE_STD) & (ratio > 1.0 / branching.ALIKE_STD)
+    gone = np.zeros(order.size, dtype=np.bool_)
+    mean, covariance, log_weight = bank.mean.copy(), bank.covariance.copy(), bank.log_weight.copy()
+    for index in range(order.size):
+        if gone[index]:
+            continue
+        group = same[index] & ~gone
+        group[:index] = False
+        if np.count_nonzero(group) > 1:
+            part = bank.part(group)
+            mean[index], covariance[index] = moments(part)
+            log_weight[index] = np.logaddexp.reduce(part.log_weight)
+            group[index] = False
+            gone |= group
+    return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight).part(~gone)
+
+
+def quantiles(weights: Array, means: Array, stds: Array, probabilities: Sequence[float]) -> Array:
+    """Quantiles of mixtures of Gaussians by bisection.
+
+    `weights` has the shape (H,), `means` and `stds` (..., H); the result (..., P) for P probabilities.
+    """
+    wanted = np.array(probabilities)
+    size = (*means.shape[:-1], wanted.size)
+    low = np.broadcast_to((means - 8.0 * stds).min(axis=-1, keepdims=True), size)
+    high = np.broadcast_to((means + 8.0 * stds).max(axis=-1, keepdims=True), size)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        below = ndtr((middle[..., None] - means[..., None, :]) / stds[..., None, :]) @ weights < wanted
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    return np.asarray(0.5 * (low + high))

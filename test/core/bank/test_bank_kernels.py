@@ -1,0 +1,123 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The compiled loops of the bank: against NumPy to rounding, and that nothing is compiled while a train brakes."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from importlib import import_module
+from itertools import product
+from pkgutil import iter_modules
+from typing import Any
+
+import numpy as np
+import numpy_bank as by_numpy
+import pytest
+from banks import FULL, bank_of
+
+from adhesion_node.core.bank import branching, kernels, motion, seeing
+from adhesion_node.core.bank.kinds import KINDS, NOISES
+from adhesion_node.core.bank.layout import Bank
+from adhesion_node.core.bank.motion import Braking
+from adhesion_node.core.bank.verdict import quantiles
+from adhesion_node.core.config import Config
+from adhesion_node.core.estimator import warm_up
+from adhesion_node.core.physics.track import Grade, Track, Tunnel
+from adhesion_node.core.physics.train import CRH3
+
+LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
+KIND, LAW, NOISE = ([label[part] for label in LABELS] for part in range(3))
+BANK = bank_of(KIND, LAW, NOISE, spread=1.0)
+TRACK = Track((Grade(0.0, 499.0, 5.0), Tunnel(499.5, 900.0), Grade(500.5, 2000.0, -8.0)))
+CONFIGS = [Config(), Config(train=replace(CRH3, rotating_mass_fraction=0.08), track=TRACK)]
+BRAKINGS = [Braking(FULL), Braking(0.4 * FULL, 0.6, True, 0.0), Braking(0.5 * FULL, 1.0, False, 4.0), Braking(0.0)]
+MODULES = [import_module(f"{kernels.__name__}.{each.name}") for each in iter_modules(kernels.__path__)]
+
+
+def check(ours: Bank, theirs: Bank) -> None:
+    """Equal but for rounding; as covariances cancel, by the size of their variances."""
+    for one, other in zip(ours[3:], theirs[3:], strict=True):
+        np.testing.assert_array_equal(one, other)
+    std = np.sqrt(np.einsum("hii->hi", theirs.covariance))
+    np.testing.assert_allclose(ours.mean, theirs.mean, rtol=1e-12, atol=1e-13)
+    np.testing.assert_allclose(
+        ours.covariance / (std[:, :, None] * std[:, None, :]),
+        theirs.covariance / (std[:, :, None] * std[:, None, :]),
+        atol=1e-12,
+    )
+    np.testing.assert_allclose(ours.log_weight, theirs.log_weight, atol=1e-11)
+
+
+@pytest.mark.parametrize("config", CONFIGS, ids=["level", "profile and rotating mass"])
+@pytest.mark.parametrize("braking", BRAKINGS)
+def test_a_step(config: Config, braking: Braking) -> None:
+    check(motion.moved(config, BANK, 0.17, braking, 1.3), by_numpy.moved(config, BANK, 0.17, braking, 1.3))
+    resisting = motion.resistance(config, BANK)
+    ours, theirs = (form.use(config, BANK, braking, resisting) for form in (motion, by_numpy))
+    for one, other in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
+
+
+def test_a_speed_below_0_and_a_standstill() -> None:
+    mean = BANK.mean.copy()
+    mean[::2, 1], mean[1::2, 1] = -0.3, 0.0
+    slow = BANK._replace(mean=mean)
+    check(motion.moved(Config(), slow, 0.1, BRAKINGS[0], 1.0), by_numpy.moved(Config(), slow, 0.1, BRAKINGS[0], 1.0))
+
+
+@pytest.mark.parametrize("position_m", [500.0, 503.0, 540.0], ids=["near", "off", "clipped"])
+def test_a_correction(position_m: float) -> None:
+    seen = seeing.position_seen(BANK, position_m, 1.3)
+    check(seeing.corrected(BANK, seen), by_numpy.corrected(BANK, seen))
+    one = seen._replace(variance=0.4)
+    check(seeing.corrected(BANK, one), by_numpy.corrected(BANK, one))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_pruning(seed: int) -> None:
+    """Some far less likely than others, some alike, and once more than may stay."""
+    rng, count = np.random.default_rng(seed), 150
+    kind, law, noise = (rng.integers(0, size, count).tolist() for size in (6, 3, 4 if seed % 2 else 1))
+    bank = bank_of(kind, law, noise, seed, spread=0.05 * (1 + seed))
+    bank = by_numpy.normalised(bank._replace(log_weight=rng.uniform(-9.0 if seed % 3 else -3.0, 0.0, count)))
+    ours = branching.pruned(bank)
+    check(ours, by_numpy.pruned(bank))
+    assert ours.log_weight.size < count
+    for one, other in zip(bank.moments(), by_numpy.moments(bank), strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-12)
+
+
+@pytest.mark.parametrize("shape", [(40,), (6, 40)])
+def test_quantiles(shape: tuple[int, ...]) -> None:
+    """Of narrow and wide parts, also far apart: where nothing lies between them as well."""
+    rng = np.random.default_rng(3)
+    for spread in (0.0, 0.01, 1.0):
+        weights = rng.dirichlet(np.full(shape[-1], 0.3))
+        means, stds = rng.normal(0.08, spread, shape), rng.uniform(1e-6, 0.02, shape)
+        wanted = (0.01, 0.05, 0.5, 0.975)
+        ours = quantiles(weights, means, stds, wanted)
+        assert ours.shape == (*shape[:-1], 4)
+        np.testing.assert_allclose(ours, by_numpy.quantiles(weights, means, stds, wanted), rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rsplit(".", maxsplit=1)[-1])
+def test_a_kernel_file_stands_alone(module: Any) -> None:
+    """What is kept of it is thrown away when its own file changes: nothing of another file may be compiled in."""
+    with open(module.__file__, encoding="utf-8") as file:
+        tree = ast.parse(file.read())
+    found = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    names = {alias.name for node in found for alias in node.names}
+    assert names <= {"annotations", "math", "numpy", "NDArray", "kernel", "TYPE_CHECKING", "NamedTuple"}
+
+
+def test_all_is_compiled_before_a_train_brakes() -> None:
+    """Whatever is measured, by whatever sensors, calls the kernels with the types of the warm-up."""
+    warm_up(Config())
+    entries = [each for module in MODULES for each in vars(module).values() if hasattr(each, "signatures")]
+    once = {each: each.signatures for each in entries}
+    assert {len(signatures) for signatures in once.values()} == {0, 1}  # 0: called by other kernels alone
+    for config in CONFIGS:
+        warm_up(replace(config, speed_source="doppler", pressure_kind="mean"))
+        warm_up(replace(config, max_lag_s=1.0, method="rail_condition"))
+    assert once == {each: each.signatures for each in entries}
