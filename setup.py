@@ -73,6 +73,7 @@ setup(
         "cluster": CLUSTER,
         "test": [
             "pytest>=7.4,<10",
+            "pytest-xdist>=3.5,<4",
             "hypothesis>=6.98,<7",
             "mcap-ros2-support>=0.5.5,<1",
             "playwright>=1.48,<2",

@@ -50,6 +50,7 @@ def pytest_configure(config: pytest.Config) -> None:
         os.environ.pop(name, None)
     os.environ["ROS_DOMAIN_ID"] = str(_claim_domain())
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrices are small, and the cores are taken by the workers
     os.environ["ROS_HOME"] = home
     set_hypothesis_home_dir(os.path.join(home, "hypothesis"))
     os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")

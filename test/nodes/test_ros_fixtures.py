@@ -53,6 +53,16 @@ def test_waiting_is_bounded(executor: SingleThreadedExecutor, spin_until: SpinUn
 
 def test_ros_keeps_to_itself() -> None:
     assert 1 <= int(os.environ["ROS_DOMAIN_ID"]) <= 100
+
+
+def test_no_other_test_process_gets_the_domain_of_this_one() -> None:
+    """Not even one that runs at the same time, as those of pytest-xdist do."""
+    code = "import conftest; print(conftest._claim_domain())"
+    path = os.pathsep.join([str(ROOT), str(ROOT / "test")])
+    other = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=True
+    )
+    assert other.stdout.strip() != os.environ["ROS_DOMAIN_ID"]
     assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
     assert Path(os.environ["ROS_LOG_DIR"]).is_relative_to(tempfile.gettempdir())
 

@@ -269,5 +269,5 @@ def test_the_quick_start_is_two_commands() -> None:
     assert len(sections) == 1
     blocks = re.findall(r"^```sh\n(.*?)^```$", sections[0], re.MULTILINE | re.DOTALL)
     assert len(blocks) == 2
-    for block, last in zip(blocks, ("demo", "python -m pytest"), strict=True):
+    for block, last in zip(blocks, ("demo", "python -m pytest -n auto"), strict=True):
         assert re.fullmatch(rf"python3 -m venv \.venv && .* && \.venv/bin/{last}\n", block), "not one command line"
