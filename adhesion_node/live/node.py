@@ -18,7 +18,7 @@ from ..nodes.ros import qos
 from ..wire import topics
 from ..wire.codecs import Rejected
 from ..wire.results import Statuses
-from ..wire.topics import Frame, Role
+from ..wire.topics import Frame
 from .view import View
 
 PERIOD_S = 0.1
@@ -62,15 +62,15 @@ class Live(Node):
             topics.MU: partial(view.adhesion, "mu"),
             topics.MU_LOWER: partial(view.adhesion, "mu_lower"),
             topics.STATE: view.train,
-            topics.BRAKING_CURVE: lambda placed: view.curve("safe", placed.position_m, placed.curve),
-            topics.BRAKING_CURVE_NOMINAL: lambda placed: view.curve("nominal", placed.position_m, placed.curve),
+            topics.BRAKING_CURVE: partial(view.curve, "safe"),
+            topics.BRAKING_CURVE_NOMINAL: partial(view.curve, "nominal"),
             topics.DIAGNOSTICS: self._on_diagnostics,
             topics.ATP_STATUS: self._on_status,
         }
 
     def _receiver(self, topic: topics.Topic, take: Callable[[Any], None]) -> Callable[[Any], None]:
-        # Which frame the sensors are to have is a parameter of the estimator, which says so if it is another.
-        read = topic._replace(frame=Frame.ANY).read if topic.role is Role.SENSOR else topic.read
+        # Which frame places are to have is a parameter of the estimator, which says so if it is another.
+        read = topic._replace(frame=Frame.ANY).read
 
         def receive(message: Any) -> None:
             refusal = ""

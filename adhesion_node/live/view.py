@@ -10,8 +10,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.atp.received import TrainState
-from ..core.physics.braking import BrakingCurve
+from ..core.atp.received import StampedCurve, TrainState
 from ..core.physics.train import KMH
 from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, POSITION, SPEED, STATE, Topic
 
@@ -102,9 +101,9 @@ class View:
             self._parts["adhesion"] = dict(self._mu)
             self._append("history", "t", SPACING_S, {**train, "regime": regime.lower(), **self._mu})
 
-    def curve(self, name: str, start_m: float, braking: BrakingCurve) -> None:
-        """A braking curve, `safe` or `nominal`, that begins at a place."""
-        way = {"x": (start_m + braking.distance_m).round(1).tolist(), "y": (braking.speed_mps / KMH).round(2).tolist()}
+    def curve(self, name: str, placed: StampedCurve) -> None:
+        """A braking curve, `safe` or `nominal`."""
+        way = {"x": placed.places_m.round(1).tolist(), "y": (placed.curve.speed_mps / KMH).round(2).tolist()}
         self._parts["curves"] = {**self._parts["curves"], name: way}
 
     def supervised(self, values: Mapping[str, str], message: str) -> None:

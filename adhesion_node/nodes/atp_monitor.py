@@ -12,6 +12,7 @@ message: one on the ROS clock, and one on the machine's own for the case that th
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -23,7 +24,7 @@ from adhesion_node.core.atp.received import NS_PER_S, StampedCurve, TrainState, 
 from adhesion_node.core.atp.supervision import Decision, Level, Severity, decide, unsafe
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import Rejected
+from adhesion_node.wire.codecs import Line, Rejected
 from adhesion_node.wire.settings import ATP_SETTINGS, Telling, Watchdogs
 from adhesion_node.wire.topics import Topic
 
@@ -54,6 +55,7 @@ class AtpMonitor(Node):
         values = declare(self, PARAMETERS)
         watchdogs = make(Watchdogs, values)
         self._clock_timeout_s = watchdogs.clock_timeout_s
+        self._line = make(Line, values)
         self._config = make(SupervisionConfig, values)
         self._state: TrainState | Unavailable = Unavailable(_SILENCE)
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
@@ -76,7 +78,9 @@ class AtpMonitor(Node):
     def _on_curve(self, message: Any) -> None:
         self.heard[topics.BRAKING_CURVE] += 1
         try:
-            self._curve = topics.BRAKING_CURVE.read(message)
+            curve = topics.BRAKING_CURVE.read(message, self._line)
+            against = f"its places run against direction = {self._line.direction!r}; is it the estimator's, too?"
+            self._curve = curve if curve.sign > 0 else Unavailable(against)
         except Rejected as refusal:
             self._curve = Unavailable(f"refused: {refusal}")
         self._judge_pair()
@@ -84,7 +88,7 @@ class AtpMonitor(Node):
     def _on_state(self, message: Any) -> None:
         self.heard[topics.STATE] += 1
         try:
-            state = topics.STATE.read(message)
+            state = topics.STATE.read(message, self._line)
             self._course = self._course.after(state)
             complaint = self._course.complaint(self._config)
             self._state = Unavailable(complaint) if complaint else state
@@ -130,7 +134,7 @@ class AtpMonitor(Node):
         if stands_s > self._clock_timeout_s:
             decision = unsafe(f"the clock has stood still for {stands_s:.3g} s; is /clock published?")
         else:
-            decision = decide(self._config, now_ns, self._state, self._curve, self._level or Level.NORMAL)
+            decision = decide(self._along_run(), now_ns, self._state, self._curve, self._level or Level.NORMAL)
         changed = decision.level is not self._level
         self._decision, self._judged = decision, True
         status = self._diagnostics.status(*self._told())
@@ -139,6 +143,9 @@ class AtpMonitor(Node):
         if changed:
             _log(self, decision)
             self._diagnostics.tell()
+
+    def _along_run(self) -> SupervisionConfig:
+        return replace(self._config, target_position_m=self._line.sign * self._config.target_position_m)
 
     @property
     def _level(self) -> Level | None:

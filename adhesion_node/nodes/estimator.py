@@ -15,7 +15,7 @@ from adhesion_node.core import Config, Estimate, Outcome, Regime
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.bank.learnt import learnt
 from adhesion_node.core.estimator import warm_up
-from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.run.pipeline import BACKWARDS, Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import SETTINGS, setup_of
 
@@ -60,6 +60,8 @@ def _findings(pipeline: Pipeline) -> list[Finding]:
     if pipeline.last is None:
         return [Finding(Severity.WARN, "no estimate yet")]
     found = [Finding(Severity.OK, pipeline.last.regime.value)]
+    if pipeline.runs_back:
+        found.append(Finding(Severity.ERROR, BACKWARDS))
     newest = pipeline.state.newest
     if newest is not None and newest.brake_pressure_pa is None:
         if pipeline.state.memory is None:

@@ -46,7 +46,7 @@ class Curve(NamedTuple):
 
     def distance_to(self, target_mps: float) -> float:
         """Distance, m, from the start of the curve to where the train has the target speed; 0 where it is slower."""
-        return float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0])
+        return abs(float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0]))
 
 
 class Band(NamedTuple):
@@ -115,11 +115,11 @@ def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
     run = read_inputs(reader, {}, line)._replace(
         mu=stamped if stamped.t_ns.size else read_unstamped(reader, topics.MU, (topics.STATE,)),
         mu_lower=read_unstamped(reader, topics.MU_LOWER, (topics.STATE, topics.DECELERATION)),
-        position=read_series(reader, topics.STATE, attrgetter("position_m")),
+        position=read_series(reader, topics.STATE, attrgetter("position_m"), line),
         speed=read_series(reader, topics.STATE, attrgetter("speed_mps")),
         regime=read_status(reader, topics.DIAGNOSTICS, "regime"),
-        safe=_read_curves(reader, topics.BRAKING_CURVE),
-        nominal=_read_curves(reader, topics.BRAKING_CURVE_NOMINAL),
+        safe=_read_curves(reader, topics.BRAKING_CURVE, line),
+        nominal=_read_curves(reader, topics.BRAKING_CURVE_NOMINAL, line),
         remarks=read_remarks(reader, topics.DIAGNOSTICS, "regime"),
         levels=read_status(reader, topics.ATP_STATUS, "level"),
         counts=read_last_status(reader, topics.DIAGNOSTICS, "regime"),
@@ -178,6 +178,6 @@ def distance_to_target(
     )
 
 
-def _read_curves(reader: BagReader, topic: Topic) -> tuple[Curve, ...]:
-    placed = (sample.read for sample in read_topic(reader, topic) if sample.read is not None)
-    return tuple(Curve(one.t_ns, one.position_m + one.curve.distance_m, one.curve.speed_mps) for one in placed)
+def _read_curves(reader: BagReader, topic: Topic, line: Line) -> tuple[Curve, ...]:
+    placed = (sample.read for sample in read_topic(reader, topic, line) if sample.read is not None)
+    return tuple(Curve(one.t_ns, one.places_m, one.curve.speed_mps) for one in placed)

@@ -3,6 +3,7 @@
 """`replay --offline`: a recording straight through the estimator, without ROS."""
 
 import argparse
+import sys
 import time
 from array import array
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -18,7 +19,7 @@ from ..wire.codecs import NOMINAL, Line, Rejected
 from ..wire.settings import SEED, SETTINGS, given, setup_of
 from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE, Topic
 from .engine import EstimatorPipeline
-from .pipeline import Pipeline
+from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
 from .results import row_of, rows_to
 from .score import Identified, Point, Truth, mean_relative_error_percent
@@ -45,12 +46,15 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     with rows_to(options.out) as write:
         # nothing is kept of an estimate but what is compared with the truth: a day takes no more memory than an hour
         for made in predictions(pipeline, truth, recorded, setup.line, window_ms):
-            write(row_of(pipeline, made))
+            write(row_of(pipeline, made, setup.line.sign))
             if truth is not None:
                 compared.append(Point(made.estimate.t_ns, made.estimate.mu))
     result = summary(pipeline, window_ms, truth, compared)
     if options.out:
         result["out"] = options.out
+    if pipeline.back_m > BACK_M:
+        result["back_m"] = pipeline.back_m
+        print(f"replay: {BACKWARDS}", file=sys.stderr)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return FAILED if pipeline.last is None else DONE
 

@@ -11,6 +11,14 @@ from ..core.physics.braking import BrakingCurve
 from ..wire.topics import POSITIONS
 from .engine import EstimatorPipeline, Verbs
 
+BACK_MPS, BACK_M = 3.0, 10.0
+"""A train that runs back faster and further than this does not roll back: its positions fall along the run."""
+
+BACKWARDS = (
+    "positions fall while the train runs: set direction to what the chainage does along the run, up where it rises, "
+    "down where it falls; or change their sign"
+)
+
 
 @final
 class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
@@ -26,10 +34,30 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         super().__init__(Verbs(partial(estimator.init, config, seed), *(partial(verb, config) for verb in verbs)))
         self.config = config
         self.windows = 0
+        self._back_from_m: float | None = None
+        """Where it began to run back."""
+        self.back_m = 0.0
+        """How far it has run back at most, without a break, faster than `BACK_MPS`."""
 
     def _output(self, estimate: Estimate) -> Prediction:
         self.windows += estimate.window > 0
+        self._note_way(estimate)
         return predict(self.config, estimate)
+
+    @property
+    def runs_back(self) -> bool:
+        """Whether the train, by its positions, runs back at speed."""
+        return self.last is not None and self._back_m(self.last) > BACK_M
+
+    def _note_way(self, estimate: Estimate) -> None:
+        if estimate.speed_mps > -BACK_MPS:
+            self._back_from_m = None
+        else:
+            self._back_from_m = max(estimate.position_m, self._back_from_m or estimate.position_m)
+        self.back_m = max(self.back_m, self._back_m(estimate))
+
+    def _back_m(self, estimate: Estimate) -> float:
+        return 0.0 if self._back_from_m is None else self._back_from_m - estimate.position_m
 
     @property
     def ticks(self) -> int:

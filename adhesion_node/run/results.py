@@ -39,12 +39,15 @@ CHUNK = 4096
 Write = Callable[[Row], object]
 
 
-def row_of(pipeline: Pipeline, made: Prediction) -> Row:
-    """A row of `COLUMNS` for what the pipeline has just given; None for what is not known or withheld."""
+def row_of(pipeline: Pipeline, made: Prediction, sign: int = 1) -> Row:
+    """A row of `COLUMNS` for what the pipeline has just given; None for what is not known or withheld.
+
+    `sign` is -1 where the chainage, which the row has, falls along the run.
+    """
     e, memory = made.estimate, pipeline.state.memory
     mu = (None,) * 3 if e.withheld else (e.mu, e.mu_std, e.mu_lower)
     told = (
-        *(e.t_ns, e.position_m, e.position_std_m, e.speed_mps, e.speed_std_mps, *mu, e.regime.name),
+        *(e.t_ns, sign * e.position_m, e.position_std_m, e.speed_mps, e.speed_std_mps, *mu, e.regime.name),
         *(_length_m(made.safe), _length_m(made.nominal), e.window),
     )
     taught = {} if memory is None else learnt(memory)

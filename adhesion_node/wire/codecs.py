@@ -31,10 +31,13 @@ if TYPE_CHECKING:  # it needs a geodesy library, and that only where there is a 
 NS = 1_000_000_000
 
 FRAME = "track"
-"""Frame of every stamped message: x runs along the track."""
+"""Frame of places: x is the chainage of the track."""
 
 TRAIN = "train"
 """Moving frame of the state and joint of the braking curve."""
+
+UP, DOWN = "up", "down"
+"""The chainage rises along the run, or falls."""
 
 ATMOSPHERE_PA = 101_325.0
 """Standard atmosphere at sea level."""
@@ -54,9 +57,9 @@ MAX_FORCE_N = 1e7
 
 @dataclass(frozen=True, slots=True)
 class Line:
-    """What a reader knows of the line beyond the message. Raises ValueError naming what is out of range."""
+    """What a reader or writer knows of the line beyond the message. Raises ValueError naming what is out of range."""
 
-    frame: str = setting(FRAME, "frame_id that sensor messages must have", group="intake")
+    frame: str = setting(FRAME, "frame_id that positions must have and that results get", group="intake")
     ambient_pressure_pa: float = setting(
         ATMOSPHERE_PA,
         "Pressure of the air, by which an absolute brake pressure is above the gauge one; some 54 kPa at 5000 m",
@@ -82,6 +85,10 @@ class Line:
     max_cross_track_m: float = setting(
         25.0, "Distance from track_line beyond which a fix is refused", "m", 0.1, 1e4, group="intake"
     )
+    child_frame: str = setting(TRAIN, "Frame of the train in results: child_frame_id, x forward", group="intake")
+    direction: str = setting(
+        UP, "Whether the chainage rises along the run (up) or falls (down)", choices=(UP, DOWN), group="intake"
+    )
     track: "TrackLine | None" = None
     """The track's centre line, on which a `fix` is projected."""
 
@@ -89,6 +96,11 @@ class Line:
         check_settings(self, "")
         if self.position_source == "fix" and self.track is None:
             raise ValueError("position_source = 'fix': set track_line, too, on which a fix is projected")
+
+    @property
+    def sign(self) -> int:
+        """What a chainage is multiplied by so that it grows along the run, and the other way round."""
+        return -1 if self.direction == DOWN else 1
 
 
 NOMINAL = Line()
@@ -125,7 +137,7 @@ def plain(type_name: str, /, **fields: Any) -> SimpleNamespace:
 class Reason(Enum):
     """Why a message was refused; the value is the remedy."""
 
-    WRONG_FRAME = f"set header.frame_id to '{FRAME}', or the reader's parameter frame to what it is"
+    WRONG_FRAME = "set header.frame_id, or the reader's parameter frame, so that both agree"
     NOT_FINITE = "give a finite number, or publish nothing while there is none"
     BAD_VARIANCE = (
         f"give covariance[0] in SI units squared, {MIN_VARIANCE_M2:g} to {MAX_VARIANCE_M2:g}, or 0 where unknown"
@@ -244,9 +256,10 @@ def variance_of(covariance: Sequence[float]) -> float | None:
     return variance if MIN_VARIANCE_M2 <= variance <= MAX_VARIANCE_M2 else None
 
 
-def place_of(message: Any) -> float:
-    """Return the place on the track, m, of a message with a `pose`; raises Rejected."""
-    return plausible("position x", message.pose.pose.position.x, Reason.IMPLAUSIBLE_POSITION, MAX_POSITION_M)
+def place_of(message: Any, line: Line) -> float:
+    """Return the place along the run, m, of a message with a `pose`; raises Rejected."""
+    place = plausible("position x", message.pose.pose.position.x, Reason.IMPLAUSIBLE_POSITION, MAX_POSITION_M)
+    return line.sign * place
 
 
 def speed_of(message: Any) -> float:

@@ -23,8 +23,11 @@ STEP_TOLERANCE, ROUNDING_M2_PER_S2 = 0.05, 1e-6
 and of v^2 what rounding makes of it."""
 
 
-def read_curve(message: Any, _line: Line) -> StampedCurve:
-    """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected."""
+def read_curve(message: Any, line: Line) -> StampedCurve:
+    """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected.
+
+    Where its places fall, so do its velocities from 0 on, and its accelerations are positive.
+    """
     points = message.points
     if list(message.joint_names) != [TRAIN] or len(points) < 2:
         raise Rejected(Reason.BAD_CURVE, f"braking curve joints = {list(message.joint_names)}, points = {len(points)}")
@@ -35,10 +38,11 @@ def read_curve(message: Any, _line: Line) -> StampedCurve:
     if not usable.all():
         index = int(np.argmin(usable))
         raise Rejected(Reason.NOT_FINITE, f"braking curve point {index} = {rows[index].tolist()}")
-    place, velocity, acceleration, time = np.ascontiguousarray(rows.T)
+    sign = -1 if rows[-1, 0] < rows[0, 0] else 1
+    place, velocity, acceleration, time = np.ascontiguousarray(rows.T) * [[sign], [sign], [sign], [1]]
     curve = BrakingCurve(place - place[0], velocity, -acceleration, time)
     _check_course(curve)
-    return StampedCurve(stamp_ns(message.header), float(place[0]), curve)
+    return StampedCurve(stamp_ns(message.header), float(line.sign * rows[0, 0]), curve, line.sign * sign)
 
 
 def write_curve(new: New, t_ns: int, position_m: float, curve: BrakingCurve) -> Fields:

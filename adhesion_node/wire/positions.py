@@ -18,13 +18,13 @@ UNKNOWN, DIAGONAL_KNOWN = 0, 2
 
 
 def read_position(message: Any, line: Line) -> PositionSample:
-    """Read a position along the track, m and m^2, from a message with a `pose`; raises Rejected."""
-    place = codecs.place_of(message)
+    """Read a position along the run, m and m^2, from a message with a `pose`; raises Rejected."""
+    place = codecs.place_of(message, line)
     return PositionSample(stamp_ns(message.header), place, _variance(message.pose.covariance[0], line))
 
 
 def read_fix(message: Any, line: Line) -> PositionSample:
-    """Read a position along the track, m and m^2, from a NavSatFix; raises Rejected.
+    """Read a position along the run, m and m^2, from a NavSatFix; raises Rejected.
 
     Of its covariance, east-north-up, that along the track counts.
     """
@@ -39,7 +39,7 @@ def read_fix(message: Any, line: Line) -> PositionSample:
     widest = max(_variance(spread, line) for spread in (east, north))
     place = line.track.place(latitude, longitude, widest**0.5, line.max_cross_track_m)
     along = place.east**2 * east + place.east * place.north * (mixed + mixed_too) + place.north**2 * north
-    return PositionSample(stamp_ns(message.header), place.along_m, _variance(along, line))
+    return PositionSample(stamp_ns(message.header), line.sign * place.along_m, _variance(along, line))
 
 
 def _variance(given: float, line: Line) -> float:

@@ -72,12 +72,12 @@ def write_deceleration(new: New, prediction: Prediction) -> Fields | None:
     return {"header": header(new, estimate.t_ns), "accel": accel}
 
 
-def read_state(message: Any, _line: Line, least: float = 0.0) -> TrainState:
-    """Read the train's state, m and m/s, with its standard deviations, from an Odometry; raises Rejected.
+def read_state(message: Any, line: Line, least: float = 0.0) -> TrainState:
+    """Read the train's state along the run, m and m/s, with standard deviations, from an Odometry; raises Rejected.
 
     No variance may be below `least`.
     """
-    place, speed = codecs.place_of(message), codecs.speed_of(message)
+    place, speed = codecs.place_of(message, line), codecs.speed_of(message)
     deviations = []
     for what, part in (("position", message.pose), ("speed", message.twist)):
         variance = finite(f"{what} covariance[0]", part.covariance[0])

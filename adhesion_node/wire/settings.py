@@ -49,7 +49,7 @@ TRACK_START = Setting(
 SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
 
 OF_LINE = settings_of(Line)
-FRAME_ID, AMBIENT, *_ = OF_LINE
+FRAME_ID, AMBIENT, DIRECTION = (one for one in OF_LINE if one.name in ("frame", "ambient_pressure_pa", "direction"))
 
 _TOLD = "diagnostics"
 _SILENCE = "Silence of the sensor after which /diagnostics says STALE"
@@ -92,7 +92,6 @@ SETTINGS = (
 """All settings of the estimator."""
 
 CREEP_SETTINGS = (
-    FRAME_ID,
     SENSOR_TIMEOUT,
     *_OF_TELLING,
     *settings_of(Vehicle, group="vehicle"),
@@ -100,7 +99,11 @@ CREEP_SETTINGS = (
 )
 """All settings of the creep estimator."""
 
-ATP_SETTINGS = (*settings_of(SupervisionConfig, group="supervision"), *settings_of(Watchdogs), *_OF_TELLING)
+ATP_SETTINGS = (
+    *settings_of(SupervisionConfig, group="supervision"),
+    *settings_of(Watchdogs),
+    *(FRAME_ID, DIRECTION, *_OF_TELLING),
+)
 """All settings of the ATP monitor."""
 
 OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
@@ -149,8 +152,9 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     profile, line = parse_track(str(track), train.length_m), _track_line(values)
     if line is not None:
         profile = _with_grades(profile, line.grades(train.length_m))
-    config = make(Config, values, train=train, track=profile)
-    return Setup(config, int(seed), make(Line, values, track=line), float(timeout_s), make(Telling, values))
+    of_line = make(Line, values, track=line)
+    config = make(Config, values, train=train, track=profile.turned() if of_line.sign < 0 else profile)
+    return Setup(config, int(seed), of_line, float(timeout_s), make(Telling, values))
 
 
 def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":

@@ -9,7 +9,7 @@ from enum import Enum
 from typing import Any, NamedTuple
 
 from . import curves, positions, results, sensors
-from .codecs import FRAME, NOMINAL, Codec, Line, New, Reason, Rejected
+from .codecs import NOMINAL, Codec, Line, New, Reason, Rejected
 
 
 class Role(Enum):
@@ -35,9 +35,8 @@ class Quality(Enum):
 class Frame(Enum):
     """Which frame_id a reader insists on."""
 
-    ANY = "none"
-    TRACK = f"'{FRAME}'"
-    LINE = "that of the parameter `frame`"
+    ANY = "none: it says how the train moves, or what it feels"
+    LINE = "that of the parameter `frame`: it says where"
 
 
 class Topic(NamedTuple):
@@ -59,9 +58,8 @@ class Topic(NamedTuple):
 
     def read(self, message: Any, line: Line = NOMINAL) -> Any:
         """Read and check a message; raises Rejected with reason and remedy."""
-        wanted = {Frame.LINE: line.frame, Frame.TRACK: FRAME}.get(self.frame)
-        if wanted is not None and message.header.frame_id != wanted:
-            raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}")
+        if self.frame is Frame.LINE and message.header.frame_id != line.frame:
+            raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}, frame = {line.frame!r}")
         return self._codec.read(message, line)
 
     def build(self, new: New, *values: Any) -> Any:
@@ -75,12 +73,12 @@ class Topic(NamedTuple):
         return self.codec
 
 
-def _sensor(name: str, type_name: str, codec: Codec, meaning: str, frame: Frame = Frame.LINE) -> Topic:
+def _sensor(name: str, type_name: str, codec: Codec, meaning: str, frame: Frame = Frame.ANY) -> Topic:
     return Topic(name, type_name, Role.SENSOR, Quality.SENSOR, frame, codec, meaning)
 
 
 def _result(name: str, type_name: str, codec: Codec, meaning: str, quality: Quality = Quality.RESULT) -> Topic:
-    return Topic(name, type_name, Role.ADHESION, quality, Frame.TRACK, codec, meaning)
+    return Topic(name, type_name, Role.ADHESION, quality, Frame.LINE, codec, meaning)
 
 
 def _number(name: str, role: Role, codec: Codec, meaning: str) -> Topic:
@@ -102,6 +100,7 @@ POSITION = _sensor(
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     positions.POSITION,
     "**in**: measured position along the track, pose.position.x m, covariance[0] m²; 0 is unknown: `position_std_m`",
+    Frame.LINE,
 )
 FIX = _sensor(
     "fix",
@@ -109,13 +108,13 @@ FIX = _sensor(
     positions.FIX,
     "**in**, instead of `position`, with `track_line`: latitude and longitude, projected on that line; the covariance "
     "along it, `position_std_m` where it is 0 or of type unknown",
-    Frame.ANY,
 )
 ODOMETRY = _sensor(
     "odometry",
     "nav_msgs/msg/Odometry",
     positions.ODOMETRY,
     "**in**, instead of `position`: the same by pose.pose.position.x and its covariance[0]; the twist is not used",
+    Frame.LINE,
 )
 BRAKE_PRESSURE = _sensor(
     "brake_pressure",
@@ -161,7 +160,7 @@ TRUTH_STATE = Topic(
     "nav_msgs/msg/Odometry",
     Role.TRUTH,
     Quality.SENSOR,
-    Frame.TRACK,
+    Frame.LINE,
     results.STATE,
     "simulators only: position and speed as they are",
 )

@@ -175,7 +175,7 @@ def test_a_paused_clock_is_one_reset_and_estimates_come_again(make_line: MakeLin
 @pytest.mark.parametrize(
     ("fault", "remedy"),
     [
-        ("wrong_frame", "header.frame_id = 'map': set header.frame_id to 'track'"),
+        ("wrong_frame", "header.frame_id = 'map', frame = 'track': set header.frame_id"),
         ("kmh", "speed is in m/s, not km/h"),
     ],
 )
@@ -202,7 +202,7 @@ def test_an_empty_frame_is_flagged(make_line: MakeLine) -> None:
     message.header.frame_id = ""
     line.send(topics.POSITION, message)
     line.hear_all()
-    assert "header.frame_id = '': set header.frame_id to 'track'" in last(line).message
+    assert "header.frame_id = '', frame = 'track': set header.frame_id" in last(line).message
 
 
 def test_a_stuck_position_is_an_error_and_nothing_is_said_of_mu(make_line: MakeLine) -> None:

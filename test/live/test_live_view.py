@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from adhesion_node.core.atp.received import TrainState
+from adhesion_node.core.atp.received import StampedCurve, TrainState
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.live.view import EXPECTED, LATE_S, MOST_POINTS, View
 from adhesion_node.web import as_json
@@ -82,7 +82,7 @@ def test_without_a_safe_distance_there_are_no_limits() -> None:
 def test_a_curve_begins_where_the_train_is() -> None:
     view = View()
     columns = (np.array(column) for column in ([0.0, 100.0], [50.0, 0.0], [1.0, 1.0], [0.0, 9.0]))
-    view.curve("safe", 1000.0, BrakingCurve(*columns))
+    view.curve("safe", StampedCurve(0, 1000.0, BrakingCurve(*columns)))
     assert view.parts(0.0)["curves"] == {"safe": {"x": [1000.0, 1100.0], "y": [180.0, 0.0]}}
 
 

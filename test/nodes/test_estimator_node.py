@@ -167,7 +167,7 @@ def test_every_result_says_the_same_of_one_instant(line: Line) -> None:
     _, safe, nominal = predict(line.estimator.config, estimate)
     for topic, expected in ((topics.BRAKING_CURVE, safe), (topics.BRAKING_CURVE_NOMINAL, nominal)):
         message = last[topic]
-        t_ns, _, read = topics.BRAKING_CURVE.read(message)
+        t_ns, _, read, _ = topics.BRAKING_CURVE.read(message)
         assert expected is not None
         assert t_ns == estimate.t_ns
         assert message.points[0].positions[0] == pytest.approx(estimate.position_m)
@@ -221,7 +221,7 @@ def test_the_first_refusal_is_said_with_its_remedy(line: Line) -> None:
     heard: list[DiagnosticArray] = line.heard[topics.DIAGNOSTICS]
     (status,) = heard[-1].status
     assert status.level == DiagnosticStatus.WARN
-    assert "header.frame_id = 'map': set header.frame_id to 'track'" in status.message
+    assert "header.frame_id = 'map', frame = 'track': set header.frame_id" in status.message
 
 
 def test_what_the_journey_teaches_is_told_with_its_standard_deviation(line: Line) -> None:

@@ -43,6 +43,12 @@ class Train(NamedTuple):
     estimator: Estimator
     monitor: AtpMonitor
     driver: Node
+    frame: str = "track"
+
+    @property
+    def values(self) -> dict[str, str]:
+        """The numbers behind what the monitor said last."""
+        return self.monitor._told()[1]
 
     def run(self, measured_m: Callable[[float], float], duration_s: float) -> list[Told]:
         """Publish ten positions a second, of `measured_m` over time."""
@@ -61,7 +67,9 @@ class Train(NamedTuple):
                 clock.publish(messages.clock(now_ns))
                 self.executor.spin_once(timeout_sec=0.05)
             pressure.publish(messages.brake_pressure(now_ns, RELEASED_PA, 100.0))
-            position.publish(messages.position(now_ns, measured_m(step / 10), 0.5))
+            place = messages.position(now_ns, measured_m(step / 10), 0.5)
+            place.header.frame_id = self.frame
+            position.publish(place)
             self.spin_until(self.executor, partial(self.at_rest, step + 1, heard))
             told.append(Told(step / 10, self.monitor._level, heard[-1] if heard else ""))
         return told

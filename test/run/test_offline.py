@@ -343,6 +343,25 @@ def test_a_cut_bag_is_replayed_up_to_the_cut(tmp_path: Path, offline: Offline) -
     assert loss.startswith(f"replay: {file} breaks off at byte ")
 
 
+def test_a_falling_chainage_is_run_as_a_rising_one_or_told(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    def mirrored(topic: Topic, _index: int, cdr: bytes) -> bytes:
+        if topic is not POSITION:
+            return cdr
+        message = deserialize(cdr, topic.type)
+        message.pose.pose.position.x *= -1.0
+        return serialize(message, topic.type)
+
+    write_run(tmp_path / "down", samples(), edit=mirrored)
+    rows = tmp_path / "rows.csv"
+    down = offline(tmp_path / "down", "--set", "direction=down", "--out", str(rows))
+    assert down.result["digest"] == offline(bag).result["digest"]
+    assert "back_m" not in down.result
+    assert float(rows.read_text().splitlines()[-1].split(",")[1]) < -1000.0, "the chainage, as it was given"
+    unannounced = offline(tmp_path / "down")
+    assert unannounced.result["back_m"] > 500.0
+    assert any("set direction to what the chainage does along the run" in line for line in unannounced.err)
+
+
 def test_a_wrong_frame_is_counted_or_accepted_by_name(tmp_path: Path, bag: Path, offline: Offline) -> None:
     write_run(tmp_path / "map", samples(), edit=lambda topic, _, cdr: in_map(topic, cdr))
     code, result, *_ = offline(tmp_path / "map", "--set", "frame=map")
@@ -350,7 +369,7 @@ def test_a_wrong_frame_is_counted_or_accepted_by_name(tmp_path: Path, bag: Path,
     assert result["digest"] == offline(bag).result["digest"]
     code, result, *_ = offline(tmp_path / "map")
     assert code == 1
-    assert result["dropped"] == {"WRONG_FRAME": 2 * 180}  # positions and pressures
+    assert result["dropped"] == {"WRONG_FRAME": 180}
     assert (result["measurements"], result["accepted"]) == (180, 0)
 
 

@@ -72,6 +72,8 @@ def other(value: Value) -> Value:
         "wet": "snow",
         "bank": "particle_em",
         "track": "map",
+        "train": "train1",
+        "up": "down",
         "auto": "position",
         "": "tunnel 0 1000",
     }

@@ -104,5 +104,5 @@ def test_how_far_beside_the_line_a_fix_may_lie_is_a_setting() -> None:
 def test_odometry_is_read_as_a_position() -> None:
     assert ODOMETRY.read(ODOMETRY.build(plain, T_NS, (1234.5,), 0.25)) == (T_NS, 1234.5, 0.25)
     assert ODOMETRY.read(ODOMETRY.build(plain, T_NS, (1234.5,), 0.0)).variance_m2 == 9.0
-    with pytest.raises(Rejected, match=r"header\.frame_id = 'odom': set header\.frame_id to 'track'"):
+    with pytest.raises(Rejected, match=r"header\.frame_id = 'odom', frame = 'track': set"):
         ODOMETRY.read(ODOMETRY.build(plain, T_NS, (0.0,), 1.0, "odom"))

@@ -17,7 +17,7 @@ from adhesion_node.core.setting import Setting, settings_of
 from adhesion_node.wire.codecs import Line
 from adhesion_node.wire.settings import OF_LINE, SETTINGS, Setup, Telling, parse_setting, setup_of
 
-FREE_TEXTS = {"track", "frame", "track_line", "hardware_id"}
+FREE_TEXTS = {"track", "frame", "track_line", "hardware_id", "child_frame"}
 """The settings that are neither a number nor one of a few words."""
 
 NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]
@@ -36,7 +36,7 @@ def another(setting: Setting) -> Any:
         return default - 1 if default > setting.low else default + 1
     if isinstance(default, float):
         return math.nextafter(default, setting.high)
-    free = {"track": "tunnel 0 1000", "frame": "map", "hardware_id": "194 101"}
+    free = {"track": "tunnel 0 1000", "frame": "map", "hardware_id": "194 101", "child_frame": "train1"}
     return free.get(setting.name) or next(choice for choice in setting.choices if choice != default)
 
 

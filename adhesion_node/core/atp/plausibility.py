@@ -51,8 +51,8 @@ class Course(NamedTuple):
         unsure_m = config.margin_sigma * (self.states[foremost].position_std_m + last.position_std_m)
         if back_m > config.roll_back_tolerance_m + unsure_m:
             return (
-                f"the train runs back, by {back_m:.3g} m so far: positions must grow in the direction of travel, "
-                "change their sign where they fall"
+                f"the train runs back, by {back_m:.3g} m so far: positions must grow in the direction of travel: "
+                "set direction to down where the chainage falls along the run, here and in the estimator"
             )
         apart_m = abs(_gradual([_apart(*two) for two in pairwise(self.states)]))
         span_s = (last.t_ns - first.t_ns) / NS_PER_S
@@ -61,7 +61,7 @@ class Course(NamedTuple):
         if apart_m > unsure_m + unsure_mps * span_s:
             return (
                 f"its places and its speeds differ by {apart_m:.3g} m within {span_s:.3g} s: is the position sensor "
-                "right, in m, growing in the direction of travel?"
+                "right, in m, growing in the direction of travel, is direction that of the estimator?"
             )
         return ""
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..physics.braking import BrakingCurve
+from ..physics.train import Array
 from .config import SupervisionConfig
 
 NS_PER_S = 1e9
@@ -44,6 +45,13 @@ class StampedCurve(NamedTuple):
     t_ns: int
     position_m: float
     curve: BrakingCurve
+    sign: int = 1
+    """-1 where the places fall along the curve."""
+
+    @property
+    def places_m(self) -> Array:
+        """Where the train will be, m; shape as the curve's."""
+        return self.position_m + self.sign * self.curve.distance_m
 
     def age_s(self, now_ns: int) -> float:
         """Time since its stamp."""

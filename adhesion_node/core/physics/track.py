@@ -6,7 +6,7 @@ All resistances are per weight (N/N), so that they do not depend on the train's 
 """
 
 import math
-from dataclasses import astuple, dataclass, field
+from dataclasses import astuple, dataclass, field, replace
 from numbers import Real
 
 import numpy as np
@@ -131,9 +131,23 @@ class Track:
         """Where the resistance changes, m, and its values before, between and behind, N/N."""
         return self._breaks, self._levels
 
+    def turned(self) -> "Track":
+        """The same track run the other way: positions change their sign, climbs fall."""
+        return Track(tuple(_turned(section) for section in self.sections), self.train_length_m)
+
     def least_resistance(self, from_m: float) -> float:
         """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""
         return float(self._levels[np.searchsorted(self._breaks, from_m, side="right") :].min())
+
+
+def _turned(section: Section) -> Section:
+    """The section run the other way.
+
+    >>> _turned(Grade(0.0, 2000.0, 10.0))
+    Grade(start_m=-2000.0, end_m=-0.0, rise_m=-10.0)
+    """
+    turned = replace(section, start_m=-section.end_m, end_m=-section.start_m)
+    return replace(turned, rise_m=-turned.rise_m) if isinstance(turned, Grade) else turned
 
 
 def parse_track(text: str, train_length_m: float) -> Track:

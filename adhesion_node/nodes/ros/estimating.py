@@ -19,6 +19,7 @@ from adhesion_node.run.engine import EstimatorPipeline
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import NS, Line, Rejected
+from adhesion_node.wire.frames import placed
 from adhesion_node.wire.settings import Telling
 from adhesion_node.wire.topics import Topic
 
@@ -167,6 +168,6 @@ class EstimatingNode(Node, Generic[P]):
             for topic in self._kind.results:
                 message = topic.build(new, output)
                 if message is not None:
-                    self._outputs[topic].publish(message)
+                    self._outputs[topic].publish(placed(message, self._reader.line))
                     self.published[topic] += 1
             self.report()
