@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat, QosDurability
+from rosbags.interfaces import Connection, ConnectionExtRosbag2, MessageDefinitionFormat, Qos
 from rosbags.rosbag2 import Reader
 
 from .mcap_file import TopicInfo
@@ -58,9 +58,10 @@ class ForeignRecording:
 
 
 def _info(connection: Connection) -> TopicInfo:
-    encoding, latched = "cdr", False
+    encoding = "cdr"
+    offered: tuple[Qos, ...] = ()
     if isinstance(connection.ext, ConnectionExtRosbag2):
         encoding = connection.ext.serialization_format
-        latched = any(qos.durability is QosDurability.TRANSIENT_LOCAL for qos in connection.ext.offered_qos_profiles)
+        offered = tuple(connection.ext.offered_qos_profiles)
     known_as = Definition(_ENCODINGS.get(connection.msgdef.format, ""), connection.msgdef.data)
-    return TopicInfo(connection.topic, connection.msgtype, encoding, known_as, latched)
+    return TopicInfo(connection.topic, connection.msgtype, encoding, known_as, offered)

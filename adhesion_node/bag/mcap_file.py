@@ -20,10 +20,12 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, McapRecord, Message, Schema
 from mcap.stream_reader import breakup_chunk
 from mcap.writer import MCAP0_MAGIC
+from rosbags.interfaces import Qos
 from zstandard import ZstdError
 
 from .metadata import LATEST_NS
-from .types import Definition, is_latched
+from .qos import parse
+from .types import Definition
 
 _HEAD = Struct("<BQ")
 
@@ -47,7 +49,7 @@ class TopicInfo(NamedTuple):
     type: str
     encoding: str
     definition: Definition
-    latched: bool
+    offered: tuple[Qos, ...] = ()
 
 
 class McapFile:
@@ -123,8 +125,8 @@ class McapFile:
             elif isinstance(record, Channel):
                 schema = self._schemas.get(record.schema_id) or Schema(id=0, data=b"", encoding="", name="")
                 known_as = Definition(schema.encoding, schema.data.decode())
-                latched = is_latched(record.metadata.get("offered_qos_profiles", ""))
-                info = TopicInfo(record.topic, schema.name, record.message_encoding, known_as, latched)
+                offered = parse(record.metadata.get("offered_qos_profiles", ""))
+                info = TopicInfo(record.topic, schema.name, record.message_encoding, known_as, offered)
                 self.topics.setdefault(record.id, info)
 
 

@@ -8,6 +8,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import yaml
+from rosbags.interfaces import Qos
+
+from .qos import profiles
 
 VERSION = 9
 
@@ -16,9 +19,6 @@ LATEST_NS = 2**63 - 1
 
 _ROOT = "rosbag2_bagfile_information"
 
-FOREVER = {"sec": 9223372036, "nsec": 854775807}
-"""How rosbag2 writes a duration that is not limited."""
-
 
 class Topic(NamedTuple):
     """What the metadata says of a topic."""
@@ -26,7 +26,7 @@ class Topic(NamedTuple):
     name: str
     type: str
     type_hash: str
-    latched: bool
+    offered: tuple[Qos, ...]
 
 
 class File(NamedTuple):
@@ -64,23 +64,6 @@ def read_metadata(bag: Path) -> Metadata:
         return Metadata()
 
 
-def qos_profiles(latched: bool) -> list[dict[str, Any]]:
-    """Return the QoS that a player offers: reliable; with `latched` also transient local with depth 1."""
-    return [
-        {
-            "history": "keep_last",
-            "depth": 1 if latched else 100,
-            "reliability": "reliable",
-            "durability": "transient_local" if latched else "volatile",
-            "deadline": dict(FOREVER),
-            "lifespan": dict(FOREVER),
-            "liveliness": "automatic",
-            "liveliness_lease_duration": dict(FOREVER),
-            "avoid_ros_namespace_conventions": False,
-        }
-    ]
-
-
 def document(files: Sequence[File], topics: Sequence[tuple[Topic, int]]) -> str:
     """Return the text of metadata.yaml; each topic comes with its number of messages."""
     filled = [file for file in files if file.messages]
@@ -115,7 +98,7 @@ def _topic(topic: Topic, messages: int) -> dict[str, Any]:
             "name": topic.name,
             "type": topic.type,
             "serialization_format": "cdr",
-            "offered_qos_profiles": qos_profiles(topic.latched),
+            "offered_qos_profiles": profiles(topic.offered),
             "type_description_hash": topic.type_hash,
         },
         "message_count": messages,

@@ -14,7 +14,8 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
-from .metadata import File, Topic, qos_profiles
+from .metadata import File, Topic
+from .qos import profiles
 from .types import Definition
 
 CHUNK_BYTES = 64 * 1024
@@ -65,7 +66,7 @@ class Part:
         if topic.name in self._channels:
             return
         # JSON is YAML as well, and rosbag2 wants YAML here.
-        qos = {"offered_qos_profiles": json.dumps(qos_profiles(topic.latched)), "topic_type_hash": topic.type_hash}
+        qos = {"offered_qos_profiles": json.dumps(profiles(topic.offered)), "topic_type_hash": topic.type_hash}
         size = 256 + len(definition.text.encode()) + len(str(qos)) + 4 * len(topic.name + topic.type)
         self._set_aside(2 * size)
         self._chunk_bytes += size

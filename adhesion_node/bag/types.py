@@ -2,7 +2,6 @@
 
 """Message classes, CDR and message definitions of ROS 2 Jazzy, without an installed ROS."""
 
-import re
 import struct
 from functools import cache
 from typing import Any, NamedTuple
@@ -96,15 +95,6 @@ def same_name(one: str, other: str) -> bool:
     (True, False)
     """
     return one.lstrip("/") == other.lstrip("/")
-
-
-def is_latched(offered_qos_profiles: str) -> bool:
-    """Tell whether a QoS list as written in bags (names since version 9, numbers before) is transient local.
-
-    >>> is_latched("- durability: 1"), is_latched('[{"durability": "transient_local"}]'), is_latched("")
-    (True, True, False)
-    """
-    return re.search(r'durability"?:\s*"?(1|transient_local)\b', offered_qos_profiles) is not None
 
 
 def _require(type_name: str) -> None:

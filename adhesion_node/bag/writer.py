@@ -6,11 +6,15 @@ import errno
 import math
 import shutil
 from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple, Self
 
+from rosbags.interfaces import Qos
+
 from .metadata import LATEST_NS, File, Topic, document
 from .part import Part, message_bound
+from .qos import RELIABLE
 from .types import Definition, definition, type_hash
 
 MB = 1_000_000
@@ -56,16 +60,17 @@ class BagWriter:
             raise
 
     def add_topic(
-        self, name: str, type_name: str, *, latched: bool = False, known_as: Definition | None = None
+        self, name: str, type_name: str, *, offered: Sequence[Qos] = (), known_as: Definition | None = None
     ) -> None:
         """Announce a topic; `write` does so itself where the defaults fit. Announcing again changes nothing.
 
-        `latched` topics are marked transient local. `known_as` defines a type that is not part of ROS 2 Jazzy.
+        `offered` is the quality of service of its publishers, as far as known. `known_as` defines a type that is not
+        part of ROS 2 Jazzy.
         Raises ValueError when the type is unknown.
         """
         if name not in self._topics:
             defined = known_as if known_as and known_as.text else definition(type_name)
-            self._topics[name] = Topic(name, type_name, type_hash(type_name), latched), defined
+            self._topics[name] = Topic(name, type_name, type_hash(type_name), tuple(offered) or (RELIABLE,)), defined
 
     def write(self, topic_name: str, type_name: str, cdr: bytes, log_ns: int) -> None:
         """Append one message. Raises ValueError when the topic has another type or the time is out of range."""

@@ -18,11 +18,15 @@ from rclpy.qos import ReliabilityPolicy
 
 from ..bag import BagReader, Record
 from ..wire import topics
+from .offers import as_recorded, expires
 from .ros.qos import advertise
 from .ros.types import new
 
 PERIOD_S, RUSH_PERIOD_S = 0.002, 0.0005
 """Between two ticks at a given rate and as fast as possible."""
+
+DEPTH = 100
+"""Of a publisher's queue, where none was kept for late subscribers."""
 
 BURST = 20
 """Log times per tick at most: a fraction of a subscriber's queue."""
@@ -60,8 +64,12 @@ class Replay(Node):
         self._wanted = subscribers
         self._clock_out = advertise(self, topics.CLOCK)
         self._outputs = {
-            source: advertise(self, topics.Topic(target, reader.topics[source])) for source, target in selection.items()
+            source: advertise(
+                self, topics.Topic(target, reader.topics[source]), as_recorded(reader.infos[source].offered, DEPTH)
+            )
+            for source, target in selection.items()
         }
+        self._expiring = [end for source, end in self._outputs.items() if expires(reader.infos[source].offered)]
         self._steps = groupby(reader.messages(selection), key=lambda record: record.log_ns)
         self._next: tuple[int, Iterator[Record]] | None = None
         self._origin: tuple[float, int] | None = None
@@ -155,8 +163,11 @@ class Replay(Node):
         return first_ns + (time.monotonic() - started) * self._rate * 1e9 if self._rate else math.inf
 
     def _await_acknowledgement(self, output: Publisher) -> bool:
-        """Wait until reliable subscribers have taken everything; what they have not would be overwritten."""
-        if output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S)):
+        """Wait until reliable subscribers have taken everything; what they have not would be overwritten.
+
+        Not for what expires: DDS would wait in vain for a subscriber that came too late for it.
+        """
+        if output in self._expiring or output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S)):
             return True
         self.get_logger().warning(
             f"{output.topic_name}: a subscriber did not take its messages within {ACKNOWLEDGED_S:g} s",

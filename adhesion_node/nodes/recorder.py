@@ -5,7 +5,6 @@
 import argparse
 import math
 import sys
-from bisect import bisect_right, insort
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -21,6 +20,8 @@ from ..bag.writer import MB
 from ..command.options import help_texts, run_tool
 from ..wire import topics
 from ..wire.codecs import stamp_ns
+from .log_time import SimulatedTime
+from .offers import offered
 from .ros import runtime
 from .ros.qos import subscribe
 
@@ -35,8 +36,8 @@ ROUNDS = 5
 stands still or is slow. A busy machine misses rounds, so it does not change what equal runs leave, as a deadline would.
 """
 
-CLOCKS = 1000
-"""How many /clock are remembered: more than a subscription's queue holds."""
+HELD = 10_000
+"""Messages that wait for the first /clock at most."""
 
 MIN_FREE_MB = 100.0
 LIMITS = Limits(span_ns=SPAN_NS, min_free_bytes=MIN_FREE_MB * MB)
@@ -58,22 +59,20 @@ class _Message(NamedTuple):
     stamp_ns: int
 
 
-class _Tick(NamedTuple):
-    """A /clock. Sorts by the time of publishing."""
-
-    published_ns: int
-    clock_ns: int
-
-
 class Recorder(Node):
     """Records `topics.RECORDED` under their resolved names into the new directory `output`.
 
     The log time is the node's time: the system clock at arrival, or with `use_sim_time` the /clock in force when the
     message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder does
-    not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks. Before the
-    first /clock, the header's stamp takes its place. `heard` counts the messages received by topic. Call `close` at
-    the end. Raises ValueError when `output` exists. A callback or `close` raises OSError when the disk is full; `close`
-    makes the recording complete up to there all the same.
+    not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks.
+
+    What comes before the first /clock waits for it, the newest `HELD` messages: it is of its header's stamp where that
+    is of the same time, else of the first /clock. So a recording begins when its time begins. Where /clock never comes
+    the stamps stand for it.
+
+    `heard` counts the messages received by topic. Call `close` at the end. Raises ValueError when `output` exists. A
+    callback or `close` raises OSError when the disk is full; `close` makes the recording complete up to there all the
+    same.
     """
 
     def __init__(self, output: Path, limits: Limits = LIMITS, *, by_log_time: bool = False, **kwargs: Any) -> None:
@@ -83,7 +82,7 @@ class Recorder(Node):
         """
         super().__init__("recorder", **kwargs)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
-        self._clocks: list[_Tick] = []
+        self._time = SimulatedTime()
         self._last_ns = 0
         self.heard: Counter[topics.Topic] = Counter()
         self._arrivals = 0
@@ -110,7 +109,11 @@ class Recorder(Node):
         self._writer.check_disk()
         due = self._rounds[0]
         self._rounds.append(self._arrivals)
-        self._release(lambda message: message.arrival <= due)
+        if self._time.begun:
+            self._release(lambda message: message.arrival <= due)
+        elif self._pending:
+            waits = "no /clock yet, what comes waits for it: is the simulator running? Else leave use_sim_time out"
+            self.get_logger().warning(waits, once=True)
         if self._writer.unsaved and self._oldest_unsaved <= due:
             self._writer.flush()
 
@@ -127,13 +130,15 @@ class Recorder(Node):
         name = self.resolve_topic_name(topic.name)
 
         def receive(cdr: bytes, info: Mapping[str, int]) -> None:
-            self._writer.add_topic(name, topic.type, latched=topic.latched)
+            if not self.heard[topic]:
+                self._writer.add_topic(name, topic.type, offered=offered(self, topic))
             exact, stamp_ns = self._canonical(name, topic.type, cdr)
             self._arrivals += 1
             self.heard[topic] += 1
             message = _Message(info["source_timestamp"], self._arrivals, name, topic.type, exact, stamp_ns)
             if self._simulated:
                 self._pending.append(message)
+                self._limit_what_waits()
             else:
                 self._write(message, self.get_clock().now().nanoseconds)
 
@@ -150,28 +155,28 @@ class Recorder(Node):
         return serialize(message, type_name), stamp_ns(header) if header else 0
 
     def _on_clock(self, message: Any, info: Mapping[str, int]) -> None:
-        """Write what was published before the /clock before this one: what was published since may be on its way."""
+        """Write what was published before the /clock before this one."""
         self.heard[topics.CLOCK] += 1
-        insort(self._clocks, _Tick(info["source_timestamp"], topics.CLOCK.read(message)))
-        del self._clocks[:-CLOCKS]
-        if len(self._clocks) > 1:
-            before = self._clocks[-2]
+        before = self._time.tick(info["source_timestamp"], topics.CLOCK.read(message))
+        if before is not None:
             self._release(lambda message: message.published_ns < before.published_ns)
             self._writer.advance(before.clock_ns)
+
+    def _limit_what_waits(self) -> None:
+        if not self._time.begun and len(self._pending) > HELD:
+            del self._pending[0]
+            self.get_logger().warning(
+                f"no /clock: of {HELD} messages that wait for it the oldest is given up", once=True
+            )
 
     def _release(self, ready: Callable[[_Message], bool]) -> None:
         """Write the waiting messages that are ready in the order of publishing."""
         due = sorted(filter(ready, self._pending))
         self._pending = [message for message in self._pending if not ready(message)]
         for message in due:
-            self._write(message, self._clock_at(message))
-
-    def _clock_at(self, message: _Message) -> int:
-        """Return the clock in force when a message was published, however late it comes."""
-        following = bisect_right(self._clocks, message.published_ns, key=lambda tick: tick.published_ns)
-        if following:
-            return self._clocks[following - 1].clock_ns
-        return message.stamp_ns or (self._clocks[0].clock_ns if self._clocks else self._last_ns)
+            without_ns = message.stamp_ns or self._last_ns
+            begun = self._time.begun
+            self._write(message, self._time.of(message.published_ns, message.stamp_ns) if begun else without_ns)
 
     def _write(self, message: _Message, log_ns: int) -> None:
         self._last_ns = max(log_ns, 0)  # a stamp may lie before 1970, a log time may not

@@ -37,7 +37,7 @@ def recover(source: Path, output: Path, drop_undecodable: bool = False) -> dict[
         writer, dropped = BagWriter(output), Counter[str]()
         try:
             for name, info in reader.infos.items():
-                writer.add_topic(name, info.type, latched=info.latched, known_as=info.definition)
+                writer.add_topic(name, info.type, offered=info.offered, known_as=info.definition)
             for record in progress(reader.messages(), "messages", sum(reader.counts.values())):
                 if drop_undecodable and not record.is_whole:
                     dropped[record.topic] += 1

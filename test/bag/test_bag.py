@@ -21,6 +21,7 @@ from rosbags.interfaces import ConnectionExtRosbag2, QosDurability
 from rosbags.rosbag2 import Reader
 
 from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize, typestore
+from adhesion_node.bag.qos import LATCHED
 from adhesion_node.bag.writer import file_name
 from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, RECORDED, WHEEL_SPEED
 
@@ -33,7 +34,7 @@ def every_topic(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[st
     messages = {topic.name: filled(topic.type, numbers) for topic in RECORDED}
     with BagWriter(path) as writer:
         for number, topic in enumerate(RECORDED):
-            writer.add_topic(topic.name, topic.type, latched=topic is BRAKING_CURVE)
+            writer.add_topic(topic.name, topic.type, offered=[LATCHED] if topic is BRAKING_CURVE else [])
             writer.write(topic.name, topic.type, serialize_message(messages[topic.name]), S + number)
     return path, messages
 

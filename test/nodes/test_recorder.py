@@ -106,7 +106,7 @@ def test_every_topic_is_recorded_under_its_resolved_name(
         assert reader.complete
         assert reader.topics == expected
         assert set(reader.counts.values()) == {1}
-        latched = {name for name, info in reader.infos.items() if info.latched}
+        latched = {name for name, info in reader.infos.items() for one in info.offered if one.durability.value == 1}
         for record in reader.messages():
             if sim:
                 assert record.log_ns == 7 * S
@@ -160,9 +160,9 @@ def test_without_a_clock_the_stamp_takes_its_place(
 ) -> None:
     recording, ends = start(tmp_path / "bag", context, executor, spin_until, [TRUTH_MU, POSITION], sim=True)
     ends[POSITION].publish(stamped(POSITION, 3 * S))
-    spin_until(executor, lambda: recording.counts.get("/train1/position"))
+    spin_until(executor, lambda: recording.heard[POSITION])
     ends[TRUTH_MU].publish(message_class(TRUTH_MU)(data=0.1))
-    spin_until(executor, lambda: recording.counts.get("/train1/truth/mu"))
+    spin_until(executor, lambda: recording.heard[TRUTH_MU])
     recording.close()
     with BagReader(tmp_path / "bag") as reader:
         assert [record.log_ns for record in reader.messages()] == [3 * S, 3 * S]
@@ -173,7 +173,7 @@ def test_a_stamp_before_1970_does_not_end_the_recording(
 ) -> None:
     recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], sim=True)
     ends[POSITION].publish(stamped(POSITION, -3 * S))
-    spin_until(executor, lambda: recording.counts)
+    spin_until(executor, lambda: recording.heard[POSITION])
     recording.close()
     with BagReader(tmp_path / "bag") as reader:
         assert [(record.log_ns, record.message.header.stamp.sec) for record in reader.messages()] == [(0, -3)]

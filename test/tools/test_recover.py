@@ -16,6 +16,7 @@ from rosbags.rosbag2 import Reader
 from test_recording_survives import file_size_limit
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
+from adhesion_node.bag.qos import LATCHED
 from adhesion_node.bag.types import Definition
 from adhesion_node.bag.writer import file_name
 from adhesion_node.tools import recover
@@ -27,7 +28,7 @@ S = 10**9
 def interrupted(path: Path, steps: int) -> None:
     """Leave a recording as a killed recorder does: without index and metadata, ending within a chunk."""
     writer = BagWriter(path)
-    writer.add_topic("/curve", BRAKING_CURVE.type, latched=True)
+    writer.add_topic("/curve", BRAKING_CURVE.type, offered=[LATCHED])
     writer.write("/curve", BRAKING_CURVE.type, b"\0\1\0\0", 0)
     for step in range(steps):
         writer.write("/position", POSITION.type, cdrs.position(step * S, step / 3, 0.25), step * S)
@@ -55,7 +56,7 @@ def test_an_interrupted_recording_becomes_complete(tmp_path: Path, capsys: pytes
         read = list(after.messages())
         assert read == list(before.messages())
         assert after.complete
-        assert after.infos["/curve"].latched
+        assert after.infos["/curve"].offered == (LATCHED,)
         assert it.message_count == len(read) == sum(summary["messages"].values()) > 100
 
 

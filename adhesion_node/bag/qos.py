@@ -1,0 +1,48 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The quality of service that the publishers of a topic offered: rosbag2 keeps it, so that a player offers the same."""
+
+from collections.abc import Iterable
+from typing import Any
+
+from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2.errors import ReaderError
+from rosbags.rosbag2.metadata import dump_qos_v9, parse_qos
+
+FOREVER = QosTime(9223372036, 854775807)
+"""How rosbag2 writes a duration that is not limited."""
+
+RELIABLE = Qos(
+    QosHistory.KEEP_LAST,
+    100,
+    QosReliability.RELIABLE,
+    QosDurability.VOLATILE,
+    deadline=FOREVER,
+    lifespan=FOREVER,
+    liveliness=QosLiveliness.AUTOMATIC,
+    liveliness_lease_duration=FOREVER,
+    avoid_ros_namespace_conventions=False,
+)
+"""Of a topic whose publishers are not known."""
+
+LATCHED = RELIABLE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)
+"""Who subscribes late gets the last message."""
+
+
+def parse(text: str) -> tuple[Qos, ...]:
+    """Read the list that a channel of an MCAP file holds: by names since version 9, by numbers before.
+
+    >>> [qos.durability.name for qos in parse(str(profiles([LATCHED])))]
+    ['TRANSIENT_LOCAL']
+    >>> parse(""), parse("- durability: 1")
+    ((), ())
+    """
+    try:
+        return tuple(parse_qos(text))
+    except (ReaderError, AttributeError, LookupError, TypeError, ValueError, RecursionError):  # as good as none
+        return ()
+
+
+def profiles(offered: Iterable[Qos]) -> list[dict[str, Any]]:
+    """Return what metadata.yaml says of them."""
+    return [{**profile} for profile in dump_qos_v9(list(offered))]

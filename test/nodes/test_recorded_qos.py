@@ -1,0 +1,125 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What a topic's publishers offer goes through a recording into the player: who subscribes late sees no difference."""
+
+from __future__ import annotations
+
+import time
+from copy import copy
+from pathlib import Path
+
+from conftest import SpinUntil
+from messages import message_class
+from rclpy.context import Context
+from rclpy.duration import Duration
+from rclpy.executors import SingleThreadedExecutor
+from rclpy.node import Node
+from rclpy.qos import LivelinessPolicy, QoSProfile
+from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosLiveliness, QosReliability, QosTime
+from rosbags.rosbag2 import Reader
+from test_recorder import stamped
+
+from adhesion_node.bag import BagReader, BagWriter, select_from
+from adhesion_node.bag.qos import FOREVER
+from adhesion_node.nodes import offers
+from adhesion_node.nodes.player import Replay
+from adhesion_node.nodes.recorder import Recorder
+from adhesion_node.nodes.ros.qos import EXPIRING, LATCHED, SENSOR_SUBSCRIPTION, subscribe
+from adhesion_node.tools.recover import recover
+from adhesion_node.wire.topics import BRAKING_CURVE, POSITION, Topic
+
+S = 10**9
+
+
+def record(
+    path: Path, topic: Topic, profiles: list[QoSProfile], executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> BagReader:
+    """Record one message of each publisher, under a remapped name."""
+    context = executor.context
+    remapped = ["--ros-args", "-r", f"{topic.name}:=elsewhere"]
+    recording = Recorder(path, context=context, cli_args=remapped)
+    executor.add_node(recording)
+    talker = Node("talker", context=context, cli_args=remapped)
+    executor.add_node(talker)
+    ends = [talker.create_publisher(message_class(topic), topic.name, profile) for profile in profiles]
+    spin_until(executor, lambda: all(end.get_subscription_count() for end in ends))
+    spin_until(executor, lambda: recording.count_publishers("elsewhere") == len(ends))
+    for number, end in enumerate(ends):
+        end.publish(stamped(topic, number + 1))
+    spin_until(executor, lambda: recording.counts == {"/elsewhere": len(ends)})
+    recording.close()
+    for node in (recording, talker):
+        executor.remove_node(node)
+        node.destroy_node()
+    return BagReader(path)
+
+
+def test_a_recording_says_what_the_publishers_offered(
+    tmp_path: Path, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    with record(tmp_path / "bag", BRAKING_CURVE, [EXPIRING], executor, spin_until) as reader:
+        (offered,) = reader.infos["/elsewhere"].offered
+    assert (offered.reliability, offered.durability) == (QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL)
+    assert (offered.lifespan, offered.deadline) == (QosTime(5, 0), FOREVER)
+    recover(tmp_path / "bag", tmp_path / "again")
+    for path in (tmp_path / "bag", tmp_path / "again"):
+        with Reader(path) as other:  # metadata.yaml, by another reader
+            (connection,) = other.connections
+            assert isinstance(connection.ext, ConnectionExtRosbag2)
+            assert connection.ext.offered_qos_profiles == [offered]
+
+
+def test_each_kind_of_publisher_stands_once(
+    tmp_path: Path, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    alive = QoSProfile(
+        depth=3, liveliness=LivelinessPolicy.MANUAL_BY_TOPIC, liveliness_lease_duration=Duration(seconds=2)
+    )
+    profiles = [SENSOR_SUBSCRIPTION, alive, SENSOR_SUBSCRIPTION]
+    with record(tmp_path / "bag", POSITION, profiles, executor, spin_until) as reader:
+        offered = reader.infos["/elsewhere"].offered
+    assert {(one.reliability, one.liveliness, one.liveliness_lease_duration) for one in offered} == {
+        (QosReliability.BEST_EFFORT, QosLiveliness.AUTOMATIC, FOREVER),
+        (QosReliability.RELIABLE, QosLiveliness.MANUAL_BY_TOPIC, QosTime(2, 0)),
+    }
+    assert len(offered) == 2
+
+
+def test_a_publisher_that_has_gone_counts_as_one_of_ours(context: Context, executor: SingleThreadedExecutor) -> None:
+    node = Node("nobody", context=context)
+    executor.add_node(node)
+    (curve,) = offers.offered(node, BRAKING_CURVE)
+    assert (curve.durability, curve.lifespan) == (QosDurability.TRANSIENT_LOCAL, QosTime(5, 0))
+
+
+def test_a_played_curve_waits_for_who_comes_late_until_it_is_too_old(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    short = copy(EXPIRING)
+    short.lifespan = Duration(seconds=0.5)
+    with record(tmp_path / "live", BRAKING_CURVE, [short], executor, spin_until) as reader:
+        (only,) = reader.messages()
+        with BagWriter(tmp_path / "bag") as writer:  # the same topic with two curves, 2 s apart
+            writer.add_topic(only.topic, only.type, offered=reader.infos[only.topic].offered)
+            for second in (1, 3):
+                writer.write(only.topic, only.type, only.cdr, second * S)
+    heard: dict[str, int] = {"soon": 0, "late": 0}
+    with BagReader(tmp_path / "bag") as played:
+        player = Replay(played, select_from(played, [], ["/elsewhere"]), subscribers=0, context=context)
+        executor.add_node(player)
+        spin_until(executor, lambda: player.published["/elsewhere"] == 1)
+        published_s = time.monotonic()
+
+        def join(name: str) -> None:
+            node = Node(name, context=context)
+            executor.add_node(node)
+            topic = BRAKING_CURVE._replace(name="elsewhere")
+            subscribe(node, topic, lambda _: heard.update({name: heard[name] + 1}), LATCHED)
+
+        join("soon")
+        spin_until(executor, lambda: heard["soon"] == 1)
+        spin_until(executor, lambda: time.monotonic() > published_s + 0.7)
+        assert player.published["/elsewhere"] == 1
+        join("late")
+        spin_until(executor, lambda: player.finished and heard["soon"] == 2 and heard["late"])
+    assert heard == {"soon": 2, "late": 1}
