@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import cdrs
+import numpy as np
 import pytest
 import yaml
 from conftest import ROOT
@@ -25,9 +26,13 @@ from hypothesis import strategies as st
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record
 from adhesion_node.bag.writer import file_name
 from adhesion_node.core.intake.samples import MAX_POSITION_M
-from adhesion_node.tools import csv_cells, csv_format, csv_rows, import_csv, recover
-from adhesion_node.tools.csv_format import Format
-from adhesion_node.tools.csv_rows import Refusal, Row
+from adhesion_node.tools import import_csv, recover
+from adhesion_node.tools.log import format as log_format
+from adhesion_node.tools.log.cells import END_OF_STAMPS_NS
+from adhesion_node.tools.log.checks import odd
+from adhesion_node.tools.log.format import OPTIONAL, Format
+from adhesion_node.tools.log.text import Refusal
+from adhesion_node.tools.log.whole import read_log
 from adhesion_node.wire import parameter_file
 from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
@@ -170,15 +175,21 @@ CELLS = st.sampled_from(
 ) | st.text(max_size=8)
 FORMATS = st.builds(
     Format,
-    named=st.dictionaries(st.sampled_from(("time", *csv_rows.OPTIONAL)), st.sampled_from("abt"), max_size=3),
-    delimiter=st.sampled_from([",", ";", "\t", " "]),
-    time_unit=st.sampled_from(list(csv_cells.TIME_UNITS)),
-    position_unit=st.sampled_from(list(csv_format.POSITION_UNITS)),
-    pressure_unit=st.sampled_from(list(csv_format.PRESSURE_UNITS)),
+    named=st.dictionaries(st.sampled_from(("time", *OPTIONAL)), st.sampled_from("abt"), max_size=3),
+    delimiter=st.sampled_from([None, ",", ";", "\t", " "]),
+    decimal=st.sampled_from([None, ".", ","]),
+    skip_rows=st.none() | st.integers(0, 3),
+    time_unit=st.sampled_from([None, *log_format.TIME_UNITS, "iso"]),
+    time_format=st.sampled_from([None, "%H:%M:%S", "%d.%m.%Y", "ISO8601"]),
+    time_zone=st.sampled_from(["UTC", "Europe/Berlin"]),
+    sort=st.booleans(),
+    direction=st.sampled_from(["up", "down"]),
+    position_unit=st.sampled_from(list(log_format.POSITION_UNITS)),
+    pressure_unit=st.sampled_from(list(log_format.PRESSURE_UNITS)),
     pressure_is_gauge=st.booleans(),
-    speed_unit=st.sampled_from(list(csv_format.SPEED_UNITS)),
-    acceleration_unit=st.sampled_from(list(csv_format.ACCELERATION_UNITS)),
-    wheel_unit=st.sampled_from(csv_format.WHEEL_UNITS),
+    speed_unit=st.sampled_from(list(log_format.SPEED_UNITS)),
+    acceleration_unit=st.sampled_from(list(log_format.ACCELERATION_UNITS)),
+    wheel_unit=st.sampled_from(log_format.WHEEL_UNITS),
 )
 HEADERS = st.sampled_from(
     [
@@ -194,7 +205,7 @@ LINES = st.lists(st.lists(CELLS, max_size=6).map(",".join) | st.text(max_size=40
 def test_any_text_as_a_log(header: str, lines: list[str], form: Format) -> None:
     text = "\n".join([header, *lines])
     with refusals_say_why():
-        check_rows(list(csv_rows.read_rows(io.StringIO(text), "log", form)))
+        check_rows(text, form)
 
 
 @given(
@@ -205,8 +216,9 @@ def test_any_text_as_a_log(header: str, lines: list[str], form: Format) -> None:
 def test_any_numbers_in_a_log(times: list[Any], cells: list[Any], form: Format) -> None:
     assume(not form.named)
     table = [["time", "position", "variance", "brake_pressure", "speed"], *([time, *cells] for time in times)]
-    text = "\n".join(form.delimiter.join(map(str, row)) for row in table)
-    check_rows(list(csv_rows.read_rows(io.StringIO(text), "log", form)))
+    text = "\n".join((form.delimiter or ",").join(map(str, row)) for row in table)
+    with refusals_say_why():
+        check_rows(text, form)
 
 
 @given(data=st.binary(max_size=60), good=st.booleans())
@@ -222,19 +234,22 @@ def test_any_file_as_a_log(data: bytes, good: bool) -> None:
                 assert sum(reader.counts.values()) == len(list(reader.messages())) > 0
 
 
-def check_rows(rows: list[Row | Refusal]) -> None:
+def check_rows(text: str, form: Format) -> None:
     """Every line is a plausible measurement with a rising time, or a refusal in one line that names the place."""
-    last_ns = -1
-    for row in rows:
-        if isinstance(row, Refusal):
-            assert row.message.startswith("log:")
-            continue
-        assert last_ns < row.t_ns < csv_cells.END_OF_STAMPS_NS
-        last_ns = row.t_ns
-        assert all(math.isfinite(value) for value in row.values.values())
-        assert not any(map(math.isinf, row.axles_radps))
-        assert abs(row.values.get("position", 0.0)) <= MAX_POSITION_M
-        cdrs.position(row.t_ns, row.values.get("position", 0.0), row.values.get("variance", 1.0))
+    refused: list[Refusal] = []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "log")
+        path.write_text(text, encoding="utf-8", errors="surrogatepass")
+        log = read_log(path, form, refused.append)
+    assert all(each.message.startswith(f"{path}:") for each in refused)
+    t_ns = log.rows["t_ns"]
+    assert ((t_ns >= 0) & (t_ns < END_OF_STAMPS_NS)).all()
+    assert t_ns.diff().dropna().gt(0).all()
+    assert not np.isinf(log.rows.to_numpy(dtype=float)).any()
+    for row in log.rows.fillna({"variance": 1.0}).to_dict("records"):
+        assert not abs(row.get("position", 0.0)) > MAX_POSITION_M
+    if not log.rows.empty:
+        assert all(odd(log))
 
 
 NAMES = st.sampled_from([setting.name for setting in SETTINGS])

@@ -1,0 +1,134 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Columns of a log as numbers and times: what a cell cannot be is NaN, or no time."""
+
+import re
+from collections.abc import Iterable
+from decimal import Decimal
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from ...core.physics.train import Array
+from .format import TIME_UNITS, Format
+
+NO_TIME = -1
+"""Stands for a cell that is no time, and for one before 1970."""
+
+END_OF_STAMPS_NS = 2**31 * 10**9
+"""A ROS stamp holds whole seconds in 31 bits: until 2038."""
+
+CLOCK = "%H:%M:%S.%f"
+"""The time of the day alone."""
+
+FORMATS = (
+    "ISO8601",
+    *("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f"),
+    *("%d-%m-%Y %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y%m%d %H:%M:%S.%f", CLOCK),
+)
+"""Formats of dates that are tried, in this order; a fraction of the second may be missing, its sign be a comma."""
+
+_EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
+"""Times from this number on are counted in such units since 1970."""
+
+_EPOCH, _END = (pd.Timestamp(seconds, unit="s", tz="UTC") for seconds in (0, 2**31))
+
+_NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
+
+
+def numbers(cells: "pd.Series[Any]", decimal: str) -> Array:
+    """Return the numbers of cells, shape (n,), exactly as Python reads them; NaN for what is no finite number.
+
+    Separators of thousands are understood where the decimal sign stands behind them: 12.345,6.
+
+    >>> numbers(pd.Series(["12,5", "1.234,5", "1.234", "nan", "1_0"]), ",").tolist()
+    [12.5, 1234.5, nan, nan, nan]
+    """
+    if pd.api.types.is_numeric_dtype(cells):
+        read = cells.to_numpy(dtype=np.float64, na_value=np.nan)
+    else:
+        text, thousands = cells.astype(str), "." if decimal == "," else ","
+        grouped = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{thousands}][0-9]{{3}})+[{decimal}][0-9]+")
+        text = text.mask(grouped, text.str.replace(thousands, "", regex=False))
+        if decimal == ",":
+            text = text.str.replace(".", "no number", regex=False).str.replace(",", ".", regex=False)
+        read = text.where(text.str.fullmatch(_NUMBER), "nan").to_numpy(dtype=object).astype(np.float64)
+    return np.where(np.isfinite(read), read, np.nan)
+
+
+def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype[np.int64]]":
+    """Return the times of cells in whole nanoseconds, shape (n,), exactly; `NO_TIME` for what is none.
+
+    A date without zone is taken as it stands: the zone is that of the log as a whole (time.py).
+    """
+    if pd.api.types.is_datetime64_any_dtype(cells):
+        return _stamps(cells)
+    if form.time_format is None:
+        unit, texts = TIME_UNITS[form.time_unit or "s"], map(str, cells)
+        sign = form.decimal or "."
+        return np.array([_count(text.replace(sign, "."), unit) for text in texts], dtype=np.int64)
+    return _stamps(_parsed(cells.astype(str), form.time_format))
+
+
+def time_format(cells: Iterable[str]) -> str | None:
+    """Return the one of `FORMATS` that most cells have, the first of equals; None where they are numbers.
+
+    >>> time_format(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_format(["0.1", "0.2"])
+    ('%d.%m.%Y %H:%M:%S.%f', None)
+    """
+    text = pd.Series([cell for cell in cells if ":" in cell], dtype=object).astype(str)
+    counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS}
+    best = max(FORMATS, key=lambda form: counts[form])
+    return best if counts[best] else None
+
+
+def time_unit(cells: Iterable[str], decimal: str) -> str:
+    """Return the unit of times that are numbers: by their size, else seconds.
+
+    >>> time_unit(["1700000000123"], "."), time_unit(["1700000000.5"], "."), time_unit(["17"], ".")
+    ('ms', 's', 's')
+    """
+    read = numbers(pd.Series(list(cells), dtype=object), decimal)
+    median = float(np.nanmedian(read)) if np.isfinite(read).any() else 0.0
+    return next((unit for least, unit in _EPOCHS if median >= least), "s")
+
+
+def is_clock(form: str | None) -> bool:
+    """Whether a format of times has no date.
+
+    >>> is_clock(CLOCK), is_clock("ISO8601"), is_clock(None)
+    (True, False, False)
+    """
+    return form is not None and form != "ISO8601" and not re.search("%[djxcs]", form)
+
+
+def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
+    """The dates of a format; a clock's are those of the day on which the epoch begins."""
+    if form in FORMATS:
+        text = text.str.replace(",", ".", regex=False)
+    if form in FORMATS[1:]:
+        text = text.where(text.str.contains(r":[0-9]+\.[0-9]+$"), text + ".0")
+    if is_clock(form):
+        form, text = f"%Y-%m-%d {form}", "1970-01-01 " + text
+    return pd.to_datetime(text, format=form, errors="coerce", utc=True)
+
+
+def _stamps(read: "pd.Series[Any]") -> "np.ndarray[Any, np.dtype[np.int64]]":
+    """Nanoseconds since 1970; those that are not until 2038 are no times."""
+    index = pd.DatetimeIndex(read)
+    index = index.tz_localize("UTC") if index.tz is None else index.tz_convert("UTC")
+    inside = (index >= _EPOCH) & (index < _END)  # what is no date is not
+    return np.where(inside, index.where(inside, _EPOCH).as_unit("ns").asi8, NO_TIME)
+
+
+def _count(text: str, unit_ns: int) -> int:
+    """A number of units, exactly; digits beyond the nanosecond are rounded."""
+    try:
+        value = Decimal(text) * unit_ns
+    except ArithmeticError:
+        return NO_TIME
+    # Python also reads 1_000 as a number; in a log it is a misprint.
+    if "_" in text or not value.is_finite() or not 0 <= value < END_OF_STAMPS_NS:
+        return NO_TIME
+    return int(value.to_integral_value())

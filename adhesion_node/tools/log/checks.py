@@ -1,0 +1,223 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What is odd of a log as it was understood, each with the option that cures it.
+
+Means over a second are judged, so that neither noise nor the rate of the rows matters.
+"""
+
+import math
+from collections.abc import Iterator
+from itertools import product
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ...core.physics.train import KMH, Array
+from .format import POSITION_UNITS, SPEED_UNITS, TIME_UNITS, Format
+from .rows import Flags
+from .whole import Log, moment
+
+LEAST_S, LEAST_M = 10.0, 100.0
+"""Of less time or less way nothing is said."""
+
+FASTEST_MPS = 105.0
+"""No train on rails is faster in service: 380 km/h."""
+
+HARDEST_MPS2, HARD_S = 3.0, 3
+"""No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
+
+SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
+
+BRAKES_MPS2, RUNS_MPS2 = -0.3, -0.1
+"""A train that slows down more than by the first brakes; by less than the second, it runs or coasts."""
+
+RELEASED_PIPE_PA = 2.5e5
+"""No cylinder has so much while the train runs; the pipe has 5 bar then."""
+
+SAME = math.log(1.25)
+"""By so much positions and speed may differ, as where a wheel slides."""
+
+
+class Motion(NamedTuple):
+    """Means over the n seconds of a log; NaN where nothing was measured."""
+
+    place_m: Array
+    speed_mps: Array
+    pressure_pa: Array
+    """Of brake_pressure, gauge."""
+
+    @property
+    def course_mps(self) -> Array:
+        """By the positions, from the second before; shape (n,)."""
+        return np.diff(self.place_m, prepend=math.nan)
+
+    @property
+    def pace_mps(self) -> Array:
+        """The measured speed between a second and the one before; shape (n,)."""
+        before = np.append(math.nan, self.speed_mps[:-1])
+        return np.abs(before + self.speed_mps) / 2.0
+
+    @property
+    def both(self) -> Flags:
+        """Where positions and speed tell of the same seconds."""
+        return np.isfinite(self.course_mps + self.pace_mps)
+
+    @property
+    def is_compared(self) -> bool:
+        """Whether there is enough of both."""
+        return bool(self.both.sum() > LEAST_S and self.pace_mps[self.both].sum() > LEAST_M)
+
+    @property
+    def fastest_mps(self) -> Array:
+        """Speed, by the positions where none was measured."""
+        return np.abs(self.speed_mps if np.isfinite(self.speed_mps).any() else self.course_mps)
+
+
+def odd(log: Log) -> list[str]:
+    """Say what is odd, with the cure."""
+    t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
+    texts = [*_rows_too_far(t_s, log.form), *_pressures(log)]
+    if texts or t_s[-1] < LEAST_S:
+        return texts
+    motion = _motion(log, t_s)
+    if motion.is_compared:
+        texts += _speed_against_positions(motion, log.form)
+    else:
+        texts += _slow_or_falling(motion)
+    texts += [] if texts else [*_too_fast(motion, log.form), *_hard(motion)]
+    return [*texts, *_pipe(motion), *_clock(log, t_s)]
+
+
+def _rows_too_far(t_s: Array, form: Format) -> Iterator[str]:
+    step_s = float(np.median(np.diff(t_s))) if len(t_s) > 2 else 1.0
+    if form.time_unit in TIME_UNITS and not FASTEST_ROWS_S < step_s < SLOWEST_ROWS_S:
+        other = "ms" if step_s > 1.0 else "s"
+        yield f"a row every {step_s:g} s: are the times in {other}? --time-unit {other}"
+
+
+def _pressures(log: Log) -> Iterator[str]:
+    for name in ("brake_pressure", "brake_demand"):
+        if name not in log.rows or name not in log.columns.names or not log.form.pressure_is_gauge:
+            continue
+        gauge = log.rows[name] - log.form.ambient_pressure_pa
+        least, most = gauge.min(), gauge.max()
+        if 0.1 < most < 3000.0:
+            unit = "bar" if most < 15.0 else "kpa"
+            yield f"{name} is {most:g} Pa at most: is it in {unit}? --pressure-unit {unit}"
+        elif 80e3 < least < 108e3:
+            yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
+
+
+def _motion(log: Log, t_s: Array) -> Motion:
+    rows, second = log.rows, np.floor(t_s).astype(np.int64)
+    means = rows.groupby(second).mean().reindex(range(int(second[-1]) + 1)) if second[-1] < 10**6 else rows
+
+    def column(name: str, offset: float = 0.0) -> Array:
+        values = means[name] if name in means else pd.Series(math.nan, index=means.index)
+        read: Array = values.to_numpy(dtype=np.float64) - offset
+        return read
+
+    return Motion(column("position"), column("speed"), column("brake_pressure", log.form.ambient_pressure_pa))
+
+
+def _speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
+    """Positions and speeds tell the same way; if not, what the one is of the other tells why."""
+    course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
+    ratio = float((course * speed).sum() / (speed * speed).sum())
+    if ratio < 0.0:
+        yield _falls(motion)
+    told = f"the positions move at {abs(ratio):.3g} times the speed"
+    for (place, place_m), (pace, pace_mps) in product(POSITION_UNITS.items(), SPEED_UNITS.items()):
+        other = pace_mps / SPEED_UNITS[form.speed_unit] / (place_m / POSITION_UNITS[form.position_unit])
+        if abs(math.log(max(abs(ratio), 1e-30) / other)) < SAME:
+            cures = [f"--position-unit {place}"] * (place != form.position_unit)
+            cures += [f"--speed-unit {pace}"] * (pace != form.speed_unit)
+            if cures:
+                yield f"{told}: another unit? {' '.join(cures)}"
+            return
+    if abs(ratio) < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
+        yield f"{told}: are they degrees? --lat COL --lon COL"
+    else:
+        yield f"{told}: are both units right, is the speed that of a wheel which slid?"
+
+
+def _slow_or_falling(motion: Motion) -> Iterator[str]:
+    """Positions alone: do they rise, and as fast as a train runs?"""
+    course = motion.course_mps[np.isfinite(motion.course_mps)]
+    way_m, net_m = np.abs(course).sum(), course.sum()
+    if len(course) < LEAST_S or abs(net_m) < 0.8 * way_m:
+        return
+    most = float(np.abs(course).max())
+    if 0.0 < most < 2e-3:
+        yield f"the train creeps at {most:.2g} m/s: are the positions degrees? --lat COL --lon COL"
+    elif 0.0 < most < 0.15:
+        yield f"the train creeps at {most:.2g} m/s: are the positions in km? --position-unit km"
+    elif net_m < -LEAST_M:
+        yield _falls(motion)
+
+
+def _falls(motion: Motion) -> str:
+    first, last = motion.place_m[np.isfinite(motion.place_m)][[0, -1]]
+    return f"the positions fall, from {first:.0f} to {last:.0f} m: --direction down turns them"
+
+
+def _hard(motion: Motion) -> Iterator[str]:
+    """Without positions only the braking tells of a wrong unit of the speed."""
+    steps = (motion.speed_mps[HARD_S:] - motion.speed_mps[:-HARD_S]) / HARD_S
+    if np.nanmin(steps, initial=0.0) < -HARDEST_MPS2:
+        yield (
+            f"the speed falls by {-np.nanmin(steps):.1f} m/s^2, harder than any train brakes: km/h read as m/s, "
+            "--speed-unit kmh? Or is it of a wheel that locked?"
+        )
+
+
+def _too_fast(motion: Motion, form: Format) -> Iterator[str]:
+    speeds = np.sort(motion.fastest_mps[np.isfinite(motion.fastest_mps)])
+    if len(speeds) > 2 and (fast := float(speeds[-3])) > FASTEST_MPS:  # two seconds may be outliers
+        measured = bool(np.isfinite(motion.speed_mps).any())
+        cure = (
+            "km/h? --speed-unit kmh"
+            if measured and form.speed_unit == "mps"
+            else "another --position-unit, --time-unit?"
+        )
+        yield f"the train runs {fast:.0f} m/s, {fast / KMH:.0f} km/h: {cure}"
+
+
+def _pipe(motion: Motion) -> Iterator[str]:
+    """The pressure of a cylinder rises when the train brakes, that of the pipe falls."""
+    speed = motion.speed_mps if np.isfinite(motion.speed_mps).any() else motion.course_mps
+    slows = np.diff(speed, prepend=math.nan)
+    known = np.isfinite(motion.pressure_pa)
+    braking, running = (
+        motion.pressure_pa[known & (slows < BRAKES_MPS2)],
+        motion.pressure_pa[known & (slows > RUNS_MPS2)],
+    )
+    if len(braking) > 2 and len(running) > 2:
+        brakes_pa, runs_pa = np.median(braking), np.median(running)
+        if runs_pa > RELEASED_PIPE_PA and brakes_pa < runs_pa - 0.2e5:
+            yield (
+                f"brake_pressure is {runs_pa / 1e5:.1f} bar while the train runs, {brakes_pa / 1e5:.1f} bar while it "
+                "brakes: is it the brake pipe's? --pipe COL"
+            )
+
+
+def _clock(log: Log, t_s: Array) -> Iterator[str]:
+    """Time that goes on by much more than the train's way: a clock that was set."""
+    if "position" not in log.rows:
+        return
+    known = log.rows["position"].notna().to_numpy()
+    at, place, t_ns = t_s[known], log.rows["position"].to_numpy()[known], log.rows["t_ns"].to_numpy()[known]
+    steps = np.diff(at)
+    for i in np.flatnonzero(steps > max(LEAST_S, 50.0 * np.median(steps) if len(steps) else 0.0)):
+        before, after = (
+            np.abs(place[b] - place[a]) / max(at[b] - at[a], 1e-9)
+            for a, b in ((max(i - 5, 0), i), (i + 1, min(i + 6, len(at) - 1)))
+        )
+        slowest = min(before, after)
+        if slowest > 5.0 and abs(place[i + 1] - place[i]) < 0.5 * slowest * steps[i]:
+            yield (
+                f"the clock goes on by {steps[i]:.0f} s at {moment(t_ns[i])} and the train does not: "
+                "cut the log there, or correct the times behind"
+            )
+            return

@@ -1,0 +1,150 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""How a log is written: its text, the units of its columns, and what they may hold."""
+
+import codecs
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+
+from ...core.intake.samples import (
+    MAX_ACCELERATION_MPS2,
+    MAX_POSITION_M,
+    MAX_SPEED_MPS,
+    MAX_VARIANCE_M2,
+    MIN_VARIANCE_M2,
+)
+from ...core.physics.train import CRH3, KMH
+from ...wire.codecs import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MAX_WHEEL_RADPS, MIN_ABSOLUTE_PA, Line
+
+TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
+"""In ns; besides there is `iso`, a date."""
+
+POSITION_UNITS = {"m": 1.0, "km": 1e3}
+PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5}
+SPEED_UNITS = {"mps": 1.0, "kmh": KMH}
+ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665}
+WHEEL_UNITS = ("radps", "rpm", "mps", "kmh")
+"""The last two of the rim."""
+
+PRESSURES = ("brake_pressure", "brake_demand", "brake_pipe")
+
+PLACES = (("position",), ("lat", "lon"), ("speed",))
+"""Columns of which a log has one group at least, beside the time."""
+
+OPTIONAL = (
+    *("position", "lat", "lon", "height", "variance"),
+    *(*PRESSURES, "speed", "speed_std", "acceleration"),
+)
+"""All columns but the time and the axles."""
+
+_IS_PRESSURE = "Pa absolute: is the --pressure-unit, --pressure-kind or --ambient-pressure another?"
+_ABSOLUTE = (MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA, _IS_PRESSURE)
+
+LIMITS = {
+    "position": (-MAX_POSITION_M, MAX_POSITION_M, "m: is the --position-unit another?"),
+    "lat": (-90.0, 90.0, "degrees: are latitude and longitude exchanged?"),
+    "lon": (-180.0, 180.0, "degrees"),
+    "height": (-500.0, 10_000.0, "m"),
+    "variance": (MIN_VARIANCE_M2, MAX_VARIANCE_M2, "m^2: leave it empty where unknown"),
+    "brake_pressure": _ABSOLUTE,
+    "brake_demand": _ABSOLUTE,
+    "brake_pipe": _ABSOLUTE,
+    "speed": (-MAX_SPEED_MPS, MAX_SPEED_MPS, "m/s: is the --speed-unit another?"),
+    "speed_std": (1e-6, MAX_SPEED_MPS, "m/s: leave it empty where unknown"),
+    "acceleration": (-MAX_ACCELERATION_MPS2, MAX_ACCELERATION_MPS2, "m/s^2: is the --acceleration-unit another?"),
+    "wheel_speed": (-MAX_WHEEL_RADPS, MAX_WHEEL_RADPS, "rad/s: is the --wheel-unit another?"),
+}
+"""Least and greatest value in SI, and its unit with the remedy, by column."""
+
+
+def option(column: str) -> str:
+    """Return the option that names a column.
+
+    >>> option("brake_pressure"), option("speed_std")
+    ('--pressure', '--speed-std')
+    """
+    return "--" + column.removeprefix("brake_").replace("_", "-")
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """How to read a log. `named` are the columns the user named, `axles` those of the axles: these have to be there.
+
+    What is None is guessed (text.py).
+    """
+
+    named: Mapping[str, str]
+    axles: Sequence[str] = ()
+    encoding: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    skip_rows: int | None = None
+    """Lines above the header."""
+    units_rows: int = 0
+    """Lines between the header and the first row, such as units."""
+    time_unit: str | None = None
+    """One of `TIME_UNITS`, or `iso`."""
+    time_format: str | None = None
+    """Of a date, as strptime takes it."""
+    time_zone: str = "UTC"
+    """Of dates that name none."""
+    sort: bool = False
+    direction: str = "up"
+    """Whether the chainage rises as the train runs, or falls: `down`."""
+    position_unit: str = "m"
+    position_std_m: float | None = None
+    """Stands in where the log gives no variance; None: 0.5 m along the track, unknown of latitude and longitude."""
+    pressure_unit: str = "pa"
+    pressure_is_gauge: bool = True
+    ambient_pressure_pa: float = ATMOSPHERE_PA
+    pipe_released: float | None = None
+    """Pressure of the brake pipe, in the unit of pressures, where the brake is released; None: its 9th decile."""
+    full_pressure_pa: float = CRH3.full_pressure_pa
+    """What a full brake demands of the cylinders, gauge."""
+    speed_unit: str = "mps"
+    acceleration_unit: str = "mps2"
+    wheel_unit: str = "radps"
+    wheel_radius_m: float = CRH3.wheel_radius_m
+
+    def __post_init__(self) -> None:
+        if self.delimiter is not None and (len(self.delimiter) != 1 or self.delimiter in '"\r\n'):
+            raise ValueError(f"delimiter = {self.delimiter!r}: give one character, such as ',' or ';'")
+        if self.skip_rows is not None and self.skip_rows < 0:
+            raise ValueError(f"skip-rows = {self.skip_rows}: give the number of lines above the header")
+        if self.encoding is not None:
+            _require(codecs.lookup, LookupError, "encoding", self.encoding, "such as utf-8, cp1252 or utf-16")
+        _require(ZoneInfo, _NO_ZONE, "time-zone", self.time_zone, "such as UTC or Europe/Berlin")
+        std = self.position_std_m
+        if std is not None and not MIN_VARIANCE_M2 <= std**2 <= MAX_VARIANCE_M2:
+            raise ValueError(f"position-std = {std!r}: give a standard deviation above 0, in m")
+        if not 0.01 <= self.wheel_radius_m <= 5.0:
+            raise ValueError(f"wheel-radius = {self.wheel_radius_m!r}: give a radius of 0.01 to 5 m")
+        if not 1e5 <= self.full_pressure_pa <= 1e6:
+            raise ValueError(f"full-pressure = {self.full_pressure_pa!r}: give 100000 to 1000000 Pa, gauge")
+        Line(ambient_pressure_pa=self.ambient_pressure_pa)
+
+    def factors(self) -> Mapping[str, float]:
+        """What one unit of a column is in SI, where it is not 1."""
+        radius = self.wheel_radius_m
+        wheel = {"radps": 1.0, "rpm": math.pi / 30.0, "mps": 1.0 / radius, "kmh": KMH / radius}
+        return {
+            "position": POSITION_UNITS[self.position_unit],
+            **dict.fromkeys(PRESSURES, PRESSURE_UNITS[self.pressure_unit]),
+            **dict.fromkeys(("speed", "speed_std"), SPEED_UNITS[self.speed_unit]),
+            "acceleration": ACCELERATION_UNITS[self.acceleration_unit],
+            "wheel_speed": wheel[self.wheel_unit],
+        }
+
+
+_NO_ZONE = (ZoneInfoNotFoundError, ValueError, OSError)
+"""What `ZoneInfo` raises for a name that is none, or a folder."""
+
+
+def _require(find: Callable[[str], Any], errors: Any, name: str, value: str, such_as: str) -> None:
+    try:
+        find(value)
+    except errors:
+        raise ValueError(f"{name} = {value!r}: there is none of this name; give one {such_as}") from None

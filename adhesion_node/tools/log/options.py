@@ -1,0 +1,83 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The options that say how a log is written and what its numbers are."""
+
+import argparse
+from collections.abc import Callable
+from dataclasses import fields
+from typing import Any
+
+from ...core.physics.train import CRH3
+from ...wire.settings import AMBIENT
+from .format import (
+    ACCELERATION_UNITS,
+    OPTIONAL,
+    POSITION_UNITS,
+    PRESSURE_UNITS,
+    SPEED_UNITS,
+    TIME_UNITS,
+    WHEEL_UNITS,
+    Format,
+    option,
+)
+
+_GUESSED = "when it is not as guessed"
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    """Add them to a parser."""
+    add = parser.add_argument
+    for column in ("time", *OPTIONAL):
+        add(option(column), dest=column, metavar="COL", help=f"name of the column, when not {column!r}")
+    axles = "names of the columns of the axles, the first one first, when not 'wheel_speed_1' and so on"
+    add("--wheel-speeds", dest="axles", metavar="COL", nargs="+", action="extend", default=[], help=axles)
+    _text_options(parser.add_argument_group("how the log is written").add_argument)
+    _unit_options(parser.add_argument_group("what its numbers are").add_argument)
+
+
+def format_of(options: argparse.Namespace) -> Format:
+    """Return what they say. Raises ValueError naming what is out of range."""
+    given = vars(options)
+    names = {column: given[column] for column in ("time", *OPTIONAL) if given[column] is not None}
+    given |= {"named": names, "pressure_is_gauge": options.pressure_kind == "gauge"}
+    given["delimiter"] = options.delimiter and options.delimiter.replace("\\t", "\t")
+    return Format(**{field.name: given[field.name] for field in fields(Format) if field.name in given})
+
+
+def _text_options(add: Callable[..., Any]) -> None:
+    add("--encoding", metavar="NAME", help=f"such as cp1252, {_GUESSED}")
+    add("--delimiter", metavar="CHAR", help=f"between two cells, \\t for a tab, {_GUESSED}")
+    add("--decimal", choices=[".", ","], help=f"decimal sign, {_GUESSED}")
+    add("--skip-rows", type=int, metavar="N", help=f"lines above the header, {_GUESSED}")
+    add("--time-unit", choices=[*TIME_UNITS, "iso"], help=f"of times that are numbers, {_GUESSED}; iso: dates")
+    strptime = "such as '%%d.%%m.%%Y %%H:%%M:%%S.%%f'"
+    add("--time-format", metavar="FORMAT", help=f"of dates, {strptime}, {_GUESSED}")
+    add(
+        "--time-zone",
+        metavar="ZONE",
+        default="UTC",
+        help="of dates that name none, such as Europe/Berlin (default: UTC)",
+    )
+    add("--sort", action="store_true", help="sort the rows by time")
+
+
+def _unit_options(add: Callable[..., Any]) -> None:
+    turned = "down: the chainage falls as the train runs, and is turned (default: up)"
+    add("--direction", choices=["up", "down"], default="up", help=turned)
+    add("--position-unit", choices=list(POSITION_UNITS), default="m", help="default: m; variance is in m^2")
+    std = "of all positions, where there is no variance (default: 0.5; of latitude and longitude: unknown)"
+    add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
+    add("--pressure-unit", choices=list(PRESSURE_UNITS), default="pa", help="default: pa")
+    add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="default: gauge")
+    air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
+    air += f" (default: {AMBIENT.default:g})"
+    add("--ambient-pressure", dest=AMBIENT.name, type=float, default=AMBIENT.default, metavar="PA", help=air)
+    released = "of the brake pipe while the brake is released, in the unit of pressures (default: its 9th decile)"
+    add("--pipe-released", type=float, metavar="P", help=released)
+    full = f"of the cylinders that a full brake by the pipe demands, gauge (default: {CRH3.full_pressure_pa:g})"
+    add("--full-pressure", dest="full_pressure_pa", type=float, default=CRH3.full_pressure_pa, metavar="PA", help=full)
+    add("--speed-unit", choices=list(SPEED_UNITS), default="mps", help="default: mps")
+    add("--acceleration-unit", choices=list(ACCELERATION_UNITS), default="mps2", help="default: mps2")
+    add("--wheel-unit", choices=WHEEL_UNITS, default="radps", help="default: radps; mps and kmh: of the rim")
+    radius = f"of the wheels, for those (default: {CRH3.wheel_radius_m:g})"
+    add("--wheel-radius", dest="wheel_radius_m", type=float, default=CRH3.wheel_radius_m, metavar="M", help=radius)

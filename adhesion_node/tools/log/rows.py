@@ -1,0 +1,178 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Rows of a log as measurements in SI units, and a reason with a remedy for each row that is none."""
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .cells import NO_TIME, numbers, time_format, time_unit, times_ns
+from .format import LIMITS, OPTIONAL, PLACES, PRESSURES, Format, option
+from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
+
+AXLE = re.compile(r"wheel_speed_\d+")
+"""What the columns of the axles are called where none is named."""
+
+ZONED = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
+"""How a date ends that names its zone."""
+
+EMPTY = "every row needs a time and something measured"
+
+NO_NUMBER = "write a finite number with a decimal point, without its unit; or is the --decimal another?"
+
+Flags = NDArray[np.bool_]
+
+
+class Columns(NamedTuple):
+    """Names in the header by ours, and those of the axles."""
+
+    names: dict[str, str]
+    axles: tuple[str, ...]
+
+
+class Source(NamedTuple):
+    """A log that can be read: its format with nothing left open, its columns, and its rows block by block."""
+
+    form: Format
+    columns: Columns
+    blocks: Iterator[Block]
+
+
+def open_log(path: Path, form: Format) -> Source:
+    """Look how a log is written. Raises ValueError when it is empty or a column is missing."""
+    if path.suffix.lower() in (".parquet", ".pq"):
+        table = _parquet(path)
+        names, rows = [str(name) for name in table.columns], iter([Block(table.set_axis(table.index + 1), [])])
+        form = replace(form, decimal=".")
+    else:
+        form = understood(path, form)
+        names = names_of(path, form)
+        rows = blocks(path, form, names)
+    columns = _columns(names, str(path), form)
+    first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
+    return Source(_timed(form, first.cells[columns.names["time"]]), columns, _again(first, rows))
+
+
+def measured(source: str, log: Source) -> Iterator[tuple[pd.DataFrame, list[Refusal]]]:
+    """Yield by line what was measured, `t_ns` and all columns in SI, NaN where a cell is empty; and what is refused."""
+    for cells, refused in log.blocks:
+        rows, unusable = _rows(cells, log, source)
+        yield rows, sorted([*refused, *unusable])
+
+
+def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
+    """What a block has measured: the first reason against a row counts."""
+    form, (names, axles), factors = log.form, log.columns, log.form.factors()
+    kinds = {name: name for name in names if name != "time"} | dict.fromkeys(axles, "wheel_speed")
+    theirs = {name: cells[names.get(name, name)] for name in ("time", *kinds)}
+    filled = {name: _filled(column) for name, column in theirs.items()}
+    against: dict[int, Refusal] = {}
+    good = np.ones(len(cells), dtype=np.bool_)
+
+    def refuse(rows: Flags, reason: str, column: str, remedy: Callable[[int], str]) -> None:
+        """Refuse those of the rows that are good so far."""
+        for i in np.flatnonzero(rows & good):
+            value = "" if column == "row" else str(theirs[column].iloc[i])
+            value = (form.delimiter or ",").join(map(str, cells.iloc[i])) if column == "row" else value
+            shown = repr(value if len(value) <= 60 else value[:60] + "...")
+            line = int(cells.index[i])
+            against[line] = Refusal(line, reason, f"{source}:{line}: {column} = {shown}: {remedy(int(i))}")
+        good[rows] = False
+
+    refuse(~filled["time"], "empty", "time", lambda _: EMPTY)
+    said = [filled[name] for name in kinds if name not in ("height", "variance", "speed_std")]
+    refuse(~np.any(said, axis=0), "empty", "row", lambda _: EMPTY)
+    if "lat" in kinds and "lon" in kinds:
+        both = "a place needs both, latitude and longitude"
+        refuse(filled["lat"] != filled["lon"], "empty", "row", lambda _: both)
+    t_ns = times_ns(theirs["time"].where(good, ""), form)
+    _refuse_times(refuse, t_ns == NO_TIME, theirs["time"], form)
+    rows: dict[str, Any] = {"t_ns": t_ns}
+    for name, kind in kinds.items():
+        read = numbers(theirs[name], form.decimal or ".")
+        refuse(filled[name] & np.isnan(read), "not_a_number", name, lambda _: NO_NUMBER)
+        factor = factors.get(kind, 1.0)
+        with np.errstate(over="ignore"):  # 1e300 km are out of range
+            read *= factor
+            read = read.round(6) if factor >= 10.0 else read  # 4.1 bar are 410000 Pa, not less
+        if form.pressure_is_gauge and kind in PRESSURES:
+            read += form.ambient_pressure_pa
+        least, most, remedy = LIMITS[kind]
+        outside = (read < least) | (read > most)
+        refuse(outside, "out_of_range", name, _out_of_range(read, least, most, remedy))
+        rows[name] = read
+    return pd.DataFrame(rows, index=cells.index)[good], list(against.values())
+
+
+def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any]", form: Format) -> None:
+    if form.time_format is not None:
+        how = f"it is not written as {form.time_format!r}: say how with --time-format"
+        refuse(bad, "not_a_time", "time", lambda _: how)
+        return
+    outside = bad & np.isfinite(numbers(cells, form.decimal or "."))
+    range_ = "a stamp lies between 1970 (or 0) and 2038: is the --time-unit another?"
+    refuse(outside, "out_of_range", "time", lambda _: range_)
+    refuse(bad, "not_a_number", "time", lambda _: NO_NUMBER)
+
+
+def _out_of_range(read: Any, least: float, most: float, remedy: str) -> Callable[[int], str]:
+    return lambda i: f"{read[i]:g} is not from {least:g} to {most:g} {remedy}"
+
+
+def _filled(cells: "pd.Series[Any]") -> Flags:
+    filled: Flags = (cells.notna() & (cells.astype(str) != "")).to_numpy(dtype=np.bool_)
+    return filled
+
+
+def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
+    """The format with that of the times."""
+    if form.time_format is not None or form.time_unit in ("s", "ms", "us", "ns"):
+        return form
+    sample = [str(cell) for cell in cells.head(SAMPLE)]
+    written = "ISO8601" if form.time_unit == "iso" else time_format(sample)
+    unit = None if written else form.time_unit or time_unit(sample, form.decimal or ".")
+    zone = "UTC" if written == "ISO8601" and any(map(ZONED.search, sample)) else form.time_zone
+    return replace(form, time_format=written, time_unit=unit, time_zone=zone)
+
+
+def _columns(header: Sequence[str], source: str, form: Format) -> Columns:
+    """Return the columns in use; ValueError names the first that is missing or there twice."""
+    named = {ours: form.named.get(ours, ours) for ours in ("time", *OPTIONAL)}
+    names = {ours: name for ours, name in named.items() if ours in form.named or name not in form.named.values()}
+    axles = tuple(form.axles) or tuple(name for name in header if AXLE.fullmatch(name))
+    for name in (*names.values(), *axles):
+        if header.count(name) > 1:
+            raise ValueError(f"{source}: column {name!r} is there {header.count(name)} times: rename one")
+    needed = {name: option(ours) for ours, name in names.items() if ours in form.named or ours == "time"}
+    for name, how in (needed | dict.fromkeys(form.axles, "--wheel-speeds")).items():
+        if name not in header:
+            raise ValueError(f"{source}: column {name!r} is missing: it has {list(header)}; name one with {how} COL")
+    used = {ours: name for ours, name in names.items() if name in header}
+    if len({"lat", "lon"} & set(used)) == 1:
+        used = {ours: name for ours, name in used.items() if ours not in ("lat", "lon")}
+    if not any(set(group) <= set(used) for group in PLACES):
+        remedy = "name one with --position COL, or --lat COL and --lon COL, or --speed COL"
+        raise ValueError(f"{source}: columns {list(header)}: has neither position, lat and lon, nor speed: {remedy}")
+    if {"brake_pipe", "brake_demand"} <= set(used):
+        raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")
+    return Columns(used, axles)
+
+
+def _parquet(path: Path) -> pd.DataFrame:
+    try:
+        return pd.read_parquet(path)
+    except ImportError:
+        raise ValueError(f"{path}: Parquet needs one package more: pip install pyarrow") from None
+    except (OSError, ValueError) as error:
+        raise ValueError(f"{path}: is no Parquet file ({error})") from None
+
+
+def _again(first: Block, rest: Iterator[Block]) -> Iterator[Block]:
+    yield first
+    yield from rest

@@ -1,0 +1,176 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The text of a CSV log: how it is written, guessed from its beginning, and its cells as blocks of columns."""
+
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import pandas as pd
+
+from .format import PLACES, Format
+
+DELIMITERS = (",", ";", "\t", "|")
+
+MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
+"""Byte order marks and what they say of the encoding."""
+
+SAMPLE = 300
+"""Lines from which it is guessed how a log is written."""
+
+BLOCK = 2_000
+"""Lines that are read together."""
+
+NO_HEADER = "has no header line: begin with the names of the columns, their quotes closed; or is --skip-rows another?"
+
+_WITH_COMMA, _WITH_POINT = (re.compile(rf"[+-]?[0-9]*{sign}[0-9]+([eE][+-]?[0-9]+)?") for sign in (",", "[.]"))
+
+
+class Refusal(NamedTuple):
+    """A row that cannot be used: its line, why, for counting, and the whole message."""
+
+    line: int
+    reason: str
+    message: str
+
+
+class Block(NamedTuple):
+    """Rows of a log: the cells by the names of the header, stripped, by line; and what no cells could be made of."""
+
+    cells: pd.DataFrame
+    refused: list[Refusal]
+
+
+def understood(path: Path, form: Format) -> Format:
+    """Return the format with encoding, delimiter, decimal sign and header line guessed where they are not given."""
+    form = replace(form, encoding=form.encoding or _encoding(path))
+    lines = list(islice(_lines(path, form), SAMPLE))
+    if not any(map(str.strip, lines)):
+        raise ValueError(f"{path}: {NO_HEADER}")
+    delimiter, header = _header(lines, form)
+    rows = [cells for text in lines[header + 1 :] if (cells := _cells(text, delimiter))]
+    first = "".join(rows[0]) if len(rows) > 1 else ""
+    return replace(
+        form,
+        delimiter=delimiter,
+        skip_rows=header,
+        units_rows=int(any(map(str.isalpha, first)) and not any(map(str.isdigit, first))),
+        decimal=form.decimal or _decimal(cell for cells in rows for cell in cells),
+    )
+
+
+def names_of(path: Path, form: Format) -> list[str]:
+    """Return the names in the header of a log whose format is understood."""
+    names = _cells(next(islice(_lines(path, form), form.skip_rows or 0, None), ""), form.delimiter or ",")
+    if not any(re.search(r"[^\W\d]", name) for name in names):
+        raise ValueError(f"{path}: {NO_HEADER}")
+    return names
+
+
+def blocks(path: Path, form: Format, names: Sequence[str]) -> Iterator[Block]:
+    """Yield the rows below the header. A line is a row: an unclosed quote spoils its own line only."""
+    first = (form.skip_rows or 0) + 1 + form.units_rows
+    numbered = islice(enumerate(_lines(path, form), start=1), first, None)
+    while lines := list(islice(numbered, BLOCK)):
+        yield _block(path, form, names, lines)
+
+
+def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple[int, str]]) -> Block:
+    delimiter, at, rows, refused = form.delimiter or ",", [], [], []
+    for line, text in lines:
+        try:
+            cells = split(text, delimiter)
+        except csv.Error as error:
+            why = f"close the quotes of this row ({error})"
+            refused.append(Refusal(line, "broken_quotes", f"{path}:{line}: row = {_shown(text)}: {why}"))
+            continue
+        if len(cells) == len(names):
+            at.append(line)
+            rows.append(cells)
+        elif text.strip():
+            why = f"{len(cells)} cells under {len(names)} columns: quote a cell that holds {delimiter!r}"
+            refused.append(Refusal(line, "cell_count", f"{path}:{line}: row = {_shown(text)}: {why}"))
+    return Block(pd.DataFrame(rows, index=at, columns=list(names), dtype=object), refused)
+
+
+def split(text: str, delimiter: str) -> list[str]:
+    """Return the cells of a line, stripped; raises csv.Error.
+
+    The standard library's reader: of a bad row pandas tells neither the line nor, where cells are missing, that it is.
+    """
+    return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, strict=True), [])]
+
+
+def _cells(text: str, delimiter: str) -> list[str]:
+    """The cells of a line; none of one that is blank or broken."""
+    try:
+        return split(text, delimiter) if text.strip() else []
+    except csv.Error:
+        return []
+
+
+def _lines(path: Path, form: Format) -> Iterator[str]:
+    # A broken byte must not end the import: it becomes a character that no number has.
+    with path.open(encoding=form.encoding, errors="replace") as file:
+        yield from file
+
+
+def _encoding(path: Path) -> str:
+    """That of the byte order mark; else UTF-8 where all of the file is, else that of Western Windows."""
+    decoder = codecs.getincrementaldecoder("utf-8")()
+    with path.open("rb") as file:
+        head = file.read(4)
+        for mark, encoding in MARKS:
+            if head.startswith(mark):
+                return encoding
+        try:
+            decoder.decode(head)
+            while piece := file.read(1 << 20):
+                decoder.decode(piece)
+            decoder.decode(b"", final=True)
+        except UnicodeDecodeError:
+            return "cp1252"
+    return "utf-8"
+
+
+def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:
+    """Delimiter and header line: where all names stand that must be there, else as most lines have it."""
+    delimiters = DELIMITERS if form.delimiter is None else (form.delimiter,)
+    if form.skip_rows is not None:
+        below = lines[form.skip_rows : form.skip_rows + 1] or [""]
+        return max(delimiters, key=below[0].count), form.skip_rows
+    wanted = {form.named.get("time", "time"), *form.named.values(), *form.axles}
+    places = [{form.named.get(ours, ours) for ours in group} for group in PLACES]
+    split_up = {delimiter: [_cells(text, delimiter) for text in lines] for delimiter in delimiters}
+    for number in range(len(lines)):
+        for delimiter in delimiters:
+            names = set(split_up[delimiter][number])
+            if wanted <= names and any(place <= names for place in places):
+                return delimiter, number
+    widths = {delimiter: Counter(map(len, split_up[delimiter])) for delimiter in delimiters}
+
+    def usual(delimiter: str) -> tuple[int, int]:
+        """How many lines have the commonest number of cells, and that number; one cell is none."""
+        return max(((count, width) for width, count in widths[delimiter].items() if width > 1), default=(0, 0))
+
+    delimiter = max(delimiters, key=usual)
+    width = usual(delimiter)[1] or 1
+    return delimiter, next((number for number, cells in enumerate(split_up[delimiter]) if len(cells) >= width), 0)
+
+
+def _decimal(cells: Iterable[str]) -> str:
+    """The sign that more numbers have."""
+    texts = list(cells)
+    commas, points = (sum(map(bool, map(sign.fullmatch, texts))) for sign in (_WITH_COMMA, _WITH_POINT))
+    return "," if commas > points else "."
+
+
+def _shown(text: str) -> str:
+    text = text.strip()
+    return repr(text if len(text) <= 60 else text[:60] + "...")

@@ -1,0 +1,63 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What a person is told of a log: why rows are refused, how it was read, and from where to where its columns go."""
+
+import sys
+from collections import Counter
+from collections.abc import Iterator
+
+from ...core.physics.train import KMH
+from .format import LIMITS, PRESSURES, Format
+from .text import Refusal
+from .whole import Log, moment
+
+SHOWN = 5
+"""Lines for each reason why rows are refused."""
+
+
+class Refused:
+    """Counts the refused rows, and says the first `SHOWN` of each reason on standard error."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[str] = Counter()
+
+    def tell(self, refusal: Refusal) -> None:
+        self.counts[refusal.reason] += 1
+        if self.counts[refusal.reason] <= SHOWN:
+            print(refusal.message, file=sys.stderr)
+
+    def end(self) -> None:
+        for reason, count in sorted(self.counts.items()):
+            if count > SHOWN:
+                print(f"{count - SHOWN} more: {reason}", file=sys.stderr)
+
+
+def read_as(form: Format) -> str:
+    """Say how a log was understood, and what says otherwise."""
+    header = (form.skip_rows or 0) + 1
+    text = f"{form.encoding}, delimiter {form.delimiter!r}, decimal {form.decimal!r}, header in line {header}"
+    text += f", line {header + 1} left out as units" if form.units_rows else ""
+    time = (
+        f"times in {form.time_unit}" if form.time_format is None else f"times {form.time_format!r} of {form.time_zone}"
+    )
+    otherwise = (
+        "--encoding, --delimiter, --decimal, --skip-rows, --time-unit, --time-format and --time-zone say otherwise"
+    )
+    return f"read as {time}" if form.encoding is None else f"read as {text}, {time}; {otherwise}"
+
+
+def ranges(log: Log) -> Iterator[str]:
+    """Say from where to where the columns go, so that a wrong unit shows."""
+    t_ns = log.rows["t_ns"].to_numpy()
+    first, length_s = t_ns[0], (t_ns[-1] - t_ns[0]) / 1e9
+    step_s = length_s / max(len(t_ns) - 1, 1)
+    yield f"{'time':<16} from {moment(first)} for {length_s:.9g} s, a row every {step_s:.3g} s"
+    for name in log.rows.columns.drop("t_ns"):
+        least, most = log.rows[name].min(), log.rows[name].max()
+        if name in PRESSURES:
+            least, most = ((value - log.form.ambient_pressure_pa) / 1e5 for value in (least, most))
+            yield f"{name:<16} {least:.3g} to {most:.3g} bar above the air"
+        elif name == "speed":
+            yield f"{name:<16} {least / KMH:.4g} to {most / KMH:.4g} km/h"
+        else:
+            yield f"{name:<16} {least:.9g} to {most:.9g} {LIMITS.get(name, LIMITS['wheel_speed'])[2].split(':')[0]}"

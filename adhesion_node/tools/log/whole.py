@@ -1,0 +1,120 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""A log as a whole: its times in order and in their zone, the chainage as the train runs, the demand in the pipe."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from .cells import is_clock
+from .format import PRESSURE_UNITS, Format
+from .rows import Columns, measured, open_log
+from .text import Refusal
+
+DAY_NS = 86_400 * 10**9
+
+FULL_DROP_PA = 1.5e5
+"""The pipe's pressure falls by so much for a full brake (UIC 540)."""
+
+SET_BACK = "the clock was set back; --time-zone where summer time ended, else cut the log there; or unsorted? --sort"
+
+
+class Log(NamedTuple):
+    """What a log has measured."""
+
+    form: Format
+    """With nothing left open."""
+    columns: Columns
+    rows: pd.DataFrame
+    """By line of the log: `t_ns`, which rises, and every column in SI, NaN where a cell is empty."""
+    notes: tuple[str, ...]
+    """What was done with it."""
+
+
+def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
+    """Read a log and `tell` of every row that is refused.
+
+    Raises ValueError when the file is empty or a column is missing.
+    """
+    source = open_log(path, form)
+    parts = []
+    for rows, refused in measured(str(path), source):
+        parts.append(rows)
+        for each in refused:
+            tell(each)
+    rows, notes = _in_zone(_over_midnight(pd.concat(parts), source.form), source.form)
+    rows, refused = _rising(rows.sort_values("t_ns", kind="stable") if form.sort else rows, str(path))
+    for each in refused:
+        tell(each)
+    if form.direction == "down" and "position" in rows:
+        rows["position"] = -rows["position"]
+        notes.append("direction: the chainage falls, positions are minus the chainage; so are those of track")
+    if "brake_pipe" in rows:
+        rows, note = _demanded(rows, source.form)
+        notes.append(note)
+    return Log(source.form, source.columns, rows, tuple(notes))
+
+
+def _over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
+    """The times of a clock go on after midnight."""
+    if is_clock(form.time_format) and not form.sort:
+        days = np.cumsum(np.diff(rows["t_ns"], prepend=rows["t_ns"].iloc[:1]) < -DAY_NS / 2)
+        rows["t_ns"] += days * DAY_NS
+    return rows
+
+
+def _in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
+    """The times of a zone as UTC; where an hour is there twice and the rows do not tell which, it is summer time."""
+    if form.time_format is None or form.time_zone == "UTC" or is_clock(form.time_format):
+        return rows, []
+    local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
+    try:
+        utc = local.tz_localize(zone, ambiguous="infer", nonexistent="shift_forward")
+    except ValueError:
+        utc = local.tz_localize(zone, ambiguous=np.ones(len(local), dtype=bool), nonexistent="shift_forward")
+    rows["t_ns"] = utc.as_unit("ns").asi8
+    return rows, [f"time: local of {zone}"]
+
+
+def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
+    """The rows whose time is later than that of all before, and why not the others."""
+    t_ns = rows["t_ns"].to_numpy()
+    reached = np.maximum.accumulate(t_ns)
+    late = np.append(False, t_ns[1:] <= reached[:-1]) if len(t_ns) else np.zeros(0, dtype=bool)
+    falls = np.count_nonzero(np.diff(t_ns) < 0)
+    cure = SET_BACK if 0 < falls < 3 and late.sum() > 10 * falls else "drop repeated rows, or sort the log: --sort"
+    refused = [
+        Refusal(
+            line := int(rows.index[i]),
+            "time_not_rising",
+            f"{source}:{line}: time = {moment(t_ns[i])}: time must rise, the last good row has "
+            f"{moment(reached[i - 1])}: {cure}",
+        )
+        for i in np.flatnonzero(late)
+    ]
+    return rows[~late], refused
+
+
+def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, str]:
+    """The rows with the demand that the pressure of the brake pipe is."""
+    pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.pressure_unit
+    scale = PRESSURE_UNITS[unit]
+    released = pipe.quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
+    share = ((released - pipe) / FULL_DROP_PA).clip(0.0, 1.0)
+    rows = rows.drop(columns="brake_pipe").assign(brake_demand=form.ambient_pressure_pa + share * form.full_pressure_pa)
+    return rows, (
+        f"brake pipe: released at {released / scale:g} {unit}, --pipe-released; a full brake {FULL_DROP_PA / scale:g} "
+        f"{unit} below; as the demand of {form.full_pressure_pa:g} Pa in the cylinders, --full-pressure"
+    )
+
+
+def moment(t_ns: int) -> str:
+    """Write a time: seconds, or a date where it is one.
+
+    >>> moment(1_500_000_000), moment(1_700_000_000_000_000_000)
+    ('1.5 s', '2023-11-14T22:13:20')
+    """
+    return f"{t_ns / 1e9:.9g} s" if t_ns < 10**17 else pd.Timestamp(t_ns).isoformat()

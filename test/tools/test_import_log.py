@@ -1,0 +1,300 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Logs as recorders write them: each is read as it is meant, or said to be odd with the option that cures it."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_import_csv import Import, importing
+
+from adhesion_node.tools import import_csv
+from adhesion_node.tools.log.text import SAMPLE
+from adhesion_node.wire.topics import BRAKE_DEMAND, BRAKE_PRESSURE, SPEED
+
+__all__ = ["importing"]
+
+S, AIR_PA = 10**9, 101_325.0
+
+
+def ride(seconds: int = 60) -> pd.DataFrame:
+    """A train at 180 km/h that brakes with 0.8 m/s^2 from 20 s on; ten rows a second, in SI."""
+    t_s = np.arange(10 * seconds) / 10.0
+    braked_s = (t_s - 20.0).clip(0.0)
+    speed = 50.0 - 0.8 * braked_s
+    place = 50.0 * t_s - 0.4 * braked_s**2 + 1000.0
+    braking = t_s >= 20.0
+    columns = {"time": t_s, "position": place, "speed": speed, "brake_pressure": 3e5 * braking}
+    return pd.DataFrame(columns).round(3)
+
+
+def text(rows: pd.DataFrame, delimiter: str = ",", decimal: str = ".", head: str = "") -> str:
+    return head + str(rows.to_csv(index=False, sep=delimiter, decimal=decimal))
+
+
+def read_as(importing: Import, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """What a dry run of the newest log says."""
+    import_csv.main([str(importing.log), "--dry-run"])
+    return capsys.readouterr().out.splitlines()
+
+
+WRITTEN: list[tuple[str, Callable[[pd.DataFrame], str | bytes], str]] = [
+    ("semicolons", lambda rows: text(rows, ";"), "delimiter ';'"),
+    ("tabs", lambda rows: text(rows, "\t"), "delimiter '\\t'"),
+    ("bars", lambda rows: text(rows, "|"), "delimiter '|'"),
+    ("decimal comma", lambda rows: text(rows, ";", ","), "delimiter ';', decimal ','"),
+    ("quoted comma", lambda rows: rows.to_csv(index=False, decimal=",", quoting=csv.QUOTE_ALL), "decimal ','"),
+    ("latin-1", lambda rows: text(rows, head="Zug: Tür geöffnet\n").encode("latin-1"), "cp1252"),
+    ("utf-16", lambda rows: text(rows, ";").encode("utf-16"), "utf-16"),
+    ("a mark", lambda rows: text(rows).encode("utf-8-sig"), "utf-8-sig"),
+    ("a preamble", lambda rows: text(rows, head="sep=,\nTrain 4711, car 3\n\ntime,2024-11-21\n"), "header in line 5"),
+    ("units", lambda rows: text(rows).replace("\n", "\ns,m,m/s,Pa\n", 1), "line 2 left out as units"),
+]
+
+
+@pytest.mark.parametrize(("write", "said"), [case[1:] for case in WRITTEN], ids=[case[0] for case in WRITTEN])
+def test_however_it_is_written_a_log_is_read_and_how_is_said(
+    importing: Import, capsys: pytest.CaptureFixture[str], write: Callable[[pd.DataFrame], str | bytes], said: str
+) -> None:
+    rows = ride()
+    assert importing(write(rows)) == 0, importing.errors
+    assert importing.summary["written"] == len(rows)
+    assert [sample.position_m for sample in importing.positions()] == rows["position"].tolist()
+    (line,) = [line for line in read_as(importing, capsys) if line.startswith("read as")]
+    assert said in line
+    assert all(option in line for option in ("--encoding", "--delimiter", "--decimal", "--skip-rows", "--time-format"))
+
+
+@pytest.mark.parametrize(
+    ("written", "options", "first_ns"),
+    [
+        ("%H:%M:%S,%f", [], 29_703 * S),
+        ("%d.%m.%Y %H:%M:%S", [], 1_732_176_903 * S),
+        ("%d.%m.%Y %H:%M:%S,%f", ["--time-zone", "Europe/Berlin"], (1_732_176_903 - 3600) * S),
+        ("%d.%m.%y %H:%M:%S.%f", [], 1_732_176_903 * S),
+        ("%m/%d/%Y %H:%M:%S", [], 1_732_176_903 * S),
+        ("%Y-%m-%dT%H:%M:%S.%fZ", ["--time-zone", "Europe/Berlin"], 1_732_176_903 * S),
+        ("%Y-%m-%d %H:%M:%S", [], 1_732_176_903 * S),
+        ("%Hh%Mm%S %d-%b-%Y", ["--time-format", "%Hh%Mm%S %d-%b-%Y"], 1_732_176_903 * S),
+    ],
+)
+def test_times_as_recorders_write_them(importing: Import, written: str, options: list[str], first_ns: int) -> None:
+    moments = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(range(30), unit="s")
+    rows = ride()[: 10 * len(moments) : 10].assign(time=moments.strftime(written))
+    assert importing(text(rows, ";"), *options) == 0, importing.errors
+    assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S for i in range(30)]
+
+
+@pytest.mark.parametrize(("unit", "per_s"), [("s", 1), ("ms", 10**3), ("us", 10**6), ("ns", 10**9)])
+def test_times_since_1970_tell_their_unit(importing: Import, unit: str, per_s: int) -> None:
+    begin = 1_732_176_903
+    assert importing(f"time,speed\n{begin * per_s},1\n{(begin + 1) * per_s},1\n") == 0
+    assert [SPEED.read(message).t_ns for message in importing.messages("speed")] == [begin * S, (begin + 1) * S]
+
+
+def test_the_clock_goes_on_after_midnight(importing: Import) -> None:
+    assert importing("time,speed\n23:59:59.9,1\n00:00:00.0,1\n00:00:00.1,1\n") == 0
+    times = [SPEED.read(message).t_ns for message in importing.messages("speed")]
+    assert np.diff(times).tolist() == [S // 10, S // 10]
+
+
+def test_the_end_of_summer_time_is_no_step_of_the_clock(importing: Import) -> None:
+    """At 3 o'clock it is 2 o'clock again."""
+    log = "time,speed\n27.10.2024 02:59:58,1\n27.10.2024 02:59:59,1\n27.10.2024 02:00:00,1\n27.10.2024 02:00:01,1\n"
+    assert importing(log, "--time-zone", "Europe/Berlin") == 0
+    assert np.diff([SPEED.read(message).t_ns for message in importing.messages("speed")]).tolist() == [S] * 3
+
+
+def test_unsorted_rows_are_sorted_on_demand_and_the_option_is_named(importing: Import, tmp_path: Path) -> None:
+    rows = ride()
+    mixed = text(rows.sample(frac=1.0, random_state=1))
+    assert importing(mixed) == 1
+    assert importing.errors[0].endswith("drop repeated rows, or sort the log: --sort")
+    assert len(importing.errors) < 12, "five lines and a count, not one for each of the rows"
+    importing.output = tmp_path / "sorted"
+    assert importing(mixed, "--sort") == 0
+    assert [sample.position_m for sample in importing.positions()] == rows["position"].tolist()
+
+
+def test_a_log_of_speed_and_pressure_alone_is_enough(importing: Import) -> None:
+    assert importing(text(ride().drop(columns="position"))) == 0
+    assert set(importing.summary["messages"]) == {"/speed", "/brake_pressure"}
+
+
+def kilometre(rows: pd.DataFrame) -> pd.Series[Any]:
+    return 120_000.0 - rows["position"]
+
+
+ODD: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], str, list[str]]] = [
+    ("falling", lambda r: r.assign(position=kilometre(r)), "the positions fall", ["--direction", "down"]),
+    (
+        "falling alone",
+        lambda r: r.assign(position=kilometre(r)).drop(columns="speed"),
+        "the positions fall",
+        ["--direction", "down"],
+    ),
+    ("bar", lambda r: r.assign(brake_pressure=r.brake_pressure / 1e5), "in bar", ["--pressure-unit", "bar"]),
+    ("kPa", lambda r: r.assign(brake_pressure=r.brake_pressure / 1e3), "in kpa", ["--pressure-unit", "kpa"]),
+    (
+        "absolute",
+        lambda r: r.assign(brake_pressure=r.brake_pressure + 1e5),
+        "never falls below 1 bar",
+        ["--pressure-kind", "absolute"],
+    ),
+    ("km/h", lambda r: r.assign(speed=3.6 * r.speed), "0.278 times the speed", ["--speed-unit", "kmh"]),
+    ("km", lambda r: r.assign(position=r.position / 1e3), "0.001 times the speed", ["--position-unit", "km"]),
+    (
+        "km alone",
+        lambda r: r.assign(position=r.position / 1e3).drop(columns="speed"),
+        "creeps at 0.05 m/s",
+        ["--position-unit", "km"],
+    ),
+    (
+        "km/h alone",
+        lambda r: r.assign(speed=3.6 * r.speed).drop(columns="position"),
+        "648 km/h",
+        ["--speed-unit", "kmh"],
+    ),
+    ("ms", lambda r: r.assign(time=1e3 * r.time), "a row every 100 s", ["--time-unit", "ms"]),
+    (
+        "degrees",
+        lambda r: r.assign(position=47.0 + r.position / 111_181.0),
+        "are they degrees",
+        ["--lat", "position", "--lon", "lon"],
+    ),
+    (
+        "degrees alone",
+        lambda r: r.assign(position=47.0 + r.position / 111_181.0).drop(columns="speed"),
+        "are the positions degrees",
+        ["--lat", "position", "--lon", "lon"],
+    ),
+    (
+        "pipe",
+        lambda r: r.assign(brake_pressure=5e5 - r.brake_pressure / 2),
+        "5.0 bar while the train runs",
+        ["--pipe", "brake_pressure"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("spoil", "said", "cure"), [case[1:] for case in ODD], ids=[case[0] for case in ODD])
+def test_what_is_odd_is_said_with_the_option_that_cures_it(
+    importing: Import, tmp_path: Path, spoil: Callable[[pd.DataFrame], pd.DataFrame], said: str, cure: list[str]
+) -> None:
+    log = text(spoil(ride().assign(lon=8.0)))
+    assert importing(log) == 1
+    (odd,) = [line for line in importing.errors if "odd: " in line and said in line]
+    assert importing.summary["odd"] == [odd.removeprefix("import_csv: odd: ")]
+    for option in cure[::2]:
+        assert option in odd
+    importing.output = tmp_path / "cured"
+    assert importing(log, *cure) == 0, importing.errors
+
+
+def test_the_speed_of_a_step_of_the_clock_is_said(importing: Import) -> None:
+    rows = ride()
+    rows.loc[rows.time > 10.0, "time"] += 3600.0
+    assert importing(text(rows)) == 1
+    assert "the clock goes on by 3600 s at 10 s and the train does not" in importing.errors[0]
+    late = ride()
+    late.loc[late.time > 10.0, "time"] -= 5.0
+    importing.output = importing.output.with_name("back")
+    assert importing(text(late)) == 1
+    assert "the clock was set back" in importing.errors[0]
+
+
+def test_a_stop_of_ten_minutes_without_rows_is_no_step_of_the_clock(importing: Import) -> None:
+    rows = ride(89)
+    rows = pd.concat([rows, ride().assign(time=rows.time + 700.0, position=rows.position.iloc[-1] + ride().position)])
+    assert importing(text(rows)) == 0, importing.errors
+
+
+def test_the_chainage_is_turned_and_that_is_said(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:
+    assert importing("time,position\n0,5000\n1,4990\n", "--direction", "down") == 0
+    assert [sample.position_m for sample in importing.positions()] == [-5000.0, -4990.0]
+    import_csv.main([str(importing.log), "--dry-run", "--direction", "down"])
+    assert "positions are minus the chainage" in capsys.readouterr().out
+
+
+def test_the_brake_pipe_becomes_the_demand(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:
+    """UIC 540: 5 bar are released, 1.5 bar less the full brake."""
+    pipe = "time,speed,HL\n" + "".join(f"{i},20,{p}\n" for i, p in enumerate([5.0] * 20 + [4.25, 3.5, 0.0]))
+    assert importing(pipe, "--pipe", "HL", "--pressure-unit", "bar") == 0
+    demanded = [BRAKE_DEMAND.read(message).pressure_pa for message in importing.messages("brake_demand")]
+    assert demanded[-4:] == pytest.approx([0.0, 205e3, 410e3, 410e3])
+    import_csv.main([str(importing.log), "--dry-run", "--pipe", "HL", "--pressure-unit", "bar"])
+    assert "brake pipe: released at 5 bar, --pipe-released; a full brake 1.5 bar below" in capsys.readouterr().out
+    importing.output = importing.output.with_name("full")
+    options = ["--pipe-released", "4.8", "--full-pressure", "300000"]
+    assert importing(pipe, "--pipe", "HL", "--pressure-unit", "bar", *options) == 0
+    demanded = [BRAKE_DEMAND.read(message).pressure_pa for message in importing.messages("brake_demand")]
+    assert demanded[-3] == pytest.approx(300e3 * 0.55 / 1.5)
+
+
+def test_a_dry_run_shows_rows_and_writes_nothing(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:
+    importing(text(ride(), ";", ","))
+    options = ["--dry-run", "--output", str(importing.output.with_name("never"))]
+    assert import_csv.main([str(importing.log), *options]) == 0
+    out = capsys.readouterr().out
+    assert re.search(r"^2 +0 +1000\.0 +101325\.0 +50\.0$", out, re.MULTILINE)
+    assert re.search(r"^speed +65\.\d+ to 180 km/h$", out, re.MULTILINE)
+    assert re.search(r"^brake_pressure +0 to 3 bar above the air$", out, re.MULTILINE)
+    assert not importing.output.with_name("never").exists()
+    assert import_csv.main([str(importing.log)]) == 2
+    assert "name the recording with --output DIR, or look first with --dry-run" in capsys.readouterr().err
+
+
+def test_guesses_give_way_to_options(importing: Import) -> None:
+    log = "note\ntime;speed\n1,000;1,500\n2,000;2,500\n"
+    options = ["--delimiter", ";", "--skip-rows", "1", "--decimal", ",", "--encoding", "ascii", "--time-unit", "s"]
+    assert importing(log, *options) == 0
+    assert [SPEED.read(message)[:2] for message in importing.messages("speed")] == [(S, 1.5), (2 * S, 2.5)]
+    importing.output = importing.output.with_name("point")
+    assert importing(log, "--decimal", ".") == 2, "then they are no numbers"
+    assert "--decimal" in importing.errors[0]
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--encoding", "klingon"], "encoding = 'klingon': there is none of this name"),
+        (["--time-zone", "Berlin/Europe"], "time-zone = 'Berlin/Europe': there is none of this name"),
+        (["--skip-rows", "-1"], "skip-rows = -1: give the number of lines above the header"),
+        (["--full-pressure", "4.1"], "full-pressure = 4.1: give 100000 to 1000000 Pa, gauge"),
+    ],
+)
+def test_options_that_cannot_be_are_refused(importing: Import, options: list[str], message: str) -> None:
+    assert importing("time,speed\n1,2\n", *options) == 2
+    assert importing.errors[-1].startswith(f"import_csv: {message}")
+
+
+def test_a_guess_from_the_beginning_does_not_spoil_the_rest(importing: Import) -> None:
+    """Whole numbers first, then commas: said with the option that helps, and cured by it."""
+    log = "time;speed\n" + "".join(f"{i};20\n" for i in range(SAMPLE)) + f"{SAMPLE};20,5\n"
+    assert importing(log) == 1
+    assert "'20,5'" in importing.errors[0]
+    assert "--decimal" in importing.errors[0]
+    importing.output = importing.output.with_name("cured")
+    assert importing(log, "--decimal", ",") == 0
+
+
+def test_parquet_as_well(importing: Import, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("pyarrow")
+    rows = ride().assign(time=pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(ride().time, unit="s"))
+    rows.loc[3, "speed"] = np.nan
+    rows.to_parquet(tmp_path / "log.parquet")
+    assert import_csv.main([str(tmp_path / "log.parquet"), "--output", str(importing.output)]) == 0
+    assert "1 without speed" in capsys.readouterr().out
+    assert [sample.position_m for sample in importing.positions()] == rows["position"].tolist()
+    assert importing.positions()[1].t_ns == 1_732_176_903 * S + S // 10
+    assert BRAKE_PRESSURE.read(importing.messages("brake_pressure")[-1]).pressure_pa == pytest.approx(3e5)
+    (tmp_path / "none.parquet").write_bytes(b"PAR1")
+    assert import_csv.main([str(tmp_path / "none.parquet"), "--dry-run"]) == 2
+    assert "is no Parquet file" in capsys.readouterr().err
