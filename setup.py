@@ -17,6 +17,8 @@ PROGRAMS = (
 )
 
 # Recordings, frames, pictures, geographic positions, completion in the shell. The nodes of a train run without.
+# pandas, not polars: it is apt's, half as large, and reads the times and zones of recorders; of the import of a day
+# (360 000 rows, 44 s) reading takes 0.6 s by it, 0.1 s by polars, and took 3.4 s by a reader of our own.
 TOOLS = [
     "mcap>=1.5,<2",
     "zstandard>=0.22,<1",

@@ -138,7 +138,7 @@ def _work(options: argparse.Namespace) -> int:
     if options.dry_run:
         log, refused = read(Path(options.file), form)
         summary = _summary(log, refused)
-        lines = [log.rows.head(SHOWN).rename_axis("line").to_string()]
+        lines = ["the first rows, in SI, pressures absolute:", log.rows.head(SHOWN).rename_axis("line").to_string()]
     elif options.output:
         log, summary = convert(Path(options.file), Path(options.output), form)
         lines = [f"{summary['rows']} rows, {summary['written']} written to {summary['output']}"]

@@ -168,7 +168,7 @@ def _parquet(path: Path) -> pd.DataFrame:
     try:
         return pd.read_parquet(path)
     except ImportError:
-        raise ValueError(f"{path}: Parquet needs one package more: pip install pyarrow") from None
+        raise ValueError(f"{path}: Parquet needs pyarrow: pip install '.[parquet]'") from None
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: is no Parquet file ({error})") from None
 
