@@ -54,18 +54,30 @@ def normalised(log_weight: Array) -> Array:
 
 
 @kernel
-def moments(log_weight: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
-    """Mean and covariance of the mixture."""
-    weight = np.exp(log_weight - total(log_weight))
-    centre, spread = np.zeros(SIZE), np.zeros((SIZE, SIZE))
-    for h in range(weight.size):
+def _united(weight: Array, mean: Array, covariance: Array, group: Labels, centre: Array, spread: Array) -> float:
+    """Write mean and covariance of a mixture of some hypotheses; return their weight."""
+    whole = 0.0
+    for h in group:
+        whole += weight[h]
+    centre[:] = 0.0
+    spread[:] = 0.0
+    for h in group:
         for i in range(SIZE):
-            centre[i] += weight[h] * mean[h, i]
-    for h in range(weight.size):
+            centre[i] += weight[h] / whole * mean[h, i]
+    for h in group:
         for i in range(SIZE):
             for j in range(SIZE):
                 apart = (mean[h, i] - centre[i]) * (mean[h, j] - centre[j])
-                spread[i, j] += weight[h] * (covariance[h, i, j] + apart)
+                spread[i, j] += weight[h] / whole * (covariance[h, i, j] + apart)
+    return whole
+
+
+@kernel
+def moments(log_weight: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """Mean and covariance of the mixture."""
+    centre, spread = np.empty(SIZE), np.empty((SIZE, SIZE))
+    weight = np.exp(log_weight - total(log_weight))
+    _united(weight, mean, covariance, np.arange(weight.size), centre, spread)
     return centre, spread
 
 
@@ -137,52 +149,43 @@ def _order(log_weight: Array) -> Labels:
 
 
 @kernel
-def _alike(bank: Bank, one: int, other: int, rule: Pruning) -> bool:
-    """Whether two hypotheses have one label, and the same speed and adhesion but for parts of their deviations."""
-    if bank.noise[one] != bank.noise[other] or bank.law[one] != bank.law[other] or bank.kind[one] != bank.kind[other]:
-        return False
-    for i in (MU, SPEED):
-        std = math.sqrt(bank.covariance[one, i, i])
-        ratio = math.sqrt(bank.covariance[other, i, i]) / std
-        apart = abs(bank.mean[other, i] - bank.mean[one, i])
-        if not (apart < rule.near * std + 1e-9 and 1.0 / rule.factor < ratio < rule.factor):
-            return False
-    return True
-
-
-@kernel
 def pruned(bank: Bank, rule: Pruning) -> tuple[Labels, Array, Array, Array]:
     """Which hypotheses stand for those that are left, and their means, covariances and weights."""
     mean, covariance, log_weight = bank.mean, bank.covariance, bank.log_weight
-    whole = total(log_weight[log_weight > rule.least])
-    order = _order(log_weight)
-    while order.size and not log_weight[order[-1]] > rule.least:
-        order = order[:-1]
-    left = order.size
-    kept, means = np.empty(left, dtype=np.intp), np.empty((left, SIZE))
-    covariances, weights = np.empty((left, SIZE, SIZE)), np.empty(left)
-    gone = np.zeros(left, dtype=np.bool_)
-    count = 0
-    for first in range(left):
-        if gone[first]:
-            continue
+    count = log_weight.size
+    order, label = _order(log_weight), (bank.noise * 64 + bank.law) * 64 + bank.kind
+    centre, std, weight = np.empty((count, 2)), np.empty((count, 2)), np.empty(count)
+    for h in range(count):
+        weight[h] = math.exp(log_weight[h]) if log_weight[h] > rule.least else 0.0
+        for part, i in enumerate((MU, SPEED)):
+            centre[h, part], std[h, part] = mean[h, i], math.sqrt(covariance[h, i, i])
+    left, group = 0, np.empty(count, dtype=np.intp)
+    kept, means, sums = np.empty(count, dtype=np.intp), np.empty((count, SIZE)), np.empty(count)
+    covariances = np.empty((count, SIZE, SIZE))
+    gone = weight == 0.0
+    for first in range(count):
         one = order[first]
-        group = np.empty(left - first, dtype=np.intp)
-        group[0], size = one, 1
-        for index in range(first + 1, left):
+        if gone[one]:
+            continue
+        size = 0
+        for index in range(first, count):
             h = order[index]
-            if not gone[index] and _alike(bank, one, h, rule):
-                group[size], gone[index] = h, True
+            if gone[h] or label[h] != label[one]:
+                continue
+            alike = True
+            for part in range(2):
+                ratio = std[h, part] / std[one, part]
+                near = abs(centre[h, part] - centre[one, part]) < rule.near * std[one, part] + 1e-9
+                alike = alike and near and 1.0 / rule.factor < ratio < rule.factor
+            if alike or h == one:
+                group[size], gone[h] = h, True
                 size += 1
-        kept[count], weights[count] = one, log_weight[one] - whole
-        means[count], covariances[count] = mean[one], covariance[one]
+        kept[left], means[left], covariances[left], sums[left] = one, mean[one], covariance[one], weight[one]
         if size > 1:
-            group = group[:size]
-            weights[count] = total(log_weight[group]) - whole
-            means[count], covariances[count] = moments(log_weight[group], mean[group], covariance[group])
-        count += 1
-    kept, means, covariances, weights = kept[:count], means[:count], covariances[:count], weights[:count]
-    if count > rule.most:
-        best = np.sort(_order(weights)[: rule.most])
-        kept, means, covariances, weights = kept[best], means[best], covariances[best], weights[best]
-    return kept, means, covariances, weights - total(weights)
+            sums[left] = _united(weight, mean, covariance, group[:size], means[left], covariances[left])
+        left += 1
+    logs = np.log(sums[:left])
+    chosen = np.arange(left)
+    if left > rule.most:
+        chosen = np.sort(_order(logs)[: rule.most])
+    return kept[chosen], means[chosen], covariances[chosen], normalised(logs[chosen])
