@@ -9,6 +9,7 @@ import numpy as np
 from .bank import following as bank
 from .bank.verdict import Findings, found
 from .belief.gaussian import Gaussian
+from .belief.rail import Rail
 from .config import Config
 from .estimate import Estimate, estimate_of, unknown
 from .intake.outcome import Event, Outcome, counted
@@ -38,8 +39,12 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     if measurement.has_position and memory.misled:
         detail = f"position x = {measurement.position_m:.12g}"
         state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
-    mean, _ = memory.bank.moments()
-    rail = state.knowledge.aged(config, measurement.t_ns, Gaussian(mean[:2], np.zeros((2, 2))))
+    before = memory.bank
+
+    def rail() -> Rail:
+        mean, _ = before.moments()
+        return state.knowledge.aged(config, measurement.t_ns, Gaussian(mean[:2], np.zeros((2, 2))))
+
     off = bank.off(config, memory, measurement)
     stepping = state.stepping.after(config, memory, measurement, off)
     size_m = stepping.size_m(off.std_m)

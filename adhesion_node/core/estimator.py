@@ -72,7 +72,7 @@ def step(config: Config, state: State, sample: Sample) -> tuple[State, Estimate 
 
 def advance(config: Config, state: State, sample: Sample) -> tuple[State, tuple[Estimate, ...]]:
     """Take one sample as `step` does; return every estimate that falls due."""
-    state = state._replace(events=())
+    state = state._replace(events=()) if state.events else state
     if not sample.is_valid():
         return state.told(Event(Outcome.INVALID, repr(sample))), ()
     return _passed(config, state, gate.push(state.gate, state.inbox, sample))

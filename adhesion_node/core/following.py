@@ -43,4 +43,4 @@ def _unseen(config: Config, state: State, measurement: Measurement) -> tuple[Sta
     before, due = state.repeated.before, state.unseen % config.step == 0
     event = Event(Outcome.STUCK, f"position x = {measurement.position_m:.12g}")
     state = state._replace(unseen=state.unseen + 1).told(event)
-    return state, blind_estimate(config, before, measurement.t_ns) if due and before else None
+    return state, blind_estimate(config, before.estimate, measurement.t_ns) if due and before else None

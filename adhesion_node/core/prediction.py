@@ -33,15 +33,19 @@ def predict(config: Config, estimate: Estimate) -> Prediction:
     slows down. Its brake is that of the configured confidence. The nominal curve follows the identified law.
     """
     resistance = config.track.least_resistance(estimate.position_m)
-    weakest = max(1.0 - float(ndtri(config.confidence)) * config.brake_error, 0.0)
-    cautious = replace(config.train, rigging_efficiency=max(config.train.rigging_efficiency * weakest, 1e-3))
     return Prediction(
         estimate,
-        _curve(cautious, estimate.speed_mps, estimate.mu_lower, resistance)
+        _curve(_cautious(config), estimate.speed_mps, estimate.mu_lower, resistance)
         if estimate.ahead is None
         else _curve(config.train, estimate.speed_mps, estimate.ahead, resistance),
         None if estimate.withheld else _curve(config.train, estimate.speed_mps, _expected(estimate), resistance),
     )
+
+
+def _cautious(config: Config) -> Train:
+    """The train with the weakest brake that it may have."""
+    weakest = max(1.0 - float(ndtri(config.confidence)) * config.brake_error, 0.0)
+    return replace(config.train, rigging_efficiency=max(config.train.rigging_efficiency * weakest, 1e-3))
 
 
 def _expected(estimate: Estimate) -> float | AdhesionLaw:

@@ -20,6 +20,30 @@ from .intake.samples import Measurement
 from .methods.protocol import AnyMethod, MethodWindow
 
 
+class Sure(NamedTuple):
+    """What was known at some time. The numbers are not made before they are asked for, which is rare."""
+
+    seen: Estimate
+    """The last estimate."""
+    memory: Memory | None
+
+    @property
+    def estimate(self) -> Estimate:
+        """The last estimate; where the bank is, with position and speed as of the newest measurement."""
+        memory = self.memory
+        if memory is None or memory.fixes < 2:
+            return self.seen
+        mean, covariance = memory.bank.moments()
+        belief = Gaussian(mean[:2], covariance[:2, :2])
+        return self.seen._replace(
+            t_ns=memory.t_ns,
+            position_m=float(mean[POSITION]),
+            speed_mps=float(mean[SPEED]),
+            position_std_m=belief.position_std,
+            speed_std_mps=belief.speed_std,
+        )
+
+
 class State(NamedTuple):
     """Everything the estimator remembers. Immutable: `step` returns a new one."""
 
@@ -49,7 +73,7 @@ class State(NamedTuple):
     """Measurements accepted since the last estimate."""
     seen: Estimate | None = None
     """The last estimate that positions have borne out."""
-    repeated: Repeated[Estimate] = Repeated(math.nan, 0, None)
+    repeated: Repeated[Sure] = Repeated(math.nan, 0, None)
     pace: Pace = Pace()
     unseen: int = 0
     """Measurements in a row of a position sensor that is stuck."""
@@ -72,23 +96,14 @@ class State(NamedTuple):
         return math.nan if self.belief is None else float(self.belief.mean[1])
 
     @property
-    def sure(self) -> Estimate | None:
-        """The last estimate; where the bank is, with position and speed as of the newest measurement."""
-        memory = self.memory
-        if self.seen is None or memory is None or memory.fixes < 2:
-            return self.seen
-        mean, covariance = memory.bank.moments()
-        belief = Gaussian(mean[:2], covariance[:2, :2])
-        return self.seen._replace(
-            t_ns=memory.t_ns,
-            position_m=float(mean[POSITION]),
-            speed_mps=float(mean[SPEED]),
-            position_std_m=belief.position_std,
-            speed_std_mps=belief.speed_std,
-        )
+    def sure(self) -> Sure | None:
+        """What is known now."""
+        return None if self.seen is None else Sure(self.seen, self.memory)
 
     def told(self, *events: Event) -> State:
         """The state after events, which are counted."""
+        if not events:
+            return self
         return self._replace(counts=counted(self.counts, *events), events=self.events + events)
 
     def forgotten(self) -> State:

@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -151,11 +151,11 @@ def met(config: Config, measurement: Measurement) -> Memory:
     for component, variance in variances.items():
         bank.covariance[:, component, component] = variance
     memory = Memory(bank.normalised(), measurement.t_ns - 1, declared)
-    return followed(config, memory, measurement, Rail(0.0, 1.0, 0.0))
+    return followed(config, memory, measurement, lambda: Rail(0.0, 1.0, 0.0))
 
 
-def followed(config: Config, memory: Memory, measurement: Measurement, rail: Rail) -> Memory:
-    """The train followed up to a measurement, which is taken in; `rail` is known where a braking opens."""
+def followed(config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail]) -> Memory:
+    """The train followed up to a measurement, which is taken in; `rail` is asked for where a braking opens."""
     pressures, speeds = _pressures(measurement), _speeds(config, measurement)
     if measurement.brake_pressure_pa is None and measurement.demand_pa is None:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
@@ -257,7 +257,7 @@ def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Me
     return memory._replace(wheels=wheels, bank=bank)
 
 
-def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
+def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     """Open or close a braking, ask what has changed, weigh what wheels and slide protection tell."""
     bank, now_s = memory.bank, memory.t_ns / S
     speed = float(bank.weight @ bank.mean[:, SPEED])
@@ -267,8 +267,9 @@ def _judged(config: Config, memory: Memory, rail: Rail) -> Memory:
     braked = pressed and speed >= config.slowest_mps
     if braked and not memory.braked:
         likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
+        known = rail()
         return memory._replace(
-            bank=opened(config, likely, rail.mu, rail.std, now_s), since_s=0.0, seen=1, told_s=0.0, known=rail
+            bank=opened(config, likely, known.mu, known.std, now_s), since_s=0.0, seen=1, told_s=0.0, known=known
         )
     if memory.braked and not braked:
         return memory._replace(bank=closed(bank), seen=0)

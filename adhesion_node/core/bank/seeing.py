@@ -72,7 +72,7 @@ def acceleration_seen(
 
 def corrected(bank: Bank, seen: Observation) -> Bank:
     """Take an observation in; the weights are not normalised."""
-    variance = np.asarray(np.broadcast_to(seen.variance, seen.innovation.shape), np.float64, order="C", copy=True)
+    variance = seen.variance + np.zeros(seen.innovation.size)
     mean, covariance, log_weight = weighing.corrected(bank, seen.innovation, seen.slope, variance, CLIPPED)
     return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight)
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..belief.rail import Rail
@@ -61,7 +62,7 @@ class Stepping(NamedTuple):
         mean = sum(self.off_m) / AGREEING
         return mean if len(self.off_m) == AGREEING and abs(mean) > MEAN_SIGMA * std_m else 0.0
 
-    def taken(self, config: Config, size_m: float, rail: Rail) -> tuple[Memory, Stepping]:
+    def taken(self, config: Config, size_m: float, rail: Callable[[], Rail]) -> tuple[Memory, Stepping]:
         """The train followed anew from before the step on, which moves its position and nothing else."""
         assert self.before is not None  # there is no size without it
         bank = self.before.bank

@@ -26,7 +26,7 @@ PACE_NS = 2_000_000_000
 
 
 class Motion(Protocol):
-    """What was known of the train's motion at some time: an estimate."""
+    """What was known of the train's motion at some time."""
 
     @property
     def t_ns(self) -> int: ...
@@ -38,27 +38,35 @@ class Motion(Protocol):
     def speed_std_mps(self) -> float: ...
 
 
-Known = TypeVar("Known", bound=Motion)
+class Known(Protocol):
+    """It can tell what was known at some time."""
+
+    @property
+    def estimate(self) -> Motion: ...
 
 
-class Repeated(NamedTuple, Generic[Known]):
+Of = TypeVar("Of", bound=Known)
+
+
+class Repeated(NamedTuple, Generic[Of]):
     """A position, since when it has been the same, and what was known before."""
 
     position_m: float
     since_ns: int
-    before: Known | None
+    before: Of | None
 
-    def after(self, measurement: Measurement, known: Known | None) -> Repeated[Known]:
+    def after(self, measurement: Measurement, known: Of | None) -> Repeated[Of]:
         """Note the next position; `known` is what is known now."""
         same = measurement.position_m == self.position_m and measurement.t_ns >= self.since_ns
         return self if same else Repeated(measurement.position_m, measurement.t_ns, known)
 
     def is_stuck(self, measurement: Measurement) -> bool:
         """Whether the train must have moved on from a position that is still the same."""
-        if self.before is None:
+        if self.before is None or measurement.t_ns == self.since_ns:  # most positions are new
             return False
-        known_s = abs(self.since_ns - self.before.t_ns) * 1e-9
-        slowest = max(abs(self.before.speed_mps) - 3.0 * self.before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
+        before = self.before.estimate
+        known_s = abs(self.since_ns - before.t_ns) * 1e-9
+        slowest = max(abs(before.speed_mps) - 3.0 * before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
         return least_way(slowest, (measurement.t_ns - self.since_ns) * 1e-9) >= stuck_way(measurement.variance_m2)
 
 

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right, insort
+from bisect import bisect_left, insort
 from typing import Any, NamedTuple
 
 from .outcome import Outcome
@@ -23,7 +23,7 @@ class Stream(NamedTuple):
     """Samples of one sensor that may still be needed."""
 
     samples: tuple[Any, ...] = ()
-    """Sorted by t_ns, each stamp once."""
+    """Sorted by t_ns, which is the first of their fields, each stamp once."""
     newest_ns: int | None = None
     """Newest stamp that has come."""
     allowed_ns: int = 0
@@ -37,7 +37,7 @@ class Stream(NamedTuple):
         """Why a sample of that stamp may not be added; None where it may."""
         if self.newest_ns is not None and t_ns > self.newest_ns and t_ns < self.allowed_ns - BURST_NS:
             return Outcome.TOO_OFTEN
-        index = bisect_left(self.samples, t_ns, key=_stamp)
+        index = bisect_left(self.samples, (t_ns,))
         doubled = index < len(self.samples) and self.samples[index].t_ns == t_ns
         return Outcome.DUPLICATE if doubled else None
 
@@ -50,7 +50,7 @@ class Stream(NamedTuple):
             allowed_ns = max(t_ns, self.allowed_ns) + INTERVAL_NS
             return self._replace(samples=(*self.samples, sample), newest_ns=t_ns, allowed_ns=allowed_ns)
         samples = list(self.samples)
-        insort(samples, sample, key=_stamp)
+        insort(samples, sample)
         return self._replace(samples=tuple(samples))
 
     def between(self, first_ns: int, last_ns: int) -> Stream:
@@ -69,12 +69,12 @@ class Stream(NamedTuple):
 
     def since(self, first_ns: int) -> Stream:
         """Without what is older than a time or beyond the most that are kept."""
-        first = max(bisect_left(self.samples, first_ns, key=_stamp), self.excess)
+        first = max(bisect_left(self.samples, (first_ns,)), self.excess)
         return self._replace(samples=self.samples[first:]) if first > 0 else self
 
     def has_between(self, first_ns: int, last_ns: int) -> bool:
         """Whether a kept sample is stamped from the first to the last time."""
-        index = bisect_left(self.samples, first_ns, key=_stamp)
+        index = bisect_left(self.samples, (first_ns,))
         return index < len(self.samples) and self.samples[index].t_ns <= last_ns
 
     def has_reached(self, t_ns: int) -> bool:
@@ -83,21 +83,17 @@ class Stream(NamedTuple):
 
     def next_ns(self, t_ns: int) -> int | None:
         """The stamp of the first kept sample behind a time; None where there is none."""
-        index = bisect_right(self.samples, t_ns, key=_stamp)
+        index = bisect_left(self.samples, (t_ns + 1,))
         return self.samples[index].t_ns if index < len(self.samples) else None
 
     def latest(self, t_ns: int) -> Any | None:
         """The newest sample that is not later than a time; None where there is none."""
-        index = bisect_right(self.samples, t_ns, key=_stamp) - 1
+        index = bisect_left(self.samples, (t_ns + 1,)) - 1
         return None if index < 0 else self.samples[index]
 
     def unspent(self, first_ns: int, last_ns: int) -> tuple[Any, ...]:
         """The samples from the first to the last time that are not used up."""
         if self.spent_ns is not None:
             first_ns = max(first_ns, self.spent_ns + 1)
-        first, end = (bisect_left(self.samples, t_ns, key=_stamp) for t_ns in (first_ns, last_ns + 1))
+        first, end = (bisect_left(self.samples, (t_ns,)) for t_ns in (first_ns, last_ns + 1))
         return self.samples[first:end]
-
-
-def _stamp(sample: Any) -> int:
-    return int(sample.t_ns)

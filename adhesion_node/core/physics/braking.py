@@ -47,9 +47,9 @@ def curve(
     speeds = np.linspace(max(speed_mps, target_mps), target_mps, POINTS)
     half = (speeds[:-1] - speeds[1:]) / 2
     inner = (speeds[:-1] + speeds[1:])[:, None] / 2 + half[:, None] * _NODES
-    slowing = _deceleration(train, inner, mu, grade)
-    at_points = _deceleration(train, speeds, mu, grade)
-    weakest = min(float(slowing.min()), float(at_points.min()))
+    found = _deceleration(train, np.concatenate((speeds, inner.ravel())), mu, grade)
+    at_points, slowing = found[:POINTS], found[POINTS:].reshape(inner.shape)
+    weakest = float(found.min())
     if not weakest > 0.0:
         raise ValueError(f"braking curve: deceleration {weakest:.4g} m/s^2 at grade {grade:g}: the train does not slow")
     per_speed = _WEIGHTS / slowing

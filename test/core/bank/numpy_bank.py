@@ -118,13 +118,13 @@ def pruned(bank: Bank) -> Bank:
     """Without the unlikely, and with what says the same said once."""
     bank = _united(normalised(bank.part(bank.log_weight > math.log(branching.LEAST))))
     if bank.log_weight.size > branching.MOST:
-        bank = bank.part(np.sort(np.argsort(-bank.log_weight, kind="stable")[: branching.MOST]))
+        bank = bank.part(np.sort(np.argsort(-np.round(bank.log_weight, 9), kind="stable")[: branching.MOST]))
     return normalised(bank)
 
 
 def _united(bank: Bank) -> Bank:
     """Unite hypotheses of one label that say the same, the likelier one first."""
-    order = np.argsort(-bank.log_weight, kind="stable")
+    order = np.argsort(-np.round(bank.log_weight, 9), kind="stable")
     bank = bank.part(order)
     same = (bank.noise[:, None] == bank.noise) & (bank.law[:, None] == bank.law) & (bank.kind[:, None] == bank.kind)
     for component in (MU, SPEED):

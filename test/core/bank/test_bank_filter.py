@@ -84,7 +84,7 @@ def run(config: Config, seed: int, mu: float, seconds: float = 35.0) -> list[Mem
     times, _, positions = braked_run(mu, seed, seconds)
     memories: list[Memory] = []
     for each in measurements(times, positions, 0.3):
-        memories.append(followed(config, memories[-1], each, UNKNOWN) if memories else met(config, each))
+        memories.append(followed(config, memories[-1], each, lambda: UNKNOWN) if memories else met(config, each))
     return memories
 
 
@@ -123,7 +123,7 @@ def test_white_positions_are_told_from_wandering_ones() -> None:
         slow[index] = kept * slow[index - 1] + 2.0 * np.sqrt(1 - kept**2) * rng.standard_normal()
     memory: Memory | None = None
     for each in measurements(times, positions + slow + 0.2 * rng.standard_normal(times.size), 2.0):
-        memory = met(CONFIG, each) if memory is None else followed(CONFIG, memory, each, UNKNOWN)
+        memory = met(CONFIG, each) if memory is None else followed(CONFIG, memory, each, lambda: UNKNOWN)
     assert memory is not None
     assert float(memory.bank.weight @ (memory.bank.noise == 0)) < 0.01
 
@@ -158,7 +158,7 @@ def test_pressures_in_any_split_over_measurements_give_the_same_state(split: int
                 measured = newest._replace(pressures=pressures)
                 if last < 10:
                     measured = measured._replace(variance_m2=float("inf"))
-                memory = followed(CONFIG, memory, measured, UNKNOWN)
+                memory = followed(CONFIG, memory, measured, lambda: UNKNOWN)
         memories.append(memory)
     one, other = memories
     assert one.brake == other.brake

@@ -83,7 +83,7 @@ def probe(index: int, measurements: list[Measurement]) -> None:
     memory = met(config, measurements[0])
     check(memory)
     for measurement in measurements[1:]:
-        memory = followed(config, memory, measurement, RAIL)
+        memory = followed(config, memory, measurement, lambda: RAIL)
         check(memory)
         findings = found(config, memory, RAIL, RAIL)
         assert 0.0 <= findings.rail.lower <= findings.rail.mu < math.inf

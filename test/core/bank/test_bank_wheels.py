@@ -23,6 +23,8 @@ WORN = np.array([1.0, 0.97, 0.985, 1.01])
 EVEN = np.ones(4)
 MS = S // 1000
 
+RAIL = Rail(0.05, 0.04, 0.02)
+
 
 def sample(t_ns: int, speed: float, creep: Array, radius: Array, rng: np.random.Generator | None = None) -> WheelSample:
     noise = 0.0 if rng is None else 0.002 * rng.standard_normal(creep.size)
@@ -167,7 +169,7 @@ def test_radii_are_learnt_whatever_a_released_cylinder_seems_to_hold(idle_pa: fl
         wheels = (sample(t_ns, 40.0, np.zeros(4), WORN),)
         speeds = (SpeedSample(t_ns, 40.0, 0.01),)
         measured = Measurement(t_ns, 4.0 * index, 0.04, idle_pa, 40.0, speeds=speeds, wheels=wheels)
-        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, Rail(0.05, 0.04, 0.02))
+        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
     assert memory is not None
     assert memory.wheels.learnt > 50
     assert memory.wheels.radius == pytest.approx(WORN, rel=3e-3)

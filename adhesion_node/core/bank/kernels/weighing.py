@@ -20,6 +20,9 @@ Labels = NDArray[np.intp]
 
 SPEED, MU, SIZE = 1, 2, 10
 
+EQUAL = 1e-9
+"""Logarithms of weights that differ by less are equal: rounding shall not choose between twins of another law."""
+
 
 class Pruning(NamedTuple):
     """What hypotheses are left."""
@@ -137,11 +140,11 @@ def corrected(
 
 @kernel
 def _order(log_weight: Array) -> Labels:
-    """Indices by falling weight; of equal ones the first first."""
+    """Indices by falling weight; of those that are equal but for rounding the first first."""
     order = np.empty(log_weight.size, dtype=np.intp)
     for h in range(order.size):
         place = h
-        while place > 0 and log_weight[order[place - 1]] < log_weight[h]:
+        while place > 0 and log_weight[order[place - 1]] < log_weight[h] - EQUAL:
             order[place] = order[place - 1]
             place -= 1
         order[place] = h
