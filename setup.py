@@ -13,7 +13,7 @@ MANIFEST = ElementTree.parse(HERE / "package.xml")
 
 PROGRAMS = (
     *("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "live", "simulator", "slip_simulator"),
-    *("import_csv", "recover", "demo", "report", "study", "bench"),
+    *("import_csv", "train", "recover", "demo", "report", "study", "bench"),
 )
 
 # Recordings, frames, pictures, geographic positions, completion in the shell. The nodes of a train run without.
@@ -59,7 +59,10 @@ setup(
     maintainer_email=MANIFEST.find("maintainer").get("email"),
     license=MANIFEST.findtext("license"),
     packages=find_packages(include=["adhesion_node*", "sim_node*"]),
-    package_data={"adhesion_node": ["py.typed", "nodes/*.yaml", "web/*", "layouts/*"], "sim_node": ["py.typed"]},
+    package_data={
+        "adhesion_node": ["py.typed", "nodes/*.yaml", "trains/*.yaml", "web/*", "layouts/*"],
+        "sim_node": ["py.typed"],
+    },
     data_files=shared_files(),
     zip_safe=False,
     python_requires=">=3.11",

@@ -56,6 +56,10 @@ def setting_options(add: Callable[..., Any]) -> None:
     add("--seed", type=int, help="seed of the estimator")
     add("--set", metavar="NAME=VALUE", action="append", default=[], help="a setting of the estimator; repeatable")
     add("--params", metavar="FILE", help="settings of the estimator as a ROS parameter file")
+    train = (
+        "the train, by its file (doc/train.md), or high_speed, metro, freight (default: the CRH3 of Xie et al. 2019)"
+    )
+    add("--train", metavar="FILE", help=train)
     add("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
 
 

@@ -39,8 +39,9 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
     from .player import Replay
     from .ros import runtime
 
-    if any((options.set, options.params, options.node, options.estimator, options.out)) or options.seed is not None:
-        own = "--set, --params, --node, --seed, --estimator and --out are for --offline"
+    own_options = (options.set, options.params, options.train, options.node, options.estimator, options.out)
+    if any(own_options) or options.seed is not None:
+        own = "--set, --params, --train, --node, --seed, --estimator and --out are for --offline"
         raise ValueError(f"{own}: start the live estimator of your choice with its own parameters")
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)

@@ -47,8 +47,8 @@ def _work(options: argparse.Namespace) -> int:
     output.mkdir(parents=True, exist_ok=True)
     page = output / "report.html"
     page.write_text(html, encoding="utf-8")
-    result: dict[str, Any] = {"page": str(page), "runs": []}
-    texts = []
+    result: dict[str, Any] = {"page": str(page), "train": setup.train, "runs": []}
+    texts = [f"train: {setup.train}"]
     for subject in subjects:
         pictures = list(_pictures(subject, output, options.target))
         found = findings(subject.run, setup.config, options.target)
@@ -69,7 +69,7 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
             source = "estimated from the recorded sensors"
         for topic, count in reader.undecodable.items():
             print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)
-        return Subject(name, source, run, setup.config)
+        return Subject(name, source, run, setup.config, setup.train)
 
 
 def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:

@@ -34,6 +34,8 @@ class Subject(NamedTuple):
     """Where its estimates come from, in words."""
     run: Run
     config: Config
+    train: str = ""
+    """For which its distances are computed, in words."""
 
 
 def chart_data(subject: Subject, target_kmh: float) -> dict[str, Any]:

@@ -22,6 +22,7 @@ MOST_CHANGES = 40
 _Write = Callable[[Mapping[str, Any], Subject], str]
 
 FINDINGS: tuple[tuple[str, _Write], ...] = (
+    ("Train", lambda f, s: escape(s.train)),
     ("Estimates", lambda f, s: escape(s.source)),
     ("Duration", lambda f, s: f"{f['seconds']:.0f} s"),
     ("Speed", lambda f, s: f"{f['from_kmh']:.0f} → {f['to_kmh']:.0f} km/h"),

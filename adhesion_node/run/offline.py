@@ -49,7 +49,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
             write(row_of(pipeline, made, setup.line.sign))
             if truth is not None:
                 compared.append(Point(made.estimate.t_ns, made.estimate.mu))
-    result = summary(pipeline, window_ms, truth, compared)
+    result = {"train": setup.train, **summary(pipeline, window_ms, truth, compared)}
     if options.out:
         result["out"] = options.out
     if pipeline.back_m > BACK_M:

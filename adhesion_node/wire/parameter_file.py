@@ -69,10 +69,15 @@ def unheeded(ros_arguments: Sequence[str], node: str) -> list[str]:
     ]
 
 
+def load(path: str) -> Any:
+    """What a YAML file holds. Raises OSError, ValueError or YAMLError where it is not readable."""
+    return yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
+
+
 def sections(path: str) -> list[Section]:
     """Return the sections of a file in their order; ValueError when it is no readable parameter file."""
     try:
-        return list(_named(yaml.load(Path(path).read_text(encoding="utf-8"), _Loader), ""))
+        return list(_named(load(path), ""))
     except (OSError, ValueError, yaml.YAMLError, AttributeError, LookupError, TypeError, RecursionError) as error:
         raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
 

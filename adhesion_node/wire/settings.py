@@ -14,10 +14,11 @@ from ..core.creep.config import CreepConfig
 from ..core.creep.vehicle import Vehicle
 from ..core.intake.samples import MAX_POSITION_M
 from ..core.physics.track import Grade, Track, parse_track
-from ..core.physics.train import Train
+from ..core.physics.train import CRH3, Train
 from ..core.setting import Setting, check_settings, make, setting, settings_of
 from . import parameter_file
 from .codecs import Line
+from .train_file import read_train
 
 if TYPE_CHECKING:
     from .track_line import TrackLine
@@ -44,6 +45,16 @@ TRACK_START = Setting(
     -MAX_POSITION_M,
     MAX_POSITION_M,
     group="track",
+)
+
+DEFAULT_TRAIN, OWN_TRAIN = "CRH3 of Xie et al. 2019, as no train is given", "by its parameters"
+"""Of a train that has no file."""
+
+TRAIN_FILE = Setting(
+    "train_file",
+    "",
+    "File that describes the train, or high_speed, metro, freight; a parameter given beside it counts first",
+    group="train's file",
 )
 
 SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
@@ -87,7 +98,7 @@ _OF_TRAIN = settings_of(Train, "train.", "train")
 _OF_TELLING = settings_of(Telling)
 SETTINGS = (
     *(SEED, *OF_LINE, SENSOR_TIMEOUT, *_OF_TELLING),
-    *(*settings_of(Config), *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
+    *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
 )
 """All settings of the estimator."""
 
@@ -121,6 +132,8 @@ class Setup(NamedTuple):
     sensor_timeout_s: float
     """Silence of the position after which /diagnostics says STALE; no result depends on it."""
     telling: Telling = Telling()
+    train: str = ""
+    """The train in words, for the top of what is reported."""
 
 
 class CreepSetup(NamedTuple):
@@ -147,6 +160,10 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
     check_names(values, SETTINGS)
+    named = ""
+    if values.get(TRAIN_FILE.name):
+        file = read_train(str(TRAIN_FILE.check(values[TRAIN_FILE.name])))
+        named, values = file.name, {**file.values, **values}
     seed, timeout_s, track = (one.check(values.get(one.name, one.default)) for one in (SEED, SENSOR_TIMEOUT, TRACK))
     train = make(Train, values, "train.")
     profile, line = parse_track(str(track), train.length_m), _track_line(values)
@@ -154,7 +171,21 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
         profile = _with_grades(profile, line.grades(train.length_m))
     of_line = make(Line, values, track=line)
     config = make(Config, values, train=train, track=profile.turned() if of_line.sign < 0 else profile)
-    return Setup(config, int(seed), of_line, float(timeout_s), make(Telling, values))
+    words = _in_words(named or (DEFAULT_TRAIN if train == CRH3 else OWN_TRAIN), train)
+    return Setup(config, int(seed), of_line, float(timeout_s), make(Telling, values), words)
+
+
+def preset(settings: Sequence[Setting], given: Mapping[str, Any]) -> tuple[Setting, ...]:
+    """The settings with the defaults that a given train's file has for them. Raises ValueError as `read_train`."""
+    if not given.get(TRAIN_FILE.name):
+        return tuple(settings)
+    values = read_train(str(TRAIN_FILE.check(given[TRAIN_FILE.name]))).values
+    return tuple(one._replace(default=values.get(one.name, one.default)) for one in settings)
+
+
+def _in_words(name: str, train: Train) -> str:
+    brake = train.brake_force(train.full_pressure_pa) / train.mass_kg / (1.0 + train.rotating_mass_fraction)
+    return f"{name}: {1e-3 * train.mass_kg:.4g} t, {train.length_m:.4g} m, full brake {brake:.3g} m/s^2"
 
 
 def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":
@@ -188,6 +219,8 @@ def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -
     `--node` names the node whose parameters are meant where a file has them for several.
     """
     values = parameter_file.read(options.params, getattr(options, "node", None) or node) if options.params else {}
+    if getattr(options, "train", None):
+        values |= {TRAIN_FILE.name: options.train}
     return values | dict(parse_setting(text, settings) for text in options.set)
 
 

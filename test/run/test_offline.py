@@ -40,6 +40,7 @@ FAST_CONFIG = setup_of(FAST).config
 FAST_SETTINGS = [f"--set={name}={value}" for name, value in FAST.items()]
 
 KEYS = {
+    "train",
     "measurements",
     "accepted",
     "ticks",

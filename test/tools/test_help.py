@@ -62,6 +62,7 @@ COMPLETED = [
     ("recorder --out", {"--output"}),
     ("recover my_run --out", {"--output"}),
     ("import_csv log.csv --pressure-", {"--pressure-unit", "--pressure-kind"}),
+    ("train --est", {"--estimate"}),
     ("report my_run --tar", {"--target"}),
     ("live --po", {"--port"}),
     ("bench --r", {"--rounds"}),

@@ -17,7 +17,10 @@ from adhesion_node.core.setting import Setting, settings_of
 from adhesion_node.wire.codecs import Line
 from adhesion_node.wire.settings import OF_LINE, SETTINGS, Setup, Telling, parse_setting, setup_of
 
-FREE_TEXTS = {"track", "frame", "track_line", "hardware_id", "child_frame"}
+OF_FILES = ("track", "train_file")
+"""Settings, or beginnings of their names, that are no field of the configuration."""
+
+FREE_TEXTS = {"train_file", "track", "frame", "track_line", "hardware_id", "child_frame"}
 """The settings that are neither a number nor one of a few words."""
 
 NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]
@@ -70,18 +73,18 @@ def test_every_setting_says_what_it_is_and_what_it_may_be(setting: Setting) -> N
 
 def test_nothing_named_is_the_nominal_set_up() -> None:
     setup = setup_of({})
-    assert setup == Setup(Config(), 1, Line("track", 101_325.0), 0.5)
+    assert setup == Setup(Config(), 1, Line("track", 101_325.0), 0.5, train=setup.train)
     assert setup.config.train == CRH3
     assert setup_of({setting.name: setting.default for setting in SETTINGS}) == setup
 
 
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if not s.name.startswith("track")], ids=named)
+@pytest.mark.parametrize("setting", [s for s in SETTINGS if not s.name.startswith(OF_FILES)], ids=named)
 def test_every_setting_is_used(setting: Setting) -> None:
     value = another(setting)
     assert value != setting.default
     changed = setup_of({setting.name: value})
     assert in_use(changed, setting.name) == value
-    others = [other.name for other in SETTINGS if other != setting and not other.name.startswith("track")]
+    others = [other.name for other in SETTINGS if other != setting and not other.name.startswith(OF_FILES)]
     assert [in_use(changed, name) for name in others] == [in_use(setup_of({}), name) for name in others]
 
 

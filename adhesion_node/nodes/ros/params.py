@@ -12,6 +12,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
+from adhesion_node.wire.settings import preset
 
 _INT64_MAX = 2**63 - 1
 
@@ -42,6 +43,7 @@ def descriptor(setting: Setting) -> ParameterDescriptor:
 def declare(node: Node, settings: Sequence[Setting]) -> dict[str, Any]:
     """Declare every setting as a parameter of `node` and return the effective values as plain Python ones.
 
+    A train's file gives the defaults of what it names.
     All values are checked before the first is accepted; a bad one raises ValueError with name, value and what is
     allowed. Afterwards a change is refused: a configuration holds for a whole run. The effective configuration is
     logged once. Construct the node with `automatically_declare_parameters_from_overrides=True`: then the
@@ -49,6 +51,8 @@ def declare(node: Node, settings: Sequence[Setting]) -> dict[str, Any]:
     """
     if node.has_parameter(_USE_SIM_TIME.name):
         _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
+    given = {one.name: node.get_parameter(one.name).value for one in settings if node.has_parameter(one.name)}
+    settings = preset(settings, given)
     values = {setting.name: setting.check(_given(node, setting)) for setting in settings}
     for setting in settings:
         node.set_descriptor(setting.name, descriptor(setting))
