@@ -122,7 +122,10 @@ def write_changed(path: Path) -> dict[str, Any]:
     document = yaml.safe_load(DEFAULTS.read_text(encoding="utf-8"))
     section = document["estimator"]["ros__parameters"]
     path.with_suffix(".csv").write_text("lat,lon\n47,8\n47.1,8\n", encoding="utf-8")
-    document["estimator"]["ros__parameters"] = _changed(section) | {"track_line": str(path.with_suffix(".csv"))}
+    document["estimator"]["ros__parameters"] = {
+        **_changed(section),
+        **{"track_line": str(path.with_suffix(".csv")), "train_file": "metro"},
+    }
     with path.open("w", encoding="utf-8") as stream:
         yaml.safe_dump(document, stream)
     return sections(path)["estimator"]

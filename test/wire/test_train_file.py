@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import json
-from argparse import Namespace
+from argparse import ArgumentParser, Namespace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from adhesion_node.core import Config
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.nodes import replay
 from adhesion_node.nodes.estimator import Estimator
+from adhesion_node.tools.log.options import add_options, format_of
 from adhesion_node.wire.settings import SETTINGS, given, setup_of
 from adhesion_node.wire.train_file import SHIPPED, read_train
 
@@ -97,6 +98,16 @@ def test_a_replay_says_for_which_train_it_was_computed(tmp_path: Path, capfd: py
     first = capfd.readouterr().out.splitlines()[0].split(maxsplit=1)
     assert first == ["train", json.loads(result.read_text(encoding="utf-8"))["train"]]
     assert first[1] == "metro, six cars: 210 t, 108 m, full brake 1.3 m/s^2"
+
+
+def test_an_import_takes_wheels_and_full_pressure_from_the_file(tmp_path: Path) -> None:
+    parser = ArgumentParser()
+    add_options(parser)
+    file = written(tmp_path)
+    formats = [format_of(parser.parse_args(args)) for args in ([], ["--train", file])]
+    formats.append(format_of(parser.parse_args(["--train", file, "--wheel-radius", "0.4"])))
+    assert [form.wheel_radius_m for form in formats] == [0.46, 0.42, 0.4]
+    assert [form.full_pressure_pa for form in formats] == [410e3, 380e3, 380e3]
 
 
 BRAKE = UNIT["brake"]

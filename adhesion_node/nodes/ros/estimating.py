@@ -20,7 +20,7 @@ from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import NS, Line, Rejected
 from adhesion_node.wire.frames import placed
-from adhesion_node.wire.settings import Telling
+from adhesion_node.wire.settings import Telling, preset
 from adhesion_node.wire.topics import Topic
 
 from . import qos
@@ -66,7 +66,7 @@ class EstimatingNode(Node, Generic[P]):
     def __init__(self, kind: Kind[P], **kwargs: Any) -> None:
         super().__init__(kind.name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self._kind = kind
-        self.pipeline, line, timeout_s, telling = kind.set_up(declare(self, kind.parameters))
+        self.pipeline, line, timeout_s, telling = kind.set_up(declare(self, kind.parameters, preset))
         self._resets: deque[int] = deque(maxlen=OFTEN)
         """When the latest ones were seen."""
         self._seen_resets = 0

@@ -3,7 +3,7 @@
 """Settings as ROS parameters: typed, with ranges, checked as a whole before the node does anything."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -12,13 +12,16 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
-from adhesion_node.wire.settings import preset
 
 _INT64_MAX = 2**63 - 1
 
 _USE_SIM_TIME = Setting("use_sim_time", False, "Follow /clock")
 _OF_RCLPY = ("use_sim_time", "start_type_description_service")
 _OF_RCLPY_QOS = "qos_overrides."
+
+
+Preset = Callable[[Sequence[Setting], Mapping[str, Any]], Sequence[Setting]]
+"""Settings whose defaults hold where a node was given some values."""
 
 
 def descriptor(setting: Setting) -> ParameterDescriptor:
@@ -40,19 +43,19 @@ def descriptor(setting: Setting) -> ParameterDescriptor:
     return described
 
 
-def declare(node: Node, settings: Sequence[Setting]) -> dict[str, Any]:
+def declare(node: Node, settings: Sequence[Setting], preset: Preset | None = None) -> dict[str, Any]:
     """Declare every setting as a parameter of `node` and return the effective values as plain Python ones.
 
-    A train's file gives the defaults of what it names.
-    All values are checked before the first is accepted; a bad one raises ValueError with name, value and what is
-    allowed. Afterwards a change is refused: a configuration holds for a whole run. The effective configuration is
-    logged once. Construct the node with `automatically_declare_parameters_from_overrides=True`: then the
-    parameters it was given but does not have are logged as well.
+    `preset` changes defaults by what the node was given, a train's file for one. All values are checked before the
+    first is accepted; a bad one raises ValueError with name, value and what is allowed. Afterwards a change is refused:
+    a configuration holds for a whole run. The effective configuration is logged once. Construct the node with
+    `automatically_declare_parameters_from_overrides=True`: then parameters that it was given but does not have are
+    logged as well.
     """
     if node.has_parameter(_USE_SIM_TIME.name):
         _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
     given = {one.name: node.get_parameter(one.name).value for one in settings if node.has_parameter(one.name)}
-    settings = preset(settings, given)
+    settings = settings if preset is None else preset(settings, given)
     values = {setting.name: setting.check(_given(node, setting)) for setting in settings}
     for setting in settings:
         node.set_descriptor(setting.name, descriptor(setting))

@@ -9,6 +9,7 @@ from typing import Any
 
 from ...core.physics.train import CRH3
 from ...wire.settings import AMBIENT
+from ...wire.train_file import read_train
 from .format import (
     ACCELERATION_UNITS,
     OPTIONAL,
@@ -20,6 +21,9 @@ from .format import (
     Format,
     option,
 )
+
+OF_TRAIN = ("wheel_radius_m", "full_pressure_pa")
+"""What of a log's format the train's file knows."""
 
 _GUESSED = "when it is not as guessed"
 
@@ -40,6 +44,8 @@ def format_of(options: argparse.Namespace) -> Format:
     given = vars(options)
     names = {column: given[column] for column in ("time", *OPTIONAL) if given[column] is not None}
     given |= {"named": names, "pressure_is_gauge": options.pressure_kind == "gauge"}
+    train = read_train(options.train).train if options.train else CRH3
+    given |= {name: getattr(train, name) for name in OF_TRAIN if given[name] is None}
     given["delimiter"] = options.delimiter and options.delimiter.replace("\\t", "\t")
     return Format(**{field.name: given[field.name] for field in fields(Format) if field.name in given})
 
@@ -75,9 +81,14 @@ def _unit_options(add: Callable[..., Any]) -> None:
     released = "of the brake pipe while the brake is released, in the unit of pressures (default: its 9th decile)"
     add("--pipe-released", type=float, metavar="P", help=released)
     full = f"of the cylinders that a full brake by the pipe demands, gauge (default: {CRH3.full_pressure_pa:g})"
-    add("--full-pressure", dest="full_pressure_pa", type=float, default=CRH3.full_pressure_pa, metavar="PA", help=full)
+    add("--full-pressure", dest="full_pressure_pa", type=float, metavar="PA", help=full)
     add("--speed-unit", choices=list(SPEED_UNITS), default="mps", help="default: mps")
     add("--acceleration-unit", choices=list(ACCELERATION_UNITS), default="mps2", help="default: mps2")
     add("--wheel-unit", choices=WHEEL_UNITS, default="radps", help="default: radps; mps and kmh: of the rim")
     radius = f"of the wheels, for those (default: {CRH3.wheel_radius_m:g})"
-    add("--wheel-radius", dest="wheel_radius_m", type=float, default=CRH3.wheel_radius_m, metavar="M", help=radius)
+    add("--wheel-radius", dest="wheel_radius_m", type=float, metavar="M", help=radius)
+    add(
+        "--train",
+        metavar="FILE",
+        help="the train's file (doc/train.md), which has full pressure and wheel radius",
+    )
