@@ -19,6 +19,7 @@ from rclpy.qos import ReliabilityPolicy
 from ..bag import BagReader, Record
 from ..wire import topics
 from .offers import as_recorded, expires
+from .ros.discovery import Subscribers
 from .ros.qos import advertise
 from .ros.types import new
 
@@ -33,11 +34,6 @@ BURST = 20
 
 SUBSCRIBERS_S = 10.0
 """Longest wait for subscribers."""
-
-SETTLE_S, SETTLE_TICKS = 0.5, 100
-"""The subscribers count as found when no other one has appeared for so long and in so many ticks: discovery is not
-finished on the other side, nor for its other topics, when the first one is seen. On a machine that is busy it takes
-longer, and so do the ticks."""
 
 ACKNOWLEDGED_S = 10.0
 """Longest wait for reliable subscribers to take what was published."""
@@ -74,9 +70,7 @@ class Replay(Node):
         self._next: tuple[int, Iterator[Record]] | None = None
         self._origin: tuple[float, int] | None = None
         self._waiting_since = time.monotonic()
-        self._seen: tuple[int, ...] = ()
-        self._seen_since = self._waiting_since
-        self._seen_ticks = 0
+        self._subscribers = Subscribers(self._outputs.values(), self._position(), subscribers)
         period = PERIOD_S if rate else RUSH_PERIOD_S
         self.create_timer(period, self.tick, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
 
@@ -95,15 +89,9 @@ class Replay(Node):
 
     def _start_when_heard(self) -> None:
         now = time.monotonic()
-        heard = tuple(publisher.get_subscription_count() for publisher in self._outputs.values())
-        self._seen_ticks += 1
-        if heard != self._seen:
-            self._seen, self._seen_since, self._seen_ticks = heard, now, 0
-        enough = self._position().get_subscription_count() >= self._wanted
-        settled = now - self._seen_since >= SETTLE_S and self._seen_ticks >= SETTLE_TICKS
-        if enough and (settled or not self._wanted):
+        if self._subscribers.found():
             self._warn_of_losses()
-        elif not enough and now - self._waiting_since >= SUBSCRIBERS_S:
+        elif not self._subscribers.enough and now - self._waiting_since >= SUBSCRIBERS_S:
             self.get_logger().warning(
                 f"{self._position().topic_name}: fewer than {self._wanted} subscribers after {SUBSCRIBERS_S:g} s: "
                 "replaying all the same"

@@ -18,8 +18,9 @@ from ..wire import settings
 FILE = Path(__file__).resolve().parent.parent / "nodes" / "defaults.yaml"
 
 HEAD = """\
-# The parameters of all nodes with their defaults, for `--ros-args --params-file`. What each one means, its unit and
-# its range: `ros2 param describe`, `--help` of the node, or doc/parameters.md. Change a copy.
+# The parameters of all nodes with their defaults, in any namespace, for `--ros-args --params-file`. What each one
+# means, its unit and its range: `ros2 param describe`, `--help` of the node, or doc/parameters.md. Change a copy, keep
+# the lines that you change, and give it before any `-p`: ROS ranks by the first mention of a name, `-p` is `/**`.
 # Written by `python -m adhesion_node.tools.defaults` out of the declarations.
 """
 
@@ -32,7 +33,8 @@ def all_settings() -> Mapping[str, Sequence[Setting]]:
 def text() -> str:
     """Return what the file should hold."""
     sections = (
-        "\n".join((f"\n{node}:", "  ros__parameters:", *_lines(of_node))) for node, of_node in all_settings().items()
+        "\n".join((f"\n/**/{node}:", "  ros__parameters:", *_lines(of_node)))
+        for node, of_node in all_settings().items()
     )
     return HEAD + "\n".join(sections) + "\n"
 

@@ -18,6 +18,8 @@ import yaml
 OF_EVERY_NODE = ("use_sim_time", "start_type_description_service", "qos_overrides.")
 """Parameters that ROS itself gives to every node: they may stand in a parameter file and mean nothing here."""
 
+_FILE = "--params-file"
+
 _WILDCARDS = {"*": r"/\w+", "**": r"(/\w+)*"}
 
 
@@ -56,17 +58,51 @@ def read(path: str, node: str) -> dict[str, Any]:
 
 
 def unheeded(ros_arguments: Sequence[str], node: str) -> list[str]:
-    """Return one message for every --params-file that has no section for `node`, a fully qualified name.
+    """Return one message for every --params-file without a section for `node`, and for every value that is shadowed.
 
-    The files are those that ROS has read already, so they are there and in order.
+    ROS ranks by where a section's name is first mentioned, of all files and of `-p`, which is the section `/**`: `-p`
+    after a file gives way to it where an earlier `-p`, or the file itself, has mentioned `/**` before. The arguments
+    are those that ROS has read already, so they are well formed and the files there.
     """
-    files = [file for option, file in pairwise(ros_arguments) if option == "--params-file"]
-    return [
-        f"--params-file {file}: has sections for {', '.join(one.name for one in found) or 'nobody'}, none for {node}: "
-        f"name one '{node.rpartition('/')[2]}' or '/**'"
-        for file, found in ((file, sections(file)) for file in files)
-        if not any(is_for(one.name, node) for one in found)
+    given = list(_given(ros_arguments))
+    named = f"name one '{node.rpartition('/')[2]}' or '/**'"
+    useless = [
+        f"{source}: has sections for {', '.join(one.name for one in found) or 'nobody'}, none for {node}: {named}"
+        for source, found in given
+        if source.startswith(_FILE) and not any(is_for(one.name, node) for one in found)
     ]
+    wanted: dict[str, tuple[str, Any]] = {}
+    merged: dict[str, dict[str, Any]] = {}
+    for source, found in given:
+        for one in found:
+            merged.setdefault(one.name, {}).update(one.values)
+            if is_for(one.name, node):
+                wanted |= {name: (source, value) for name, value in one.values.items()}
+    effective = _values([Section(*one) for one in merged.items()], node)
+    return useless + [
+        f"{source}: {name} = {value} is shadowed, {effective[name]} holds: give every --params-file before the first "
+        "-p, and in files the section /** last"
+        for name, (source, value) in wanted.items()
+        if effective[name] != value
+    ]
+
+
+def _given(ros_arguments: Sequence[str]) -> Iterator[tuple[str, list[Section]]]:
+    """Yield what gives parameters, as it stands on the command line, with its sections."""
+    for option, text in pairwise(ros_arguments):
+        if option == _FILE:
+            yield f"{option} {text}", sections(text)
+        elif option in ("-p", "--param"):
+            rule, _, value = text.partition(":=")
+            whose, _, name = rule.rpartition(":")
+            yield f"{option} {text}", [Section(whose.lstrip("/") or "**", {name: _value(value)})]
+
+
+def _value(text: str) -> Any:
+    try:
+        return yaml.load(text, _Loader)
+    except yaml.YAMLError:
+        return text
 
 
 def load(path: str) -> Any:

@@ -17,6 +17,7 @@ from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.ros.discovery import PERIOD_S, Subscribers
 from adhesion_node.nodes.ros.params import declare
 from adhesion_node.nodes.ros.qos import advertise
 from adhesion_node.nodes.ros.types import new
@@ -48,7 +49,7 @@ class RunNode(Node, ABC):
         """When, as on /clock, what `news` tells began to be so."""
         self._ended = False
         self._monotonic = Clock(clock_type=ClockType.STEADY_TIME)
-        self._begun_ns: int | None = None
+        self._begun_ns = 0
 
     def begin(self, run: Iterator[tuple[Any, Any]], topics: Sequence[Topic], period_s: float, *, paced: bool) -> None:
         """Take up a run of truths, with their `t_ns`, and what was measured; begin when the last topic is subscribed.
@@ -62,9 +63,10 @@ class RunNode(Node, ABC):
         if paced:
             if self.values["wait_for"]:
                 self.log(f"waiting for {self.values['wait_for']} subscriber(s) to {self._awaited.name}")
-            factor = self.values["real_time_factor"]
-            fitting_s = period_s / factor if factor else 0.0
-            self._timer = self.create_timer(max(fitting_s, SHORTEST_TIMER_S), self._on_timer, clock=self._monotonic)
+            self._subscribers = Subscribers(
+                self._outputs.values(), self._outputs[self._awaited], self.values["wait_for"]
+            )
+            self._timer = self.create_timer(PERIOD_S, self._on_wait, clock=self._monotonic)
 
     @property
     def ahead_s(self) -> float:
@@ -110,13 +112,18 @@ class RunNode(Node, ABC):
         """Tell people."""
         self.get_logger().info(text)
 
+    def _on_wait(self) -> None:
+        """Begin as soon as the subscribers are there."""
+        if self._subscribers.found():
+            self._timer.cancel()
+            self._begun_ns = self._monotonic.now().nanoseconds
+            factor = self.values["real_time_factor"]
+            fitting_s = self._period_s / factor if factor else 0.0
+            self._timer = self.create_timer(max(fitting_s, SHORTEST_TIMER_S), self._on_timer, clock=self._monotonic)
+
     def _on_timer(self) -> None:
-        now_ns = self._monotonic.now().nanoseconds
-        if self._begun_ns is None:
-            if self._outputs[self._awaited].get_subscription_count() < self.values["wait_for"]:
-                return
-            self._begun_ns = now_ns
-        until_s = due_s(now_ns - self._begun_ns, self.values["real_time_factor"], self._period_s)
+        elapsed_ns = self._monotonic.now().nanoseconds - self._begun_ns
+        until_s = due_s(elapsed_ns, self.values["real_time_factor"], self._period_s)
         for _ in range(MAX_BURST):
             if self._ahead is not None and self.ahead_s > until_s:
                 return

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import messages
@@ -124,6 +125,14 @@ def test_two_publishers_of_a_sensor_are_told(make_line: Callable[..., Line]) -> 
     _outputs = [line.outlet(topics.POSITION) for _ in range(2)]
     line.wait_until_said("2 publishers of /train1/position: stop all but one")
     assert line.last.level != DiagnosticStatus.OK
+
+
+def test_a_second_clock_is_told_by_the_name_it_really_has(make_line: Callable[..., Line]) -> None:
+    remapped = ["--ros-args", "-r", "/clock:=/simulated/clock"]
+    line = make_line(partial(Estimator, cli_args=remapped), use_sim_time=True)
+    for _ in range(2):
+        line.outlet(topics.CLOCK._replace(name="/simulated/clock"))
+    line.wait_until_said("2 publishers of /simulated/clock: stop all but one")
 
 
 def test_resets_again_and_again_are_told(make_line: Callable[..., Line]) -> None:

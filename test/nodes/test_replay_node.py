@@ -29,6 +29,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from adhesion_node.bag import BagReader, BagWriter, Record, select, serialize, typestore
 from adhesion_node.nodes import player, replay
 from adhesion_node.nodes.player import Replay
+from adhesion_node.nodes.ros import discovery
 from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, subscribe
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU, Topic
 
@@ -103,7 +104,8 @@ def test_the_rate_is_kept(tmp_path: Path, context: Context, monkeypatch: pytest.
 def turned_by_hand(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     """Return the time of the player's clock, ms, in a list to be changed."""
     now_ms = [5000]
-    monkeypatch.setattr(player, "time", SimpleNamespace(monotonic=lambda: now_ms[0] / 1000))
+    for module in (player, discovery):
+        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now_ms[0] / 1000))
     return now_ms
 
 
@@ -122,11 +124,11 @@ def test_a_machine_that_is_held_up_is_given_more_time_for_its_discovery(
         node = Replay(reader, select(reader.topics), 0.0, context=context)
         spin_until(executor, lambda: node.count_subscribers("/position") == 1)
         begun = []
-        for now_ms[0] in range(5000, 5000 + 300 * (player.SETTLE_TICKS + 3), 300):
+        for now_ms[0] in range(5000, 5000 + 300 * (discovery.SETTLE_LOOKS + 3), 300):
             node.tick()
             begun.append(node.published["/position"] > 0)
         node.destroy_node()
-    assert begun.index(True) == player.SETTLE_TICKS + 1
+    assert begun.index(True) == discovery.SETTLE_LOOKS + 1
 
 
 def test_recorded_results_are_not_replayed_and_truth_is(

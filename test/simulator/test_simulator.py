@@ -21,6 +21,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
+from adhesion_node.nodes.ros.qos import subscribe
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH
 from sim_node.nodes import simulator
 from sim_node.nodes.pace import MAX_BURST, due_s
@@ -264,6 +265,25 @@ def test_nothing_is_published_before_the_subscribers_are_there(
     executor.add_node(_Listener(context))
     spin_until(executor, lambda: simulator.finished)
     assert len(_by_topic(sent)["/position"]) == 61
+
+
+def test_who_is_found_a_little_later_misses_nothing(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """The position is subscribed, the pressure not yet: discovery comes topic by topic."""
+    simulator = _simulator(context, paced=True, wait_for=1, **RUN_OF_61)
+    executor.add_node(simulator)
+    listener = Node("listener", context=context)
+    executor.add_node(listener)
+    calls = _count_calls(simulator)
+    heard: list[int] = []
+    subscribe(listener, POSITION, lambda _: None)
+    spin_until(executor, lambda: simulator.count_subscribers("position") == 1)
+    calls.clear()
+    spin_until(executor, lambda: len(calls) >= 5)
+    subscribe(listener, BRAKE_PRESSURE, lambda message: heard.append(_nanoseconds(message.header.stamp)))
+    spin_until(executor, lambda: simulator.finished and len(heard) == 61)
+    assert heard[0] == 1000 * 10**9
 
 
 def _count_calls(node: Node) -> list[None]:

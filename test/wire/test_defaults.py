@@ -41,8 +41,9 @@ NODES: dict[str, tuple[Callable[..., Node], tuple[Setting, ...]]] = {
 def sections(path: Path = DEFAULTS) -> dict[str, dict[str, Any]]:
     """Return the parameters of each node as ROS spells them: `train: {mass_kg: 1}` is train.mass_kg."""
     document = yaml.safe_load(path.read_text(encoding="utf-8"))
+    assert all(name[:4] == "/**/" for name in document), "in every namespace"
     assert all(list(section) == ["ros__parameters"] for section in document.values())
-    return {name: dict(spelled(section["ros__parameters"])) for name, section in document.items()}
+    return {name[4:]: dict(spelled(section["ros__parameters"])) for name, section in document.items()}
 
 
 def spelled(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
@@ -120,9 +121,9 @@ def test_with_the_defaults_the_estimator_is_the_nominal_one(context: Context) ->
 def write_changed(path: Path) -> dict[str, Any]:
     """Write the file with every value of the estimator changed, and return the values."""
     document = yaml.safe_load(DEFAULTS.read_text(encoding="utf-8"))
-    section = document["estimator"]["ros__parameters"]
+    section = document["/**/estimator"]["ros__parameters"]
     path.with_suffix(".csv").write_text("lat,lon\n47,8\n47.1,8\n", encoding="utf-8")
-    document["estimator"]["ros__parameters"] = {
+    document["/**/estimator"]["ros__parameters"] = {
         **_changed(section),
         **{"track_line": str(path.with_suffix(".csv")), "train_file": "metro"},
     }

@@ -4,13 +4,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
+from itertools import chain
 from pathlib import Path
 
 import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 
-from adhesion_node.wire.parameter_file import read
+from adhesion_node.wire.parameter_file import read, unheeded
 
 
 def section(name: str, **values: float) -> str:
@@ -72,3 +74,53 @@ def test_a_file_for_others_is_refused(node: str, tmp_path: Path) -> None:
     file.write_text(section("/train1/simulator", seed=1))
     with pytest.raises(ValueError, match=r"has train1/simulator: name the node 'estimator' or '/\*\*'"):
         read(str(file), node)
+
+
+PASSED = ("-p use_sim_time:=true", "-p rate:=1e-6", "-p rate:=2")
+MINE, ALL, OTHER = "/**/estimator", "/**", "/train1/estimator"
+ORDERS = (
+    [MINE, "-p window:=50"],
+    ["-p use_sim_time:=true", MINE, "-p window:=50"],
+    ["-p window:=50", MINE],
+    [ALL, MINE, "-p window:=50"],
+    [MINE, ALL],
+    [ALL, MINE, ALL],
+    ["-p window:=40", MINE, "-p window:=50"],
+    ["-p use_sim_time:=true", MINE, "-p window:=40"],
+    [ALL, "-p window:=50", OTHER, MINE],
+    [OTHER, MINE, "-p window:=50"],
+    ["-p rate:=1e-6", MINE, "-p window:=50", "-p rate:=2"],
+)
+
+
+@pytest.mark.parametrize("order", ORDERS, ids=" ".join)
+def test_what_an_earlier_name_shadows_is_told(order: list[str], tmp_path: Path, context: Context) -> None:
+    """Told is what ROS does not do as it was asked last, and the remedy helps."""
+    given = []
+    for number, one in enumerate(order):
+        file = tmp_path / f"{number}.yaml"
+        file.write_text("" if one.startswith("-p") else section(one, window=40 + number))
+        given.append(one.split() if one.startswith("-p") else ["--params-file", str(file)])
+    said = [one.partition("window:=")[2] or 40 + number for number, one in enumerate(order) if one not in PASSED]
+    asked = int(said[-1])
+
+    def window(arguments: Iterable[Sequence[str]]) -> int:
+        node = Node(
+            "estimator",
+            namespace="/train1",
+            context=context,
+            cli_args=["--ros-args", *chain(*arguments)],
+            use_global_arguments=False,
+            automatically_declare_parameters_from_overrides=True,
+        )
+        value = int(node.get_parameter("window").value)
+        node.destroy_node()
+        return value
+
+    told = unheeded([*chain(*given)], "/train1/estimator")
+    assert bool(told) == (window(given) != asked)
+    for warning in told:
+        assert f"window = {asked} is shadowed, {window(given)} holds: give every --params-file before" in warning
+    ranked = sorted(zip(order, given, strict=True), key=lambda pair: (pair[0].startswith("-p"), pair[0] == ALL))
+    better = [arguments for _, arguments in ranked]
+    assert not told or (window(better), unheeded([*chain(*better)], "/train1/estimator")) == (asked, [])
