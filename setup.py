@@ -82,6 +82,7 @@ setup(
             "hypothesis>=6.98,<7",
             "mcap-ros2-support>=0.5.5,<1",
             "playwright>=1.48,<2",
+            "axe-playwright-python>=0.1.4,<0.2",
             *TOOLS,
             *CLUSTER,
             *PARQUET,

@@ -7,9 +7,11 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import pytest
-from playwright.sync_api import Page, sync_playwright
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, sync_playwright
 
 FLAGS = (
     *("--no-sandbox", "--disable-gpu", "--no-first-run", "--disable-sync"),
@@ -20,20 +22,44 @@ FLAGS = (
 TIMEOUT_MS = 20_000.0
 
 
-@contextmanager
-def open_page() -> Iterator[tuple[Page, list[str]]]:
-    """Open an empty page of 1400 x 1000 pixels; the list gathers what goes wrong in it.
+_running: list[Browser] = []
 
-    Wrong is an error or a warning on the console, an uncaught exception, and a request that fails.
-    """
+
+@contextmanager
+def launched() -> Iterator[Browser]:
+    """Start the browser, for all pages that are opened meanwhile: no other event loop can run in this thread."""
+    if _running:
+        yield _running[-1]
+        return
     chromium = shutil.which("chromium")
     if chromium is None:
         pytest.skip("no chromium on the PATH: apt install chromium")
-    troubles: list[str] = []
     with sync_playwright() as playwright, playwright.chromium.launch(executable_path=chromium, args=FLAGS) as browser:
-        page = browser.new_page(viewport={"width": 1400, "height": 1000})
+        _running.append(browser)
+        try:
+            yield browser
+        finally:
+            _running.remove(browser)
+
+
+@contextmanager
+def open_page(**context: Any) -> Iterator[tuple[Page, list[str]]]:
+    """Open an empty page of 1400 x 1000 pixels, or as `context` says; the list gathers what goes wrong in it.
+
+    Wrong is an error or a warning on the console, an uncaught exception, and a request that fails.
+    """
+    troubles: list[str] = []
+    with launched() as browser, browser.new_context(**{"viewport": {"width": 1400, "height": 1000}, **context}) as own:
+        page = own.new_page()
         page.set_default_timeout(TIMEOUT_MS)
         page.on("pageerror", lambda error: troubles.append(str(error)))
         page.on("requestfailed", lambda request: troubles.append(f"{request.url}: {request.failure}"))
         page.on("console", lambda said: troubles.append(said.text) if said.type in ("error", "warning") else None)
         yield page, troubles
+
+
+def assert_accessible(page: Page) -> None:
+    """Hold the page against the rules of WCAG 2.2, levels A and AA, as far as axe-core can tell."""
+    wcag = {"type": "tag", "values": ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa", "wcag22aa"]}
+    found = Axe().run(page, options={"runOnly": wcag})
+    assert found.violations_count == 0, found.generate_report()

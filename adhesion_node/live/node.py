@@ -41,10 +41,13 @@ class Live(Node):
             if topic is not topics.POSITION:
                 qos.subscribe(self, topic, lambda _: self.view.heard(topics.POSITION, time.monotonic()))
         try:
+            from .guard import exposure
             from .server import Server
         except ModuleNotFoundError as error:
             raise ValueError(f"{error.name} is missing: pip install '.[live]'") from error
         self.server = Server(host, port, lambda: self.view.parts(time.monotonic()), PERIOD_S)
+        if warning := exposure(host):
+            self.get_logger().warning(warning)
         self.get_logger().info(f"open {self.server.url}")
 
     def close(self) -> None:
@@ -85,7 +88,7 @@ class Live(Node):
     def _on_diagnostics(self, read: Statuses) -> None:
         for status in read.entries:
             if "regime" in status.values:  # /diagnostics is shared with everybody
-                self.view.estimated(status.values, status.message)
+                self.view.estimated(status.values, status.message, status.level > 0)
 
     def _on_status(self, read: Statuses) -> None:
         for status in read.entries:

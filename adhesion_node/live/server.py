@@ -1,82 +1,146 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The web server of the live page, in a thread of its own: the page itself and one stream of events for each viewer."""
+"""The web server of the live page, in a thread of its own: the page itself, and a socket to each viewer.
+
+Web sockets, as a browser opens no more than six streams of events to one host in all its tabs.
+"""
 
 import asyncio
 import threading
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
-from contextlib import suppress
-from typing import Any
 
-from aiohttp import web
+from aiohttp import WSCloseCode, web
 
-from ..web import as_json, page
+from ..web import POLICY, page
+from .feed import Feed, Parts
+from .guard import REQUEST_S, Guard, allowed
 
 CLOSING_S = 1.0
-"""Longest wait for open streams at the end."""
+"""Longest wait for open sockets at the end."""
 
-Parts = Callable[[], dict[str, Any]]
+BEAT_S = 0.3
+"""Longest silence towards a viewer: its page says after 1 s that there is no data."""
+
+BEHIND = 50
+"""Messages that wait for a viewer until it is given up: it comes back and is sent the whole."""
+
+HEADERS = {
+    "Content-Security-Policy": f"{POLICY}; connect-src 'self'; img-src data:; frame-ancestors 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-store",
+}
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Server:
-    """Serves the page; a viewer is sent every `period_s` those of the `parts` that have changed.
+    """Serves the page; all viewers are sent every `period_s` what has changed of the `parts`.
 
     `parts` is called from the server's thread and must not block. Raises OSError when the address is taken.
     """
 
     def __init__(self, host: str, port: int, parts: Parts, period_s: float) -> None:
-        self._parts = parts
+        self._feed = Feed(parts)
+        self._host = host
         self._period_s = period_s
         self._stop = asyncio.Event()
-        self.viewers = 0
-        """Pages that are open now."""
+        self._queues: set[asyncio.Queue[str | None]] = set()
         started: Future[tuple[asyncio.AbstractEventLoop, str]] = Future()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve(host, port, started)), name="live page")
         self._thread.start()
         self._loop, self.url = started.result()
 
+    @property
+    def viewers(self) -> int:
+        """Pages that are open now."""
+        return len(self._queues)
+
     def close(self) -> None:
-        """End the streams and the thread; closing again does nothing."""
+        """End the sockets and the thread; closing again does nothing."""
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._stop.set)
             self._thread.join()
 
     async def _serve(self, host: str, port: int, started: Future[tuple[asyncio.AbstractEventLoop, str]]) -> None:
-        application = web.Application()
+        application = web.Application(middlewares=[self._checked])
         application.add_routes([web.get("/", _page), web.get("/events", self._events)])
-        runner = web.AppRunner(application, access_log=None, shutdown_timeout=CLOSING_S)
+        runner = web.AppRunner(application, access_log=None, shutdown_timeout=CLOSING_S, keepalive_timeout=REQUEST_S)
         await runner.setup()
+        assert runner.server is not None
+        loop, self._guard = asyncio.get_running_loop(), Guard(runner.server)
         try:
-            await web.TCPSite(runner, host, port).start()
+            listening = await loop.create_server(self._guard, host, port)
         except OSError as error:
             started.set_exception(OSError(error.errno, f"{host}:{port}: {error.strerror}"))
         else:
-            number = runner.addresses[0][1]
-            started.set_result((asyncio.get_running_loop(), f"http://{f'[{host}]' if ':' in host else host}:{number}/"))
-            await self._stop.wait()
+            number = listening.sockets[0].getsockname()[1]
+            started.set_result((loop, f"http://{f'[{host}]' if ':' in host else host}:{number}/"))
+            await self._broadcast()
+            listening.close()
         finally:
             await runner.cleanup()
 
+    async def _broadcast(self) -> None:
+        silent_s = 0.0
+        while not self._stop.is_set():
+            if self._queues:
+                news = self._feed.news()
+                silent_s += self._period_s
+                if news.count(":") > 1 or silent_s >= BEAT_S:
+                    silent_s = 0.0
+                    for queue in self._queues:
+                        _give(queue, news)
+            await asyncio.sleep(self._period_s)
+        for queue in self._queues:
+            _give(queue, None)
+
     async def _events(self, request: web.Request) -> web.StreamResponse:
-        """Server-sent events: what has changed since the last one, all of it at first."""
-        response = web.StreamResponse(headers={"Content-Type": "text/event-stream", "Cache-Control": "no-store"})
+        """Text messages in JSON: the whole at first, then news."""
+        response = web.WebSocketResponse(timeout=CLOSING_S, heartbeat=10.0, max_msg_size=1024)
         await response.prepare(request)
-        sent: dict[str, Any] = {}
-        self.viewers += 1
+        queue: asyncio.Queue[str | None] = asyncio.Queue(BEHIND)
+        queue.put_nowait(self._feed.whole())
+        self._queues.add(queue)
+        listening = asyncio.create_task(_until_gone(response, queue))
         try:
-            with suppress(ConnectionError):  # the viewer has gone
-                while not self._stop.is_set():
-                    parts = self._parts()
-                    news = {name: part for name, part in parts.items() if name not in sent or sent[name] != part}
-                    if news:
-                        await response.write(f"data: {as_json(news)}\n\n".encode())
-                    sent = parts
-                    await asyncio.sleep(self._period_s)
+            while (message := await queue.get()) is not None:
+                await response.send_str(message)
+        except ConnectionError:
+            pass  # the viewer has gone
         finally:
-            self.viewers -= 1
+            self._queues.discard(queue)
+            listening.cancel()
+            await response.close(code=WSCloseCode.GOING_AWAY)
         return response
+
+    @web.middleware
+    async def _checked(self, request: web.Request, handler: Handler) -> web.StreamResponse:
+        """Answer those alone who ask for this server by a name of its own, and no other site's script."""
+        self._guard.asked(request)
+        origin = request.headers.get("Origin", "").partition("://")[2]
+        if not allowed(request.host, self._host) or (origin and origin != request.host):
+            raise web.HTTPForbidden(text=f"Host = {request.host!r}: ask for {self.url} or by an address\n")
+        return await handler(request)
+
+
+def _give(queue: asyncio.Queue[str | None], message: str | None) -> None:
+    """Put a message in; a viewer that takes none is given up."""
+    if queue.full():
+        while not queue.empty():
+            queue.get_nowait()
+        message = None
+    queue.put_nowait(message)
+
+
+async def _until_gone(response: web.WebSocketResponse, queue: asyncio.Queue[str | None]) -> None:
+    """Viewers say nothing: what comes from one is that it has gone."""
+    await response.receive()
+    _give(queue, None)
 
 
 async def _page(_: web.Request) -> web.Response:
-    return web.Response(text=page("live"), content_type="text/html")
+    response = web.Response(text=page("live"), content_type="text/html", headers=HEADERS)
+    response.force_close()
+    return response

@@ -5,20 +5,25 @@
 The parts are replaced as a whole and never changed in place, so that another thread may read them at any time.
 """
 
-import math
 from collections import deque
 from collections.abc import Mapping
-from typing import Any
+from itertools import islice
+from typing import Any, NamedTuple
 
 from ..core.atp.received import StampedCurve, TrainState
+from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
-from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, POSITION, SPEED, STATE, Topic
+from ..report.ahead import SHOWN, ahead
+from ..report.curves import IN_WORDS
+from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
+from .fit import number, numbers, rounded, text_of
 
 EXPECTED = {
     POSITION: "position",
     BRAKE_PRESSURE: "brake pressure",
     SPEED: "odometer (optional)",
     STATE: "estimator",
+    MU: "adhesion",
     BRAKING_CURVE: "braking curve",
     ATP_STATUS: "ATP monitor",
 }
@@ -27,36 +32,64 @@ EXPECTED = {
 RATE_OVER_S = 3.0
 """Time over which the rate of an input is counted."""
 
-LATE_S = 2.0
-"""Age from which an input counts as late; the ATP monitor uses a curve no longer either."""
-
-MOST_POINTS = 600
-"""Points of a history."""
+MOST_POINTS, MOST_EVENTS = 600, 60
+"""Rows of a history, and of the events."""
 
 SPACING_S, SPACING_M = 0.5, 20.0
 """Least distance between two points of a history: over time, and along the track."""
 
-LIMITS = ("permitted", "warning", "sbi", "ebi", "indication")
-"""Speeds of the supervision; in its status `permitted_mps` and so on."""
+CURVE_POINTS, MOST_KEYS = 24, 100
+"""Points of a curve, and entries of a status that are looked at."""
+
+COUNTS = ("measurements", "accepted", "windows", "changes", "resets")
+"""What is told of the estimator's diagnostics."""
+
+BRAKES = ("SERVICE_BRAKE", "EMERGENCY_BRAKE")
+"""Levels at which the monitor brakes."""
+
+
+class Rows(NamedTuple):
+    """The newest rows of a history, and how many have gone before them."""
+
+    gone: int = 0
+    rows: tuple[Any, ...] = ()
+
+    def with_row(self, row: Any, most: int) -> "Rows":
+        """Append a row; of more than `most` the oldest goes."""
+        surplus = max(len(self.rows) + 1 - most, 0)
+        return Rows(self.gone + surplus, (*self.rows, row)[surplus:])
 
 
 class View:
     """Takes what the messages say and gives it out by parts, ready for JSON. Mutable."""
 
     def __init__(self) -> None:
-        self._parts: dict[str, Any] = {}
         self._arrivals: dict[Topic, deque[float]] = {topic: deque() for topic in EXPECTED}
         self._refusals: dict[Topic, str] = {}
+        self._taken: dict[str, float | None] = {}  # when the last message was taken of topics now refused
         self._ended_s: float | None = None
-        self._start_ns = self._newest_ns = 0
+        self._start_ns = self._newest_ns = self._run = 0
         self._mu: dict[str, float] = {}
+        self._safe: BrakingCurve | None = None
+        self._sign = 1
         self._clear()
 
     def parts(self, now_s: float) -> dict[str, Any]:
-        """Return the present parts by name; None or empty while unknown. `now_s` is a time as given to `heard`."""
+        """Return the present parts by name; None or empty while unknown. `now_s` is a time as given to `heard`.
+
+        Places count along the run: `sign` is -1 where the chainage falls.
+        """
         now_s = now_s if self._ended_s is None else self._ended_s
-        inputs = [self._health(topic, now_s) for topic in EXPECTED]
-        return {**self._parts, "inputs": inputs, "ended": self._ended_s is not None}
+        return {
+            **self._parts,
+            "run": self._run,
+            "sign": self._sign,
+            "now": round(now_s, 2),
+            "inputs": {topic.name: self._health(topic, now_s) for topic in EXPECTED},
+            "heard": {topic.name: round(at[-1], 2) for topic in EXPECTED if (at := tuple(self._arrivals[topic]))},
+            "taken": self._taken,
+            "ended": self._ended_s is not None,
+        }
 
     def heard(self, topic: Topic, now_s: float, refusal: str = "") -> None:
         """A message of a topic has come; `refusal` says why it cannot be shown."""
@@ -64,11 +97,18 @@ class View:
         arrivals.append(now_s)
         while arrivals[0] < now_s - RATE_OVER_S:
             arrivals.popleft()
-        self._refusals[topic] = refusal
+        if refusal and not self._refusals.get(topic):
+            self._event("fault", f"{topic.name} refused: {text_of(refusal)}")
+        self._refusals[topic] = text_of(refusal)
+        if not refusal:
+            self._taken = {name: at_s for name, at_s in self._taken.items() if name != topic.name}
+        elif topic.name not in self._taken:
+            before_s = round(arrivals[-2], 2) if len(arrivals) > 1 else None
+            self._taken = {**self._taken, topic.name: before_s}
 
     def place(self, position_m: float) -> None:
         """A measured position."""
-        self._parts["place_m"] = round(position_m, 1)
+        self._parts["place_m"] = number(self._sign * position_m, 1)
 
     def train(self, state: TrainState) -> None:
         """An estimated state. A stamp before the last one begins a new run."""
@@ -78,53 +118,85 @@ class View:
         self._newest_ns = state.t_ns
         self._parts["train"] = {
             "t": round((state.t_ns - self._start_ns) * 1e-9, 2),
-            "position": round(state.position_m, 1),
-            "speed": round(state.speed_mps / KMH, 2),
+            "position": number(self._sign * state.position_m, 1),
+            "speed": number(abs(state.speed_mps) / KMH, 2),
         }
+        self._awaited = True
 
     def adhesion(self, name: str, value: float) -> None:
         """An adhesion: `mu`, `mu_lower` or, of a simulator, `true_mu`."""
-        self._mu[name] = round(value, 5)
+        if (fit := number(value, 5)) is not None:
+            self._mu[name] = fit
 
-    def estimated(self, values: Mapping[str, str], message: str) -> None:
-        """The estimator's diagnostics, which end the messages of an estimate."""
-        regime = values.get("regime", "")
-        self._parts["estimator"] = {
-            "message": message,
-            "regime": regime,
+    def estimated(self, values: Mapping[str, str], message: str, alarming: bool = False) -> None:
+        """The estimator's diagnostics, which end the messages of an estimate and may come between two."""
+        values = {text_of(key): text_of(value) for key, value in islice(values.items(), MOST_KEYS)}
+        before, regime = self._parts["estimator"] or {}, values.get("regime", "")
+        counts: dict[str, Any] = {key: values[key] for key in COUNTS if key in values}
+        self._parts["estimator"] = now = {
+            "message": text_of(message),
+            "alarming": alarming,
+            "regime": regime.lower(),
+            "words": IN_WORDS.get(regime, "not known yet"),
             "confidence": values.get("confidence", ""),
             "dropped": {key.removeprefix("dropped."): n for key, n in values.items() if key.startswith("dropped.")},
-            **{key: values[key] for key in ("measurements", "accepted", "windows") if key in values},
+            **counts,
         }
-        train = self._parts["train"]
-        if train is not None and {"mu", "mu_lower"} <= self._mu.keys():
-            self._parts["adhesion"] = dict(self._mu)
-            self._append("history", "t", SPACING_S, {**train, "regime": regime.lower(), **self._mu})
+        for key, said in (("changes", "the rail has changed"), ("resets", "the estimator began anew")):
+            if before and (number(now.get(key), 0) or 0) > (number(before.get(key), 0) or 0):
+                self._event(key.removesuffix("s"), said)
+        if regime != before.get("regime", "").upper():
+            self._event("regime", now["words"])
+        if alarming and message != before.get("message"):
+            self._event("fault", now["message"])
+        if self._parts["train"] is not None and self._awaited:
+            known = {"mu", "mu_lower"} <= self._mu.keys()
+            self._parts["adhesion"] = dict(self._mu) if known else None
+            self._append("history", "t", SPACING_S, {**self._parts["train"], "regime": regime.lower(), **self._mu})
+            # What is withheld is not published: the next estimate must not be shown with this one's numbers.
+            self._mu = {name: value for name, value in self._mu.items() if name == "true_mu"}
+            self._awaited = False
 
     def curve(self, name: str, placed: StampedCurve) -> None:
-        """A braking curve, `safe` or `nominal`."""
-        way = {"x": placed.places_m.round(1).tolist(), "y": (placed.curve.speed_mps / KMH).round(2).tolist()}
-        self._parts["curves"] = {**self._parts["curves"], name: way}
+        """A braking curve, `safe` or `nominal`, which tells in which direction places are met."""
+        if placed.sign != self._sign:
+            self._sign = placed.sign
+            self._clear()
+        kept = slice(None, None, max(len(placed.places_m) // CURVE_POINTS, 1))
+        columns = (placed.places_m * placed.sign, placed.curve.speed_mps / KMH)
+        places, speeds = ([*row[kept], row[-1]] for row in columns)
+        self._parts["curves"] = {**self._parts["curves"], name: {"x": rounded(places, 0), "y": rounded(speeds, 1)}}
+        if name == "safe":
+            self._safe = placed.curve
 
     def supervised(self, values: Mapping[str, str], message: str) -> None:
         """The status of the ATP monitor; its limits are None where it knows none."""
-        numbers = {key: number for key, text in values.items() if (number := _number(text)) is not None}
-        kmh = {
-            key.removesuffix("_mps"): round(number / KMH, 2) for key, number in numbers.items() if key.endswith("_mps")
-        }
-        limits = {name: kmh.get(name) for name in LIMITS}
-        target_m, left_m = numbers.get("target_position_m"), numbers.get("distance_to_target_m")
+        known = numbers(values)
+        if "target_position_m" in known:
+            known["target_position_m"] *= self._sign
+        kmh = {key.removesuffix("_mps"): number(value / KMH, 1) for key, value in known.items() if key.endswith("_mps")}
+        target_m, left_m = known.get("target_position_m"), known.get("distance_to_target_m")
+        limits = None if self._safe is None else ahead(self._safe, known)
+        level, before = text_of(values.get("level", "")), self._parts["supervision"] or {}
         self._parts["supervision"] = {
-            "level": values.get("level", ""),
-            "message": message,
-            "target_m": target_m,
+            "level": level,
+            "message": text_of(message),
+            "target_m": number(target_m, 1),
             "target_kmh": kmh.get("target_speed"),
-            "left_m": left_m,
-            "margin_m": numbers.get("margin_m"),
-            **limits,
+            "left_m": number(left_m, 1),
+            "margin_m": number(known.get("margin_m"), 0),
+            "to_indication_s": None if limits is None else number(limits.to_indication_s, 1),
+            **{name: kmh.get(name) for name in (*SHOWN, "indication")},
         }
+        self._parts["ahead"] = None
+        if limits is not None:
+            rows = {name: rounded(row / KMH, 1) for name, row in zip(SHOWN, limits[1:5], strict=True)}
+            self._parts["ahead"] = {"x": rounded(limits.position_m, 0), **rows}
+        if level != before.get("level"):
+            self._event("intervention" if level in BRAKES else "level", level.replace("_", " "))
         if target_m is not None and left_m is not None:
-            self._append("passed", "position", SPACING_M, {"position": round(target_m - left_m, 1), **limits})
+            place = {"position": number(target_m - left_m, 1), **{name: kmh.get(name) for name in SHOWN}}
+            self._append("passed", "position", SPACING_M, place)
 
     def end(self, now_s: float) -> None:
         """The run has ended: what is shown stays as it is at this time."""
@@ -132,34 +204,25 @@ class View:
 
     def _clear(self) -> None:
         """Forget the last run; the adhesions stay, as those of an estimate come before its state."""
-        unknown = dict.fromkeys(("place_m", "train", "adhesion", "estimator", "supervision"))
-        self._parts = {**unknown, "curves": {}, "history": (), "passed": ()}
+        unknown = dict.fromkeys(("place_m", "train", "adhesion", "estimator", "supervision", "ahead"))
+        self._parts: dict[str, Any] = {**unknown, "curves": {}, "history": Rows(), "passed": Rows(), "events": Rows()}
+        self._run += 1
+        self._awaited = False
+        self._safe = None
+
+    def _event(self, kind: str, said: str) -> None:
+        at_s = 0.0 if self._parts["train"] is None else self._parts["train"]["t"]
+        row = {"t": at_s, "kind": kind, "text": said}
+        self._parts["events"] = self._parts["events"].with_row(row, MOST_EVENTS)
 
     def _append(self, name: str, key: str, spacing: float, row: dict[str, Any]) -> None:
         history = self._parts[name]
-        if not history or abs(row[key] - history[-1][key]) >= spacing:
-            self._parts[name] = (*history, row)[-MOST_POINTS:]
+        if row[key] is not None and (not history.rows or abs(row[key] - history.rows[-1][key]) >= spacing):
+            self._parts[name] = history.with_row(row, MOST_POINTS)
 
     def _health(self, topic: Topic, now_s: float) -> dict[str, Any]:
         arrivals, refusal = tuple(self._arrivals[topic]), self._refusals.get(topic, "")
-        said = {"name": EXPECTED[topic], "topic": topic.name}
-        if not arrivals:
-            return {**said, "state": "never", "hz": 0.0, "age": None}
-        age = now_s - arrivals[-1]
-        state = "refused" if refusal else "late" if age > LATE_S else "good"
+        state = "never" if not arrivals else "refused" if refusal else "heard"
         # A message of 3 s ago has only left the window when the next one comes.
         recent = sum(arrival > now_s - RATE_OVER_S for arrival in arrivals)
-        return {**said, "state": state, "hz": round(recent / RATE_OVER_S, 1), "age": round(age, 1), "why": refusal}
-
-
-def _number(text: str) -> float | None:
-    """Read a number; None for a text or what is not finite.
-
-    >>> _number("2.5"), _number("NORMAL"), _number("nan")
-    (2.5, None, None)
-    """
-    try:
-        value = float(text)
-    except ValueError:
-        return None
-    return value if math.isfinite(value) else None
+        return {"name": EXPECTED[topic], "state": state, "hz": round(recent / RATE_OVER_S, 1), "why": refusal}

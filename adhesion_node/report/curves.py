@@ -20,7 +20,7 @@ MOST_POINTS = 1500
 """Points of a series at most: more than a screen is wide."""
 
 IN_WORDS = {
-    Regime.COASTING.name: "nothing to learn",
+    Regime.COASTING.name: "nothing is claimed",
     Regime.BRAKE_LIMITED.name: "the brake limits",
     Regime.ADHESION_LIMITED.name: "the adhesion limits",
 }

@@ -47,7 +47,7 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
     subtitle = (
         f"Wheel–rail adhesion and emergency braking to {target_kmh:g} km/h, beside the fixed worst case "
         f"μ\u00a0=\u00a0{FIXED_MU}. Distances are those of the braking curves; without a curve μ keeps its value. "
-        "Bands: nothing to learn (grey), the brake limits (blue), the adhesion limits (orange)."
+        "Bands: nothing is claimed (grey), the brake limits (blue), the adhesion limits (orange)."
     )
     details = (
         _section("Distances", subjects, lambda subject: _distances(subject, target_kmh)),

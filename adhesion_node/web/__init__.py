@@ -7,8 +7,12 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
-STYLES = {"report": ("style.css",), "live": ("style.css", "live.css")}
-SCRIPTS = {"report": ("chart.js", "report.js"), "live": ("chart.js", "dial.js", "live.js")}
+POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
+"""What a page may do: nothing but what stands in it."""
+
+_CHARTS = ("uplot.js", "chart.js")
+STYLES = {"report": ("uplot.css", "style.css"), "live": ("uplot.css", "style.css", "live.css")}
+SCRIPTS = {"report": (*_CHARTS, "report.js"), "live": (*_CHARTS, "dial.js", "live.js")}
 """What stands in each page, in this order."""
 
 
@@ -18,7 +22,7 @@ def page(name: str, **parts: str) -> str:
     `parts` fill its $placeholders and must be HTML already, or JSON by `as_json` inside a script element.
     """
     style, script = ("\n".join(map(_read, kind[name])) for kind in (STYLES, SCRIPTS))
-    return Template(_read(f"{name}.html")).substitute(style=style, script=script, **parts)
+    return Template(_read(f"{name}.html")).substitute(style=style, script=script, policy=POLICY, **parts)
 
 
 def as_json(data: Any) -> str:

@@ -1,12 +1,16 @@
 // Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
-// Line charts in SVG, the same for the report and the live page. Colours and dashes are classes of style.css, so that
-// a line is told by its dash where there is no colour.
+// Line charts by uPlot, the same for the report and the live page. How a line of a kind looks stands in LOOKS and, its
+// colour, in style.css: lines are told by their dashes where there is no colour.
 
-const HEIGHT = 240, MARGIN = { left: 52, right: 12, top: 10, bottom: 34 };
+const LOOKS = {
+  truth: { width: 2.2 }, identified: { points: 4 }, nominal: {},  atleast: { arrows: true }, prior: { dash: [2, 4] }, bound: { dash: [7, 4] },
+  fixed: { dash: [2, 3], width: 2.2 }, run: { width: 2.2 }, permitted: { width: 2.2 }, warning: { dash: [10, 3] }, sbi: { dash: [5, 3] },
+  ebi: { dash: [9, 3, 2, 3] },
+};
+const FONT = "12px system-ui, sans-serif", ARROW_EVERY_PX = 22, ZOOM_STEP = 1.25;
 
-// An element of HTML, or of SVG where `svg` is true.
 function element(name, attributes = {}, text = "", svg = false) {
   const made = svg ? document.createElementNS("http://www.w3.org/2000/svg", name) : document.createElement(name);
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
@@ -14,122 +18,207 @@ function element(name, attributes = {}, text = "", svg = false) {
   return made;
 }
 
-function shape(name, attributes, text) {
-  return element(name, attributes, text, true);
+const shape = (name, attributes, text) => element(name, attributes, text, true);
+
+// The colour of a class `ink KIND`, as the present scheme, forced colours or print have it.
+const inks = new Map(), probe = document.body.appendChild(element("span", { hidden: "" }));
+function ink(kind) {
+  if (!inks.has(kind)) {
+    probe.className = `ink ${kind}`;
+    inks.set(kind, getComputedStyle(probe).color);
+  }
+  return inks.get(kind);
 }
 
-// About `wanted` round numbers from `low` to `high`.
-function ticks(low, high, wanted) {
-  const raw = (high - low) / wanted, power = 10 ** Math.floor(Math.log10(raw));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((candidate) => candidate >= raw);
-  const first = Math.ceil(low / step - 1e-9);
-  return Array.from({ length: Math.floor(high / step + 1e-9) - first + 1 }, (_, i) => Number(((first + i) * step).toPrecision(10)));
+const drawn = new Set(), schemes = ["(prefers-color-scheme: dark)", "(forced-colors: active)", "print"].map((query) => matchMedia(query));
+function drawAllAnew() {
+  inks.clear();
+  drawn.forEach((one) => one.fit());
+}
+for (const scheme of schemes) scheme.addEventListener("change", drawAllAnew);
+// Paper is narrower than most screens: what is printed is drawn for it.
+for (const kind of ["before", "after"]) {
+  addEventListener(`${kind}print`, () => {
+    document.body.classList.toggle("printing", kind === "before");
+    drawAllAnew();
+  });
 }
 
-// A chart below `host`. spec: {title, x: {label, range}, y: {range}, lines: [{label, kind, x, y, dots}],
-// bands: [{from, to, kind, label}], marks: [{x, y, kind, label}]}; lines may have null for gaps. Returns draw(spec) and
-// cursor(x); `onPick` hears of a place chosen with the pointer.
-function chart(host, onPick = null) {
-  const figure = host.appendChild(element("figure", { class: "chart" }));
-  const caption = figure.appendChild(element("figcaption"));
-  const svg = figure.appendChild(shape("svg", { role: "img" }));
-  const legend = figure.appendChild(element("div", { class: "legend" }));
-  const clip = `clip${document.querySelectorAll("figure.chart").length}`;
-  let spec = null, at = null, pointer = null, width = 0, legendKey = "";
+// A stretch of x that several charts show together; null: each its own.
+const shared = () => ({ zoom: null, members: new Set() });
 
-  const sx = (x) => MARGIN.left + ((x - spec.x.range[0]) / (spec.x.range[1] - spec.x.range[0])) * (width - MARGIN.left - MARGIN.right);
-  const sy = (y) => HEIGHT - MARGIN.bottom - ((y - spec.y.range[0]) / (spec.y.range[1] - spec.y.range[0])) * (HEIGHT - MARGIN.top - MARGIN.bottom);
-  const point = (x, y) => `${sx(x).toFixed(1)},${sy(y).toFixed(1)}`;
+// A chart below `host`; it is drawn by draw(spec) with {title, unit, x: {label, range}, y: {range}, lines: [{label, kind, x, y}],
+// bands: [{from, to, kind, label}], marks: [{x, y, kind, label}], events: [{x, kind, label}]}; null in a line is a gap.
+// cursor(x) marks the present; `onPick` hears of a place clicked. The wheel, a drag, + and - zoom, Shift and a drag or the
+// arrows pan, a double click or 0 shows all again.
+function chart(host, { view = shared(), onPick = null } = {}) {
+  const figure = host.appendChild(element("figure", { class: "chart" })), caption = figure.appendChild(element("figcaption"));
+  const area = figure.appendChild(element("div", { class: "area" }));
+  let spec = null, plot = null, key = "", at = null, pointer = null;
+  const range = () => view.zoom ?? spec.x.range;
+  const refresh = () => view.members.forEach((member) => member.rescale());
 
-  function path(line) {
-    let pen = "M";
-    return line.x.map((x, i) => {
-      if (line.y[i] === null) { pen = "M"; return ""; }
-      const step = pen + point(x, line.y[i]);
-      pen = "L";
-      return step;
-    }).join("");
+  function zoomTo(from, to) {
+    const [low, high] = spec.x.range, wide = Math.min(Math.max(to - from, (high - low) / 1e4), high - low);
+    const start = Math.min(Math.max(from, low), high - wide);
+    view.zoom = wide >= 0.999 * (high - low) ? null : [start, start + wide];
+    refresh();
   }
-
-  function axes() {
-    const drawn = shape("g", { class: "axes" }), bottom = HEIGHT - MARGIN.bottom;
-    for (const x of ticks(...spec.x.range, Math.max(width / 90, 2))) {
-      drawn.append(shape("path", { d: `M${sx(x)},${MARGIN.top}V${bottom}` }));
-      drawn.append(shape("text", { x: sx(x), y: bottom + 15, "text-anchor": sx(x) > width - 25 ? "end" : "middle" }, String(x)));
-    }
-    for (const y of ticks(...spec.y.range, 5)) {
-      drawn.append(shape("path", { d: `M${MARGIN.left},${sy(y)}H${width - MARGIN.right}`, class: y === 0 ? "zero" : "" }));
-      drawn.append(shape("text", { x: MARGIN.left - 6, y: sy(y) + 4, "text-anchor": "end", class: "y" }, String(y)));
-    }
-    drawn.append(shape("text", { x: width - MARGIN.right, y: HEIGHT - 4, "text-anchor": "end" }, spec.x.label));
-    return drawn;
+  function scale(factor, around) {
+    const [from, to] = range();
+    zoomTo(around - (around - from) * factor, around + (to - around) * factor);
   }
+  const pan = (share) => { const [from, to] = range(), by = share * (to - from); zoomTo(from + by, to + by); };
 
-  function bands() {
-    const drawn = shape("g", { class: "bands" });
+  function under(u) {
+    const { ctx, bbox } = u, px = uPlot.pxRatio;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    ctx.font = `${11 * px}px system-ui, sans-serif`;
     for (const band of spec.bands ?? []) {
-      const left = sx(Math.max(band.from, spec.x.range[0])), wide = sx(Math.min(band.to, spec.x.range[1])) - left;
-      if (wide <= 0) continue;
-      drawn.append(shape("rect", { x: left, y: MARGIN.top, width: wide, height: HEIGHT - MARGIN.top - MARGIN.bottom, class: band.kind }));
-      if (wide > 7 * band.label.length) drawn.append(shape("text", { x: left + 4, y: MARGIN.top + 12 }, band.label));
+      const left = Math.max(u.valToPos(band.from, "x", true), bbox.left), right = Math.min(u.valToPos(band.to, "x", true), bbox.left + bbox.width);
+      if (right <= left) continue;
+      ctx.fillStyle = ink(`band ${band.kind}`);
+      ctx.fillRect(left, bbox.top, right - left, bbox.height);
+      ctx.fillStyle = ink("soft");
+      if (right - left > ctx.measureText(band.label).width + 8 * px) ctx.fillText(band.label, left + 4 * px, bbox.top + 12 * px);
     }
-    return drawn;
+    ctx.restore();
   }
 
-  function curves() {
-    const drawn = shape("g", { "clip-path": `url(#${clip})` });
-    for (const line of spec.lines) {
-      drawn.append(shape("path", { d: path(line), class: `line ${line.kind}` }));
-      if (!line.dots) continue;
-      line.x.forEach((x, i) => line.y[i] === null || drawn.append(shape("circle", { cx: sx(x), cy: sy(line.y[i]), r: 2, class: line.kind })));
+  function over(u) {
+    const { ctx, bbox } = u, px = uPlot.pxRatio, bottom = bbox.top + bbox.height;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left - 6 * px, 0, bbox.width + 12 * px, bottom + 6 * px);
+    ctx.clip();
+    spec.lines.forEach((line, i) => LOOKS[line.kind].arrows && arrows(u, i + 1));
+    ctx.font = `600 ${11 * px}px system-ui, sans-serif`;
+    for (const event of spec.events ?? []) {
+      const x = u.valToPos(event.x, "x", true);
+      ctx.fillStyle = ink(`event ${event.kind}`);
+      ctx.beginPath();
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x - 5 * px, bbox.top - 8 * px);
+      ctx.lineTo(x + 5 * px, bbox.top - 8 * px);
+      ctx.fill();
     }
     for (const mark of spec.marks ?? []) {
-      const right = sx(mark.x) > width - 8 * mark.label.length - 30;
-      drawn.append(shape("circle", { cx: sx(mark.x), cy: sy(mark.y), r: 5, class: `mark ${mark.kind}` }));
-      drawn.append(shape("text", { x: sx(mark.x) + (right ? -9 : 9), y: sy(mark.y) - 8, "text-anchor": right ? "end" : "start", class: "mark" }, mark.label));
+      const x = u.valToPos(mark.x, "x", true), y = u.valToPos(mark.y, "y", true), right = x > bbox.left + bbox.width - 110 * px;
+      ctx.fillStyle = ink(mark.kind);
+      ctx.beginPath();
+      ctx.arc(x, y, 5 * px, 0, 7);
+      ctx.fill();
+      ctx.textAlign = right ? "right" : "left";
+      ctx.fillText(mark.label, x + (right ? -9 : 9) * px, y - 8 * px);
     }
-    return drawn;
+    ctx.restore();
+    place();
   }
 
-  // The legend is only made anew when its entries change: it would flicker on the live page.
-  function describe() {
-    const entries = spec.lines.map((line) => [line.label, `line ${line.kind}`]);
-    if (legendKey === (legendKey = JSON.stringify(entries))) return;
-    legend.replaceChildren(...entries.map(([label, kind]) => {
-      const entry = element("span"), sample = shape("svg", { width: 30, height: 10 });
-      sample.append(shape("path", { d: "M0,5H30", class: kind }));
-      entry.append(sample, label);
-      return entry;
-    }));
+  // An interval that is open above: arrows upwards from its lower end.
+  function arrows(u, i) {
+    const { ctx } = u, px = uPlot.pxRatio, [xs, ys] = [u.data[0], u.data[i]], [first, last] = u.series[0].idxs;
+    ctx.strokeStyle = ink("atleast");
+    ctx.lineWidth = 1.4 * px;
+    ctx.beginPath();
+    let before = -Infinity;
+    for (let k = first; k <= last; k++) {
+      const x = u.valToPos(xs[k], "x", true);
+      if (ys[k] == null || x - before < ARROW_EVERY_PX * px) continue;
+      const y = u.valToPos(ys[k], "y", true), top = y - 13 * px;
+      before = x;
+      for (const [dx, dy] of [[0, y], [0, top], [-3 * px, top + 5 * px], [0, top], [3 * px, top + 5 * px]]) dy === y ? ctx.moveTo(x + dx, dy) : ctx.lineTo(x + dx, dy);
+    }
+    ctx.stroke();
   }
+
+  function make() {
+    const value = (_, number) => (number == null ? "–" : Number(number.toPrecision(spec.digits ?? 4)).toString());
+    // Along the run places count upwards; they are told as they stand on the line.
+    const told = (x) => Number((x * (spec.x.sign ?? 1)).toPrecision(10)).toString();
+    const axis = (more) => ({ stroke: () => ink("soft"), font: FONT, labelFont: FONT, grid: { stroke: () => ink("rule"), width: 1 }, ticks: { stroke: () => ink("rule"), width: 1 }, ...more });
+    plot?.destroy();
+    plot = new uPlot({
+      width: area.clientWidth || 640, height: area.clientHeight || 240, padding: [12, 12, 0, 0],
+      scales: { x: { time: false, range }, y: { range: () => spec.y.range } },
+      axes: [axis({ label: spec.x.label, labelSize: 18, size: 28, space: 70, values: (_, splits) => splits.map(told) }), axis({ size: 52, space: 30 })],
+      series: [{ label: spec.x.label, value: (_, x) => (x == null ? "–" : told(Number(x.toPrecision(6)))) }, ...spec.lines.map((line) => {
+        const look = LOOKS[line.kind];
+        return { label: line.label, value, stroke: () => ink(line.kind), width: look.width ?? 1.6, dash: look.dash, points: { show: look.points !== undefined, size: look.points, fill: () => ink(line.kind) } };
+      })],
+      legend: { markers: { width: 3, dash: (u, i) => (LOOKS[spec.lines[i - 1]?.kind]?.dash ? "dashed" : "solid") } },
+      cursor: { sync: { key: spec.x.label, scales: ["x", null] }, drag: { x: true, y: false, setScale: false }, points: { size: 6 },
+                bind: { dblclick: () => () => { view.zoom = null; refresh(); },
+                        mousedown: (u, _, handler) => (event) => (event.shiftKey ? drag(event) : handler(event)) } },
+      hooks: { drawClear: [under], draw: [over], setSelect: [select] },
+    }, table(), area);
+    pointer = plot.over.appendChild(element("div", { class: "present" }));
+    const wrap = plot.root.querySelector(".u-wrap");
+    for (const [name, text] of Object.entries({ tabindex: 0, role: "group", "aria-label": `${spec.title}: chart` })) wrap.setAttribute(name, text);
+    wrap.addEventListener("keydown", press);
+    plot.over.addEventListener("wheel", (event) => {
+      event.preventDefault();
+      scale(event.deltaY < 0 ? 1 / ZOOM_STEP : ZOOM_STEP, plot.posToVal(event.offsetX, "x"));
+    }, { passive: false });
+    plot.over.addEventListener("click", (event) => onPick?.(plot.posToVal(event.offsetX, "x")));
+  }
+
+  function select(u) {
+    const { left, width } = u.select;
+    if (width < 4) return;
+    u.setSelect({ left: 0, top: 0, width: 0, height: 0 }, false);
+    zoomTo(u.posToVal(left, "x"), u.posToVal(left + width, "x"));
+  }
+
+  function drag(start) {
+    const [from, to] = range(), perPx = (to - from) / plot.over.clientWidth;
+    const move = (event) => zoomTo(from - (event.clientX - start.clientX) * perPx, to - (event.clientX - start.clientX) * perPx);
+    addEventListener("mousemove", move);
+    addEventListener("mouseup", () => removeEventListener("mousemove", move), { once: true });
+  }
+
+  function press(event) {
+    const [from, to] = range(), middle = at !== null && at >= from && at <= to ? at : (from + to) / 2;
+    const action = { ArrowLeft: () => pan(-0.1), ArrowRight: () => pan(0.1), "+": () => scale(1 / ZOOM_STEP, middle), "=": () => scale(1 / ZOOM_STEP, middle),
+                     "-": () => scale(ZOOM_STEP, middle), 0: () => { view.zoom = null; refresh(); } }[event.key];
+    if (!action) return;
+    event.preventDefault();
+    action();
+  }
+
+  // uPlot wants one x for all lines; a chart without any point still has its axes.
+  const table = () => uPlot.join([[spec.x.range, [null, null]], ...spec.lines.map((line) => [line.x, line.y])]).toSpliced(1, 1);
 
   function draw(wanted = spec) {
     spec = wanted;
-    width = figure.clientWidth || 640;
     if (spec === null) return;
     caption.textContent = spec.title;
-    svg.setAttribute("viewBox", `0 0 ${width} ${HEIGHT}`);
-    svg.setAttribute("aria-label", spec.title);
-    const frame = shape("clipPath", { id: clip });
-    frame.append(shape("rect", { x: MARGIN.left, y: 0, width: Math.max(width - MARGIN.left - MARGIN.right, 0), height: HEIGHT - MARGIN.bottom }));
-    pointer = shape("path", { class: "cursor" });
-    svg.replaceChildren(frame, bands(), axes(), curves(), pointer);
-    describe();
-    cursor(at);
+    const lines = JSON.stringify([spec.title, spec.x.label, spec.lines.map((line) => [line.label, line.kind])]);
+    if (key !== (key = lines)) make();
+    else {
+      plot.setData(table(), false);
+      rescale();
+    }
   }
 
-  function cursor(x) {
-    at = x;
-    if (pointer !== null && x !== null) pointer.setAttribute("d", `M${sx(x)},${MARGIN.top}V${HEIGHT - MARGIN.bottom}`);
+  const rescale = () => { const [min, max] = range(); plot?.setScale("x", { min, max }); };
+
+  function fit() {
+    if (plot !== null && area.clientWidth > 0) plot.setSize({ width: area.clientWidth, height: area.clientHeight });
   }
 
-  function pick(event) {
-    if (!event.buttons || spec === null) return;
-    const box = svg.getBoundingClientRect(), inside = (event.clientX - box.left) * (width / box.width) - MARGIN.left;
-    onPick(spec.x.range[0] + (inside / (width - MARGIN.left - MARGIN.right)) * (spec.x.range[1] - spec.x.range[0]));
+  function place() {
+    if (pointer === null) return;
+    pointer.hidden = at === null || at < range()[0] || at > range()[1];
+    if (!pointer.hidden) pointer.style.transform = `translateX(${plot.valToPos(at, "x")}px)`;
   }
 
-  if (onPick !== null) for (const kind of ["pointerdown", "pointermove"]) svg.addEventListener(kind, pick);
-  new ResizeObserver(() => { if (figure.clientWidth !== width) draw(); }).observe(figure);
-  return { draw, cursor };
+  const self = { draw, fit, rescale, cursor(x) { at = x; place(); }, get plot() { return plot; } };
+  view.members.add(self);
+  drawn.add(self);
+  new ResizeObserver(fit).observe(area);
+  return self;
 }

@@ -1,14 +1,29 @@
 // Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
-// The live page: a stream of events brings what has changed, and only what hangs on it is drawn anew.
+// The live page. A socket brings what has changed. Every value is shown as long as it is fresh: what is old is blank, and
+// without a sign of life from the program the whole page is.
 
-const FIXED_MU = 0.0726, GAUGE_END = 0.2, SHOWN_S = 180, BEHIND_M = 1500;
-const IN_WORDS = { coasting: "nothing to learn", brake_limited: "the brake limits", adhesion_limited: "the adhesion limits" };
+const FIXED_MU = 0.0726, SHOWN_S = 180, BEHIND_M = 1500, STALE_S = 2, SILENT_S = 1, RETRY_MS = 1000, EVENTS_SHOWN = 14, GAP_S = 5;
+const STATE = "adhesion/state", MU = "adhesion/mu", CURVE = "adhesion/braking_curve", STATUS = "atp/status", POSITION = "position";
+const LIMITS = { permitted: "permitted", warning: "warning", sbi: "service brake", ebi: "emergency brake" };
+const KIND_OF = { adhesion_limited: "identified", brake_limited: "atleast" };
 const byId = (id) => document.getElementById(id);
-const state = { history: [], passed: [], curves: {}, inputs: [], train: null, adhesion: null, supervision: null, estimator: null, place_m: null, ended: false };
 const drawDial = dial(byId("dial")), way = chart(byId("way")), course = chart(byId("adhesion"));
 const number = (value, digits, unit = "") => (value === null || value === undefined ? "–" : value.toFixed(digits) + unit);
+const seconds = () => performance.now() / 1000;
+const nothing = () => ({ taken: {}, heard: {}, inputs: {}, history: [], passed: [], events: [], curves: {}, ended: false });
+let state = nothing(), ahead_s = null, heard_s = seconds(), heardAt = new Date(), dirty = true;
+
+const silent = () => seconds() - heard_s > SILENT_S;
+const now_s = () => (state.ended ? state.now : seconds() + ahead_s);
+const since = (time) => (time == null ? Infinity : Math.max(now_s() - time, 0));
+// Of what is shown, a refused message is no news.
+const age = (topic) => since(topic in state.taken ? state.taken[topic] : state.heard[topic]);
+const fresh = (topic, value) => (!silent() && age(topic) <= STALE_S ? value ?? null : null);
+const forFor = (topic) => (age(topic) === Infinity ? "yet" : `for ${age(topic).toFixed(0)} s`);
+// Text is only put where it differs: else a reader's place in it would be lost.
+const say = (id, text) => { if (byId(id).textContent !== text) byId(id).textContent = text; };
 
 function rows(table, cells) {
   table.replaceChildren(...cells.map((texts) => {
@@ -18,31 +33,53 @@ function rows(table, cells) {
   }));
 }
 
+function levelOf(limits) {
+  if (silent()) return ["none", "NO DATA"];
+  if (limits === null) return ["none", `NO SUPERVISION ${forFor(STATUS)}`];
+  return [limits.level.toLowerCase(), `${limits.level.replaceAll("_", " ")}: ${limits.level === "NORMAL" ? "below all limits" : limits.message}`];
+}
+
 function drawCab() {
-  const limits = state.supervision, level = byId("level");
-  drawDial(state.train?.speed ?? null, limits);
-  if (limits === null) return;
-  level.className = `level ${limits.level.toLowerCase()}`;
-  level.textContent = `${limits.level.replaceAll("_", " ")}: ${limits.message}`;
-  const left = state.place_m === null || limits.target_m === null ? null : limits.target_m - state.place_m;
+  const limits = fresh(STATUS, state.supervision), train = fresh(STATE, state.train), [kind, text] = levelOf(limits);
+  const place = fresh(POSITION, state.place_m) ?? train?.position ?? null;
+  const left = place === null || limits?.target_m == null ? null : limits.target_m - place;
+  drawDial(train?.speed ?? null, limits, left);
+  byId("level").className = `level ${kind}`;
+  say("level", text);
+  const soon = limits?.level === "NORMAL" && limits.to_indication_s > 0 ? limits.to_indication_s : null;
   rows(byId("limits"), [
-    ["target", `${number(limits.target_kmh, 0, " km/h")} in ${number(left, 0, " m")}`], ["permitted speed", number(limits.permitted, 0, " km/h")],
-    ["warning from", number(limits.warning, 0, " km/h")], ["service brake from", number(limits.sbi, 0, " km/h")],
-    ["emergency brake from", number(limits.ebi, 0, " km/h")], ["emergency brake in", number(limits.margin_m, 0, " m")]]);
+    ["target", `${number(limits?.target_kmh, 0, " km/h")}${left !== null && left < 0 ? ", passed" : ` in ${number(left, 0, " m")}`}`],
+    ["indication in", number(soon, 0, " s")], ["permitted speed", number(limits?.permitted, 0, " km/h")],
+    ["warning from", number(limits?.warning, 0, " km/h")], ["service brake from", number(limits?.sbi, 0, " km/h")],
+    ["emergency brake from", number(limits?.ebi, 0, " km/h")], ["emergency brake in", number(limits?.margin_m, 0, " m")]]);
+}
+
+// Columns of rows whose `key` rises; what follows after a gap begins anew.
+function columns(list, key, names, gap = Infinity) {
+  const x = [], ys = names.map(() => []);
+  for (const row of list) {
+    if (x.length && row[key] <= x.at(-1)) continue;
+    if (x.length && row[key] - x.at(-1) > gap) { x.push((x.at(-1) + row[key]) / 2); ys.forEach((y) => y.push(null)); }
+    x.push(row[key]);
+    ys.forEach((y, i) => y.push(row[names[i]] ?? null));
+  }
+  return [x, ...ys];
 }
 
 function drawWay() {
-  const { train, curves, passed, history, supervision } = state;
-  if (train === null) return;
-  const here = state.place_m ?? train.position, along = (name) => passed.map((row) => row[name]), positions = passed.map((row) => row.position);
-  const ends = [here + 1000, supervision?.target_m ?? 0, curves.nominal?.x.at(-1) ?? 0], top = Math.max(train.speed, ...passed.map((row) => row.ebi ?? 0), ...history.map((row) => row.speed));
-  const lines = [{ label: "emergency brake from", kind: "intervention", x: positions, y: along("ebi") }, { label: "permitted", kind: "permitted", x: positions, y: along("permitted") },
-    { label: "run", kind: "truth", x: history.map((row) => row.position), y: history.map((row) => row.speed) }];
-  if (curves.safe) lines.push({ label: "braking by the lower bound", kind: "bound", ...curves.safe });
-  if (curves.nominal) lines.push({ label: "braking by μ̂", kind: "identified", ...curves.nominal });
-  const marks = [{ x: here, y: train.speed, kind: "now", label: "" }];
-  if (supervision?.target_m != null) marks.push({ x: supervision.target_m, y: supervision.target_kmh, kind: "target", label: `target ${number(supervision.target_kmh, 0)} km/h` });
-  way.draw({ title: "Speed along the track, km/h", x: { label: "position, m", range: [here - BEHIND_M, Math.max(...ends) + 1000] }, y: { range: [0, 1.08 * top] }, lines, marks });
+  const train = fresh(STATE, state.train), curves = fresh(CURVE, state.curves) ?? {}, limits = fresh(STATUS, state.supervision);
+  const ahead = limits === null ? null : state.ahead, here = fresh(POSITION, state.place_m) ?? train?.position ?? state.history.at(-1)?.position ?? 0;
+  const [passed, ...past] = columns(state.passed.filter((row) => row.position < (ahead?.x[0] ?? Infinity)), "position", Object.keys(LIMITS));
+  const lines = Object.entries(LIMITS).map(([name, label], i) => ({ label, kind: name, x: [...passed, ...(ahead?.x ?? [])], y: [...past[i], ...(ahead?.[name] ?? [])] }));
+  const [x, speed] = columns(state.history, "position", ["speed"]);
+  lines.push({ label: "run", kind: "run", x, y: speed }, { label: "by the lower bound", kind: "bound", ...(curves.safe ?? { x: [], y: [] }) },
+             { label: "by μ̂", kind: "nominal", ...(curves.nominal ?? { x: [], y: [] }) });
+  const shown = [train?.speed ?? 0, ...past[3], ...speed].filter((y) => y !== null), marks = [];
+  const ends = [here + 1000, limits?.target_m ?? here, ...(curves.nominal?.x.slice(-1) ?? [])];
+  if (train !== null) marks.push({ x: here, y: train.speed, kind: "run", label: "" });
+  if (limits?.target_m != null) marks.push({ x: limits.target_m, y: limits.target_kmh, kind: "target", label: `target ${number(limits.target_kmh, 0)} km/h` });
+  way.draw({ title: "Speed along the track and its limits, km/h", x: { label: "position, m", sign: state.sign, range: [here - BEHIND_M, Math.max(...ends) + 500] },
+             y: { range: [0, 1.08 * Math.max(50, ...shown)] }, lines, marks });
 }
 
 // Each regime holds since the estimate before; equal neighbours are one band.
@@ -51,49 +88,93 @@ function bandsOf(history) {
   history.forEach((row, i) => {
     const last = bands.at(-1), from = i ? history[i - 1].t : row.t;
     if (last?.kind === row.regime) last.to = row.t;
-    else bands.push({ from, to: row.t, kind: row.regime, label: IN_WORDS[row.regime] ?? "" });
+    else bands.push({ from, to: row.t, kind: row.regime, label: "" });
   });
   return bands;
 }
 
+function toldOf(adhesion, estimator) {
+  if (adhesion === null) return `nothing is known of μ${age(MU) === Infinity ? " yet" : `: the last value is ${age(MU).toFixed(0)} s old`}`;
+  const bound = `at least ${number(adhesion.mu_lower, 4)}${estimator?.confidence ? ` (${Number(estimator.confidence) * 100} %)` : ""}`;
+  return { identified: `identified μ̂ ${number(adhesion.mu, 4)}, ${bound}`, atleast: `μ ≥ ${number(adhesion.mu, 4)}, which the brake uses; ${bound}` }[KIND_OF[estimator?.regime]] ??
+    `not identified; prior ${number(adhesion.mu, 4)}, not claimed; ${bound}`;
+}
+
+function drawGauge(adhesion, kind, end) {
+  const share = (value) => `${(100 * Math.min(Math.max(value / end, 0), 1)).toFixed(2)}%`, gauge = byId("gauge");
+  const mark = (value, name, label) => element("span", { class: `at ${name}`, style: `left:${share(value)}`, title: `${label} ${value}` });
+  const step = end > 0.3 ? 0.1 : 0.05, ticks = Array.from({ length: Math.floor(end / step + 1e-6) + 1 }, (_, i) => i * step);
+  const parts = [element("span", { class: "scale" }), mark(FIXED_MU, "fixed", "fixed worst case")];
+  if (adhesion !== null) {
+    const low = Math.min(adhesion.mu_lower, adhesion.mu), high = kind === "atleast" ? end : adhesion.mu;
+    parts.push(element("span", { class: `span ${kind}`, style: `left:${share(low)};width:calc(${share(high)} - ${share(low)})` }), mark(adhesion.mu_lower, "bound", "at least"), mark(adhesion.mu, kind, kind));
+    if (adhesion.true_mu !== undefined) parts.push(mark(adhesion.true_mu, "truth", "true"));
+  }
+  gauge.replaceChildren(...parts, ...ticks.map((value) => element("span", { class: "number", style: `left:${share(value)}` }, String(Number(value.toFixed(2))))));
+}
+
 function drawAdhesion() {
-  const { adhesion, estimator, history } = state;
-  byId("regime").textContent = `Adhesion: ${IN_WORDS[estimator?.regime.toLowerCase()] ?? "not known yet"}`;
-  byId("estimator").textContent = estimator === null ? "" : `Estimator: ${estimator.message}. ${estimator.accepted ?? 0} of ${estimator.measurements ?? 0} positions used, ` +
-    `${estimator.windows ?? 0} windows; not used: ${Object.entries(estimator.dropped).map(([why, count]) => `${count} ${why}`).join(", ") || "none"}.`;
-  if (adhesion === null) return;
-  const share = (value) => `${(100 * Math.min(Math.max(value / GAUGE_END, 0), 1)).toFixed(2)}%`, gauge = byId("gauge");
-  const mark = (value, kind, label) => element("span", { class: `at ${kind}`, style: `left:${share(value)}`, title: `${label} ${value}` });
-  const numbers = [0, 0.05, 0.1, 0.15, 0.2].map((value) => element("span", { class: "number", style: `left:${share(value)}` }, String(value)));
-  const low = Math.min(adhesion.mu_lower, adhesion.mu), known = "true_mu" in adhesion ? [mark(adhesion.true_mu, "truth", "true")] : [];
-  gauge.replaceChildren(element("span", { class: "scale" }), element("span", { class: "span", style: `left:${share(low)};width:calc(${share(adhesion.mu)} - ${share(low)})` }),
-    mark(FIXED_MU, "fixed", "fixed worst case"), ...known, mark(adhesion.mu_lower, "bound", "at least"), mark(adhesion.mu, "identified", "identified"), ...numbers);
-  const confidence = estimator?.confidence ? `, ${Number(estimator.confidence) * 100} %` : "", t = history.map((row) => row.t), end = Math.max(t.at(-1) ?? 0, 30);
-  const column = (name) => history.map((row) => row[name] ?? null), from = Math.max(end - SHOWN_S, 0), lines = [
-    { label: `fixed worst case ${FIXED_MU}`, kind: "fixed", x: [from, end], y: [FIXED_MU, FIXED_MU] }, { label: `at least ${number(adhesion.mu_lower, 4)}${confidence}`, kind: "bound", x: t, y: column("mu_lower") },
-    { label: `identified μ̂ ${number(adhesion.mu, 4)}`, kind: "identified", x: t, y: column("mu"), dots: true }];
-  if (known.length) lines.splice(1, 0, { label: `true ${number(adhesion.true_mu, 4)}`, kind: "truth", x: t, y: column("true_mu") });
-  course.draw({ title: "", x: { label: "time, s", range: [from, end] }, y: { range: [0, GAUGE_END] }, lines, bands: bandsOf(history) });
+  const adhesion = fresh(MU, state.adhesion), estimator = fresh(STATE, state.estimator), { history } = state, kind = KIND_OF[estimator?.regime] ?? "prior";
+  say("regime", `Adhesion: ${estimator?.words ?? "not known"}`);
+  say("mu", toldOf(adhesion, estimator));
+  const [t, mu, bound, truth] = columns(history, "t", ["mu", "mu_lower", "true_mu"], GAP_S), regimes = new Map(history.map((row) => [row.t, row.regime]));
+  const values = [FIXED_MU, ...mu, ...truth].filter((value) => value !== null), end = Math.max(0.1, Math.ceil(1.15 * Math.max(...values) / 0.05) * 0.05);
+  drawGauge(adhesion, kind, end);
+  const until = Math.max(t.at(-1) ?? 0, 30), from = Math.max(until - SHOWN_S, 0), of = (name) => mu.map((value, i) => ((KIND_OF[regimes.get(t[i])] ?? "prior") === name ? value : null));
+  const lines = [{ label: `fixed worst case ${FIXED_MU}`, kind: "fixed", x: [from, until], y: [FIXED_MU, FIXED_MU] }, { label: "at least", kind: "bound", x: t, y: bound },
+    { label: "prior", kind: "prior", x: t, y: of("prior") }, { label: "≥, the brake limits", kind: "atleast", x: t, y: of("atleast") }, { label: "identified μ̂", kind: "identified", x: t, y: of("identified") }];
+  if (truth.some((value) => value !== null)) lines.splice(1, 0, { label: "true", kind: "truth", x: t, y: truth });
+  course.draw({ title: "Adhesion coefficient", x: { label: "time, s", range: [from, until] }, y: { range: [0, end] }, lines, bands: bandsOf(history),
+                events: state.events.map((event) => ({ x: event.t, kind: event.kind })) });
 }
 
-function drawInputs() {
-  rows(byId("inputs"), state.inputs.map((input) => [
-    input.name, element("td", {}, input.topic), element("td", { class: input.state }, input.state), number(input.hz, 1, " Hz"), number(input.age, 1, " s ago"), input.why ?? ""]));
+function drawHealth() {
+  const { estimator, inputs, events } = state;
+  rows(byId("inputs"), Object.entries(inputs).map(([topic, input]) => {
+    const old = since(state.heard[topic]), kind = silent() ? "unknown" : input.state !== "heard" ? input.state : old > STALE_S ? "late" : "good";
+    return [input.name, element("td", { class: "wide" }, topic), element("td", { class: kind }, kind), kind === "late" || silent() ? "–" : number(input.hz, 1, " Hz"),
+            old === Infinity ? "–" : `${number(old, 1)} s ago${input.why ? `: ${input.why}` : ""}`];
+  }));
+  say("estimator", estimator == null ? "" : `Estimator: ${estimator.message}. ${estimator.accepted ?? 0} of ${estimator.measurements ?? 0} positions used; ` +
+    `not used: ${Object.entries(estimator.dropped).map(([why, count]) => `${count} ${why}`).join(", ") || "none"}.`);
+  const key = JSON.stringify(events.slice(-EVENTS_SHOWN));
+  if (byId("events").dataset.key === key) return;
+  byId("events").dataset.key = key;
+  byId("events").replaceChildren(...events.slice(-EVENTS_SHOWN).reverse().map((event) => element("li", { class: `event ${event.kind}` }, `${event.t.toFixed(0)} s: ${event.text}`)));
 }
 
-function drawState(connected) {
-  const seconds = state.train === null ? "waiting for the estimator" : `${state.train.t.toFixed(0)} s`;
-  byId("state").textContent = !connected ? "connection lost: is the program still running?" : state.ended ? `${seconds}, the run has ended` : seconds;
+function drawState() {
+  const gone = silent(), gone_s = ((Date.now() - heardAt) / 1000).toFixed(0);
+  document.body.classList.toggle("silent", gone);
+  byId("nodata").hidden = !gone;
+  if (gone) say("nodata", `NO DATA since ${heardAt.toLocaleTimeString("en-GB")} (${gone_s} s): is the program still running?`);
+  const at = state.train == null ? "waiting for the estimator" : fresh(STATE, state.train) === null ? `estimator silent ${forFor(STATE)}` : `${state.train.t.toFixed(0)} s`;
+  say("state", gone ? "no data" : state.ended ? `${number(state.train?.t, 0)} s, the run has ended` : at);
+  say("announce", gone ? "No data" : `${byId("level").textContent.replace(/ for \d+ s$/, "")}. ${byId("regime").textContent}`);
 }
 
-const DRAWN_BY = [[drawCab, ["train", "supervision", "place_m"]], [drawWay, ["train", "curves", "passed", "place_m"]],
-  [drawAdhesion, ["adhesion", "estimator", "history"]], [drawInputs, ["inputs"]]];
-const events = new EventSource("events");
-events.addEventListener("message", (event) => {
-  const news = JSON.parse(event.data);
-  Object.assign(state, news);
-  for (const [draw, names] of DRAWN_BY) if (names.some((name) => name in news)) draw();
-  drawState(true);
-});
-events.addEventListener("error", () => drawState(false));
-drawCab();
+function draw() {
+  dirty = false;
+  for (const part of [drawCab, drawWay, drawAdhesion, drawHealth, drawState]) part();
+}
+
+function take(event) {
+  const { now, all, set, change, add } = JSON.parse(event.data);
+  if (all !== undefined) state = nothing();
+  Object.assign(state, all, set, { now });
+  for (const [name, entries] of Object.entries(change ?? {})) state[name] = { ...state[name], ...entries };
+  for (const [name, more] of Object.entries(add ?? {})) state[name] = [...state[name], ...more].slice(-600);
+  [ahead_s, heard_s, heardAt] = [now - seconds(), seconds(), new Date()];
+  if (!dirty) requestAnimationFrame(draw);
+  dirty = true;
+}
+
+function connect() {
+  const socket = new WebSocket(new URL("events", location.href.replace(/^http/, "ws")));
+  socket.addEventListener("message", take);
+  socket.addEventListener("close", () => setTimeout(connect, RETRY_MS));
+}
+
+connect();
+// Ages grow without any message; a frame that never comes, in a hidden tab, does not stop them.
+setInterval(draw, 250);

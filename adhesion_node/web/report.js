@@ -9,7 +9,7 @@ const all = (pick) => runs.flatMap(pick);
 const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => run.charts.flatMap((spec) => spec.lines.map((line) => line.x.at(-1)))));
 
 // Equal axes in all columns: runs side by side are to be compared by eye.
-const shared = (i) => ({ range: [Math.min(...all((run) => run.charts[i].range[0])), Math.max(...all((run) => run.charts[i].range[1]))] });
+const common = (i) => ({ range: [Math.min(...all((run) => run.charts[i].range[0])), Math.max(...all((run) => run.charts[i].range[1]))] });
 const time = { label: "time, s", range: [0, longest] };
 // A bound near 0 needs any distance: as far as the fixed worst case tells all there is to compare.
 const way = { label: "position from the start, m", range: [0, 1.08 * Math.max(1, ...all((run) => run.path.x), ...all((run) => run.moments.map((m) => m.fixed.x.at(-1))))] };
@@ -17,9 +17,9 @@ const way = { label: "position from the start, m", range: [0, 1.08 * Math.max(1,
 function curveChart(run, moment) {
   const lines = [{ label: `by the fixed ${fixedMu}`, kind: "fixed", ...moment.fixed }, { label: "what the train did", kind: "truth", ...run.path }];
   if (moment.safe) lines.push({ label: "safe: by the lower bound", kind: "bound", ...moment.safe });
-  if (moment.nominal) lines.push({ label: "by the identified μ̂", kind: "identified", ...moment.nominal });
-  return { title: "Braking curve at this time, km/h", x: way, y: shared(1), lines,
-           marks: [{ x: moment.fixed.x[0], y: moment.fixed.y[0], kind: "now", label: "" }] };
+  if (moment.nominal) lines.push({ label: "by the identified μ̂", kind: "nominal", ...moment.nominal });
+  return { title: "Braking curve at this time, km/h", x: way, y: common(1), lines,
+           marks: [{ x: moment.fixed.x[0], y: moment.fixed.y[0], kind: "run", label: "" }] };
 }
 
 const number = (value, digits, unit = "") => (value === null ? "–" : value.toFixed(digits) + unit);
@@ -32,13 +32,14 @@ function readout(moment) {
 // The newest moment at a time; the first one before it.
 const momentAt = (run, t) => run.moments.findLast((moment) => moment.t <= t) ?? run.moments[0];
 
+const view = shared();
 const columns = runs.map((run) => {
   const host = document.getElementById("runs").appendChild(element("section", { class: "run" }));
   host.append(element("h2", {}, run.name), element("p", { class: "soft" }, run.source));
   const text = host.appendChild(element("p", { class: "readout" })), grid = host.appendChild(element("div", { class: "columns" }));
   const curve = chart(grid), charts = run.charts.map((spec, i) => {
-    const made = chart(grid, (t) => show(t));
-    made.draw({ ...spec, x: time, y: shared(i), bands: run.bands });
+    const made = chart(grid, { view, onPick: show });
+    made.draw({ ...spec, x: time, y: common(i), bands: run.bands });
     return made;
   });
   return (t) => {

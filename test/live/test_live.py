@@ -4,7 +4,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import socket
@@ -12,11 +11,11 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
-from http.client import HTTPResponse
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
-from urllib.request import urlopen
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import messages
 import pytest
@@ -34,27 +33,15 @@ from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
-pytest.importorskip("aiohttp", reason="the extra `live` is not installed")
+aiohttp = pytest.importorskip("aiohttp", reason="the extra `live` is not installed")
+viewer, guard, server = (
+    pytest.importorskip(name) for name in ("viewer", "adhesion_node.live.guard", "adhesion_node.live.server")
+)
 
 S = 10**9
 TIMEOUT_S = 20.0
 FOREIGN = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH"}
 """Marks of this process that a new one must not inherit."""
-
-
-@contextmanager
-def stream(url: str) -> Iterator[HTTPResponse]:
-    with urlopen(f"{url}events", timeout=TIMEOUT_S) as response:
-        yield response
-
-
-def event(response: HTTPResponse) -> dict[str, Any]:
-    """Read the next event."""
-    line = response.readline().decode()
-    assert line.startswith("data: ")
-    assert response.readline() == b"\n"
-    parts: dict[str, Any] = json.loads(line.removeprefix("data: "))
-    return parts
 
 
 @pytest.fixture
@@ -92,17 +79,16 @@ def publish_run(executor: SingleThreadedExecutor, context: Context) -> Node:
 def test_what_the_nodes_say_reaches_the_browser(
     live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
 ) -> None:
-    with stream(live.server.url) as response:
-        first = event(response)
+    with viewer.watching(live.server.url) as watcher:
+        watcher.receive()
+        first = dict(watcher.parts)
         assert first["train"] is first["adhesion"] is first["supervision"] is None
         publish_run(executor, context)
         spin_until(executor, lambda: live.view.parts(0.0)["supervision"] and live.view.parts(0.0)["adhesion"])
-        seen: dict[str, Any] = {}
-        while not (seen.get("supervision") and seen.get("adhesion") and seen.get("curves")):
-            seen |= event(response)
+        seen = watcher.until(lambda parts: parts["supervision"] and parts["adhesion"] and parts["curves"])
     assert (seen["train"]["speed"], seen["train"]["position"]) == (180.0, 1200.0)
     assert seen["adhesion"] == {"mu": 0.08, "mu_lower": 0.075}
-    assert (seen["supervision"]["level"], seen["estimator"]["regime"]) == ("WARNING", "ADHESION_LIMITED")
+    assert (seen["supervision"]["level"], seen["estimator"]["regime"]) == ("WARNING", "adhesion_limited")
     assert (seen["curves"]["safe"]["x"][0], seen["curves"]["safe"]["y"][0]) == (1200.0, 180.0)
 
 
@@ -114,8 +100,8 @@ def test_a_message_that_cannot_be_shown_is_said_and_shown_nowhere(
     publisher = qos.advertise(node, topics.STATE, qos.RESULT)
     spin_until(executor, publisher.get_subscription_count)
     publisher.publish(messages.state_message(5 * S, float("nan"), 1.0, 50.0, 1.0))
-    spin_until(executor, lambda: live.view.parts(0.0)["inputs"][3]["state"] == "refused")
-    assert "position x = nan" in live.view.parts(0.0)["inputs"][3]["why"]
+    spin_until(executor, lambda: live.view.parts(0.0)["inputs"][topics.STATE.name]["state"] == "refused")
+    assert "position x = nan" in live.view.parts(0.0)["inputs"][topics.STATE.name]["why"]
     assert live.view.parts(0.0)["train"] is None
 
 
@@ -128,25 +114,27 @@ def test_every_source_of_the_position_is_heard(
     publisher = qos.advertise(node, topic, qos.SENSOR_PUBLISHER)
     spin_until(executor, publisher.get_subscription_count)
     publisher.publish(topic.build(new, 5 * S, (47.0, 8.0, 400.0), 1.0))
-    spin_until(executor, lambda: live.view.parts(time.monotonic())["inputs"][0]["state"] == "good")
+    spin_until(executor, lambda: live.view.parts(time.monotonic())["inputs"]["position"]["state"] == "heard")
 
 
 def test_only_what_changed_is_sent_again(live: Live) -> None:
-    with stream(live.server.url) as response:
-        assert set(event(response)) == set(live.view.parts(0.0))
+    with viewer.watching(live.server.url) as watcher:
+        first = watcher.receive()
+        assert first is not None
+        assert set(first["all"]) == set(live.view.parts(0.0))
         live.view.place(77.0)
-        assert event(response) == {"place_m": 77.0}
+        while "set" not in (news := watcher.receive() or {}):
+            assert set(news) <= {"now", "change"}, "a sign of life holds nothing else"
+        assert news["set"] == {"place_m": 77.0}
 
 
 def test_a_viewer_that_goes_is_forgotten(live: Live) -> None:
-    with stream(live.server.url) as response:
-        event(response)
+    with viewer.watching(live.server.url) as watcher:
+        watcher.receive()
         assert live.server.viewers == 1
     deadline = time.monotonic() + TIMEOUT_S
-    place = 0.0
     while live.server.viewers:
         assert time.monotonic() < deadline
-        live.view.place(place := place + 1.0)  # it shows when something is to be sent
 
 
 def test_the_page_is_whole_and_only_this_machine_gets_it(live: Live) -> None:
@@ -198,17 +186,17 @@ def start(code: str, **options: Any) -> subprocess.Popen[str]:
     return subprocess.Popen([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE, text=True, **options)
 
 
-def wait_for(url: str, process: subprocess.Popen[str]) -> HTTPResponse:
-    """Open the stream as soon as the program serves it."""
+@contextmanager
+def wait_for(url: str, process: subprocess.Popen[str]) -> Iterator[Any]:
+    """Watch the page as soon as the program serves it."""
     deadline = time.monotonic() + TIMEOUT_S
     while True:
         assert process.poll() is None, "the program ended at its start"
         assert time.monotonic() < deadline, "nothing is served"
-        try:
-            response: HTTPResponse = urlopen(f"{url}events", timeout=TIMEOUT_S)
-            return response
-        except OSError:
-            continue
+        with suppress(OSError), socket.create_connection(("127.0.0.1", int(url.rsplit(":", 1)[1].strip("/")))):
+            break
+    with viewer.watching(url) as watcher:
+        yield watcher
 
 
 def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
@@ -217,8 +205,8 @@ def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
         f"import sys; from adhesion_node.main import live; sys.argv[1:] = ['--port', '{port}']; sys.exit(live())"
     )
     try:
-        with wait_for(f"http://127.0.0.1:{port}/", process) as response:
-            event(response)
+        with wait_for(f"http://127.0.0.1:{port}/", process) as watcher:
+            watcher.receive()
             process.send_signal(signal.SIGINT)
             assert process.wait(TIMEOUT_S) == 0
         assert process.stderr is not None
@@ -244,16 +232,13 @@ def test_the_live_demo_waits_for_a_viewer_runs_at_real_time_and_ends_by_ctrl_c(t
     port = free_port()
     process = start(DEMO.replace("PORT", str(port)), cwd=tmp_path, stdout=subprocess.DEVNULL)
     try:
-        with wait_for(f"http://127.0.0.1:{port}/", process) as response:
-            seen: dict[str, Any] = {}
-            begun = None
-            while not seen.get("ended"):
-                seen |= event(response)
-                begun = begun or (seen["train"] and time.monotonic())
-            assert begun is not None
-            assert time.monotonic() - begun > 0.9 * seen["train"]["t"], "faster than real time"
+        with wait_for(f"http://127.0.0.1:{port}/", process) as watcher:
+            first = watcher.until(lambda parts: parts.get("train"))["train"]["t"]
+            begun = time.monotonic()
+            seen = watcher.until(lambda parts: parts["ended"])
+            assert time.monotonic() - begun > 0.9 * (seen["train"]["t"] - first), "faster than real time"
         assert 1.9 < seen["train"]["t"] <= 3.0  # from the first estimate to the end at 3 s
-        assert [said["state"] for said in seen["inputs"] if said["topic"] != "speed"] == ["good"] * 5
+        assert [said["state"] for topic, said in seen["inputs"].items() if topic != "speed"] == ["heard"] * 6
         process.send_signal(signal.SIGINT)
         assert process.wait(TIMEOUT_S) == 0
     finally:
@@ -261,3 +246,87 @@ def test_the_live_demo_waits_for_a_viewer_runs_at_real_time_and_ends_by_ctrl_c(t
         _, error = process.communicate()
     assert "Traceback" not in error
     assert (tmp_path / "adhesion_demo" / "bag" / "metadata.yaml").is_file()
+
+
+def status_of(url: str, **headers: str) -> int:
+    """The code that the page answers with."""
+    try:
+        with urlopen(Request(url, headers=headers), timeout=TIMEOUT_S) as response:
+            return int(response.status)
+    except HTTPError as error:
+        return error.code
+
+
+@pytest.mark.parametrize("path", ["", "events"])
+def test_who_asks_by_a_foreign_name_is_refused(live: Live, path: str) -> None:
+    """A name that an attacker has made to mean this machine: any Host was answered before."""
+    assert status_of(f"{live.server.url}{path}", Host="evil.example") == 403
+    assert status_of(live.server.url) == status_of(live.server.url, Host="localhost:8080") == 200
+
+
+def test_another_sites_script_cannot_watch(live: Live) -> None:
+    with pytest.raises(aiohttp.WSServerHandshakeError), viewer.watching(live.server.url, Origin="http://evil.example"):
+        pass
+    with viewer.watching(live.server.url, Origin=live.server.url.rstrip("/")) as watcher:
+        assert watcher.receive()
+
+
+def test_what_the_page_may_do_stands_in_the_headers(live: Live) -> None:
+    with urlopen(live.server.url, timeout=TIMEOUT_S) as response:
+        policy = response.headers["Content-Security-Policy"]
+        assert response.headers["X-Content-Type-Options"] == "nosniff"
+    assert "default-src 'none'" in policy
+    assert "connect-src 'self'" in policy
+    assert "frame-ancestors 'none'" in policy
+
+
+def test_a_request_that_never_ends_is_closed(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "REQUEST_S", 0.2)
+    with socket.create_connection(("127.0.0.1", port_of(live)), TIMEOUT_S) as slow:
+        slow.sendall(b"GET / HTTP/1.1\r\nHost: localhost\r\n")
+        with suppress(ConnectionError):
+            assert slow.recv(1) == b""
+
+
+def test_too_many_connections_are_closed_and_viewers_stay(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(guard, "MOST_CONNECTIONS", 3)
+    with viewer.watching(live.server.url) as watcher, ExitStack() as stack:
+        for _ in range(2):
+            stack.enter_context(socket.create_connection(("127.0.0.1", port_of(live)), TIMEOUT_S))
+        surplus = stack.enter_context(socket.create_connection(("127.0.0.1", port_of(live)), TIMEOUT_S))
+        with suppress(ConnectionError):
+            assert surplus.recv(1) == b""
+        live.view.place(1.0)
+        assert watcher.until(lambda parts: parts.get("place_m") == 1.0)
+
+
+def test_a_second_viewer_costs_no_second_comparison() -> None:
+    looks: list[int] = []
+
+    def parts() -> dict[str, Any]:
+        looks.append(1)
+        return {"now": float(len(looks)), "run": 1}
+
+    served = server.Server("127.0.0.1", 0, parts, 0.05)
+    try:
+        with viewer.watching(served.url) as first, viewer.watching(served.url) as second:
+            second.receive()
+            before = len(looks)
+            for _ in range(5):
+                first.receive()
+                second.receive()
+            assert len(looks) - before < 5 * server.BEAT_S / 0.05 + 8
+    finally:
+        served.close()
+
+
+def test_a_page_for_everybody_is_warned_of(context: Context, capfd: pytest.CaptureFixture[str]) -> None:
+    for host, said in (("127.0.0.1", 0), ("0.0.0.0", 1)):
+        node = Live(host, 0, context=context)
+        node.close()
+        node.destroy_node()
+        assert capfd.readouterr().err.count("everybody who reaches this machine sees the page") == said
+
+
+def port_of(live: Live) -> int:
+    return int(live.server.url.rsplit(":", 1)[1].strip("/"))

@@ -10,11 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adhesion_node.core.atp.config import SupervisionConfig
 from adhesion_node.core.atp.received import StampedCurve, TrainState
-from adhesion_node.core.physics.braking import BrakingCurve
-from adhesion_node.live.view import EXPECTED, LATE_S, MOST_POINTS, View
-from adhesion_node.web import as_json
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED
+from adhesion_node.core.atp.supervision import read
+from adhesion_node.core.physics.braking import BrakingCurve, curve
+from adhesion_node.core.physics.train import CRH3
+from adhesion_node.live.feed import Feed
+from adhesion_node.live.view import EXPECTED, MOST_POINTS, View
+from adhesion_node.report.ahead import ahead
+from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE
 
 S = 10**9
 STATUS = {
@@ -37,14 +41,21 @@ def estimate(view: View, second: int, mu: float = 0.08, regime: str = "ADHESION_
 
 
 def health(view: View, now_s: float) -> dict[str, dict[str, Any]]:
-    return {said["topic"]: said for said in view.parts(now_s)["inputs"]}
+    inputs: dict[str, dict[str, Any]] = view.parts(now_s)["inputs"]
+    return inputs
+
+
+def whole(view: View) -> str:
+    """All that a viewer is sent at first."""
+    return Feed(lambda: view.parts(0.0)).whole()
 
 
 def test_at_first_nothing_is_known() -> None:
-    parts = View().parts(0.0)
+    view = View()
+    parts = view.parts(0.0)
     assert all(parts[name] is None for name in ("train", "adhesion", "supervision", "estimator", "place_m"))
-    assert [said["state"] for said in parts["inputs"]] == ["never"] * len(EXPECTED)
-    json.loads(as_json(parts))
+    assert [said["state"] for said in parts["inputs"].values()] == ["never"] * len(EXPECTED)
+    json.loads(whole(view))
 
 
 def test_an_estimate_is_shown_in_the_units_of_people() -> None:
@@ -55,11 +66,11 @@ def test_an_estimate_is_shown_in_the_units_of_people() -> None:
     assert parts["train"] == {"t": 2.0, "position": 160.0, "speed": 288.0}
     assert parts["adhesion"] == {"mu": 0.09, "mu_lower": pytest.approx(0.085)}
     assert parts["estimator"]["dropped"] == {"LATE": "2"}
-    assert [(row["t"], row["mu"], row["regime"]) for row in parts["history"]] == [
+    assert [(row["t"], row["mu"], row["regime"]) for row in parts["history"].rows] == [
         (0.0, 0.08, "adhesion_limited"),
         (2.0, 0.09, "adhesion_limited"),
     ]
-    json.loads(as_json(parts))
+    json.loads(whole(view))
 
 
 def test_supervision_is_shown_in_kmh_and_what_is_not_finite_is_unknown() -> None:
@@ -68,7 +79,7 @@ def test_supervision_is_shown_in_kmh_and_what_is_not_finite_is_unknown() -> None
     said = view.parts(0.0)["supervision"]
     assert (said["permitted"], said["sbi"], said["ebi"], said["indication"]) == (180.0, 187.2, 194.4, None)
     assert (said["target_m"], said["target_kmh"], said["left_m"]) == (6000.0, pytest.approx(100.0, abs=0.01), 3500.0)
-    assert [(row["position"], row["permitted"]) for row in view.parts(0.0)["passed"]] == [(2500.0, 180.0)]
+    assert [(row["position"], row["permitted"]) for row in view.parts(0.0)["passed"].rows] == [(2500.0, 180.0)]
 
 
 def test_without_a_safe_distance_there_are_no_limits() -> None:
@@ -76,29 +87,28 @@ def test_without_a_safe_distance_there_are_no_limits() -> None:
     view.supervised({"level": "EMERGENCY_BRAKE", "target_position_m": "6000.0"}, "no safe distance is known")
     said = view.parts(0.0)["supervision"]
     assert (said["level"], said["permitted"], said["left_m"]) == ("EMERGENCY_BRAKE", None, None)
-    assert view.parts(0.0)["passed"] == ()
+    assert view.parts(0.0)["passed"].rows == ()
 
 
 def test_a_curve_begins_where_the_train_is() -> None:
     view = View()
     columns = (np.array(column) for column in ([0.0, 100.0], [50.0, 0.0], [1.0, 1.0], [0.0, 9.0]))
     view.curve("safe", StampedCurve(0, 1000.0, BrakingCurve(*columns)))
-    assert view.parts(0.0)["curves"] == {"safe": {"x": [1000.0, 1100.0], "y": [180.0, 0.0]}}
+    assert view.parts(0.0)["curves"] == {"safe": {"x": [1000, 1100, 1100], "y": [180.0, 0.0, 0.0]}}
 
 
 def test_the_health_of_an_input() -> None:
     view = View()
     for sample in range(100):
         view.heard(POSITION, 0.1 * sample)
-    assert (health(view, 9.95)["position"]["state"], health(view, 9.95)["position"]["hz"]) == ("good", 10.0)
-    late = health(view, 9.9 + LATE_S + 0.1)["position"]
-    assert (late["state"], late["age"]) == ("late", 2.1)
+    assert (health(view, 9.95)["position"]["state"], health(view, 9.95)["position"]["hz"]) == ("heard", 10.0)
+    assert view.parts(12.0)["heard"]["position"] == 9.9
     assert health(view, 20.0)["position"]["hz"] == 0.0
     view.heard(BRAKE_PRESSURE, 9.9, "fluid_pressure = 410: is absolute")
     refused = health(view, 10.0)["brake_pressure"]
     assert (refused["state"], refused["why"]) == ("refused", "fluid_pressure = 410: is absolute")
     view.heard(BRAKE_PRESSURE, 10.0)
-    assert health(view, 10.0)["brake_pressure"]["state"] == "good"
+    assert health(view, 10.0)["brake_pressure"]["state"] == "heard"
     assert health(view, 10.0)[SPEED.name]["state"] == "never"
 
 
@@ -108,8 +118,8 @@ def test_stamps_that_go_back_begin_a_new_run() -> None:
         estimate(view, second)
     view.supervised(STATUS, "brake")
     estimate(view, 0)  # a recording that is played again
-    assert [row["t"] for row in view.parts(0.0)["history"]] == [0.0]
-    assert view.parts(0.0)["passed"] == ()
+    assert [row["t"] for row in view.parts(0.0)["history"].rows] == [0.0]
+    assert view.parts(0.0)["passed"].rows == ()
 
 
 def test_histories_are_bounded() -> None:
@@ -118,8 +128,9 @@ def test_histories_are_bounded() -> None:
         estimate(view, second)
         view.supervised(STATUS | {"distance_to_target_m": str(6000.0 - 80.0 * second)}, "brake")
     parts = view.parts(0.0)
-    assert (len(parts["history"]), parts["history"][-1]["t"]) == (MOST_POINTS, MOST_POINTS + 4.0)
-    assert len(parts["passed"]) == MOST_POINTS
+    assert (len(parts["history"].rows), parts["history"].rows[-1]["t"]) == (MOST_POINTS, MOST_POINTS + 4.0)
+    assert len(parts["passed"].rows) == MOST_POINTS
+    assert (parts["history"].gone, len(parts["events"].rows)) == (5, 2)
 
 
 def test_a_quick_estimator_fills_a_history_no_faster() -> None:
@@ -130,17 +141,17 @@ def test_a_quick_estimator_fills_a_history_no_faster() -> None:
         view.train(TrainState(S + tenth * S // 10, 5.0 * tenth, 50.0))
         view.supervised(STATUS | {"distance_to_target_m": str(6000.0 - 5.0 * tenth)}, "brake")
         view.estimated({"regime": "COASTING"}, "")
-    assert [row["t"] for row in view.parts(0.0)["history"]] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
-    assert [row["position"] for row in view.parts(0.0)["passed"]] == [20.0 * k for k in range(8)]
+    assert [row["t"] for row in view.parts(0.0)["history"].rows] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
+    assert [row["position"] for row in view.parts(0.0)["passed"].rows] == [20.0 * k for k in range(8)]
 
 
 def test_what_was_given_out_does_not_change() -> None:
     view = View()
     estimate(view, 0)
     before = view.parts(0.0)
-    text = as_json(before)
+    text = repr(before)
     estimate(view, 1, mu=0.1)
-    assert as_json(before) == text
+    assert repr(before) == text
 
 
 def test_at_the_end_the_ages_stand_still() -> None:
@@ -149,4 +160,137 @@ def test_at_the_end_the_ages_stand_still() -> None:
     view.end(10.5)
     parts = view.parts(60.0)
     assert parts["ended"] is True
-    assert (parts["inputs"][0]["state"], parts["inputs"][0]["age"]) == ("good", 0.5)
+    assert (parts["now"], parts["heard"]) == (10.5, {"position": 10.0})
+
+
+def test_what_is_refused_is_no_news_of_what_is_shown() -> None:
+    view = View()
+    view.heard(STATE, 1.0)
+    view.heard(STATE, 2.0, "speed = nan")
+    view.heard(STATE, 3.0, "speed = nan")
+    parts = view.parts(3.0)
+    assert (parts["heard"], parts["taken"]) == ({STATE.name: 3.0}, {STATE.name: 1.0})
+    view.heard(STATE, 4.0)
+    assert view.parts(4.0)["taken"] == {}
+
+
+def test_what_is_withheld_is_not_shown_with_the_numbers_of_before() -> None:
+    view = View()
+    estimate(view, 0)
+    view.train(TrainState(1001 * S, 80.0, 80.0))
+    view.estimated({"regime": "COASTING"}, "positions stand still", alarming=True)
+    parts = view.parts(0.0)
+    assert parts["adhesion"] is None
+    assert [row.get("mu") for row in parts["history"].rows] == [0.08, None]
+
+
+def test_events_are_told_once_each() -> None:
+    view = View()
+    for second, (regime, changes, resets) in enumerate(
+        [("COASTING", 0, 0), ("BRAKE_LIMITED", 0, 0), ("BRAKE_LIMITED", 1, 1)]
+    ):
+        view.train(TrainState(1000 * S + second * S, 80.0 * second, 80.0))
+        view.estimated({"regime": regime, "changes": str(changes), "resets": str(resets)}, "well")
+    for _ in range(3):
+        view.heard(SPEED, 1.0, "speed = nan")
+        view.supervised(STATUS, "brake")
+    view.supervised(STATUS | {"level": "EMERGENCY_BRAKE"}, "brake")
+    told = [(row["t"], row["kind"], row["text"]) for row in view.parts(0.0)["events"].rows]
+    assert told == [
+        (0.0, "regime", "nothing is claimed"),
+        (1.0, "regime", "the brake limits"),
+        (2.0, "change", "the rail has changed"),
+        (2.0, "reset", "the estimator began anew"),
+        (2.0, "fault", "speed refused: speed = nan"),
+        (2.0, "level", "OVERSPEED"),
+        (2.0, "intervention", "EMERGENCY BRAKE"),
+    ]
+
+
+@pytest.mark.parametrize("wild", ["1e308", "-1e308", "nan", "inf", "x" * 1_000_000])
+def test_no_value_spoils_what_is_sent(wild: str) -> None:
+    view = View()
+    estimate(view, 0)
+    view.supervised(dict.fromkeys(STATUS, wild), wild)
+    view.estimated({"regime": wild, "accepted": wild[:9]}, wild)
+    view.heard(SPEED, 1.0, wild)
+    if len(wild) < 10:
+        view.train(TrainState(2000 * S, float(wild), float(wild)))
+        view.adhesion("mu", float(wild))
+        view.place(float(wild))
+    sent = whole(view)
+    assert len(sent) < 10_000
+    assert json.loads(sent)["all"]["supervision"]["ebi"] is None
+
+
+def viewers_parts(messages: list[str]) -> dict[str, Any]:
+    """What the messages add up to."""
+    parts: dict[str, Any] = {}
+    for message in map(json.loads, messages):
+        parts |= message.get("all", {}) | message.get("set", {}) | {"now": message["now"]}
+        parts |= {name: parts[name] | entries for name, entries in message.get("change", {}).items()}
+        parts |= {name: (parts[name] + rows)[-MOST_POINTS:] for name, rows in message.get("add", {}).items()}
+    return parts
+
+
+def test_the_news_add_up_to_the_whole_and_are_short() -> None:
+    """Twenty minutes at 10 Hz with 2 estimates a second; before, the whole history went with every one of them."""
+    view, clock, lengths = View(), [0.0], []
+    feed = Feed(lambda: view.parts(clock[0]))
+    messages = [feed.whole()]
+    braking = curve(CRH3, 60.0, 0.07)
+    for tick in range(12_000):
+        clock[0] = 0.1 * tick
+        for topic in (POSITION, BRAKE_PRESSURE, SPEED):
+            view.heard(topic, clock[0])
+        view.place(8.0 * tick)
+        if tick % 5 == 0:
+            view.adhesion("true_mu", 0.09)
+            for topic in (MU, STATE, BRAKING_CURVE, ATP_STATUS):
+                view.heard(topic, clock[0])
+            for name in ("safe", "nominal"):
+                view.curve(name, StampedCurve(0, 8.0 * tick, braking))
+            estimate(view, tick // 5, mu=0.07 + 1e-5 * (tick % 1000))
+            view.supervised(STATUS | {"distance_to_target_m": f"{1e5 - 8.0 * tick:.3f}"}, "brake")
+        messages.append(feed.news())
+        lengths.append(len(messages[-1]))
+    clock[0] += 1.0
+    messages.append(feed.news())
+    assert viewers_parts(messages) == json.loads(Feed(lambda: view.parts(clock[0])).whole())["all"]
+    assert sum(lengths[-600:]) / 60.0 < 5000.0, "bytes a second"
+
+
+def test_the_limits_ahead_are_those_of_the_monitor() -> None:
+    config = SupervisionConfig(line_speed_kmh=320.0)
+    braking, state = curve(CRH3, 80.0, 0.07), TrainState(0, 1500.0, 80.0, 0.5, 0.1)
+    reading = read(config, braking, state, 300_000_000)
+    numbers = {"target_position_m": 6000.0, "target_speed_mps": config.target_speed_mps, **reading._asdict()}
+    limits = ahead(braking, numbers)
+    assert limits is not None
+    for name in ("permitted", "warning", "sbi", "ebi"):
+        row = getattr(limits, f"{name}_mps")
+        assert row[0] == pytest.approx(numbers[f"{name}_mps"], abs=0.01)
+        assert np.all(np.diff(row) <= 1e-9), "they fall towards the target"
+    later = read(config, braking, state._replace(position_m=3000.0), 300_000_000)
+    assert np.interp(3024.0, limits.position_m, limits.ebi_mps) == pytest.approx(later.ebi_mps, abs=1.0)
+    assert limits.position_m[0] == pytest.approx(6000.0 - reading.distance_to_target_m)
+
+
+def test_limits_of_a_monitor_with_other_times_are_not_drawn() -> None:
+    braking, state = curve(CRH3, 80.0, 0.07), TrainState(0, 1500.0, 80.0)
+    reading = read(SupervisionConfig(driver_time_s=9.0), braking, state, 0)
+    assert ahead(braking, {"target_position_m": 6000.0, "target_speed_mps": 27.778, **reading._asdict()}) is None
+    assert ahead(braking, {"target_position_m": 6000.0}) is None
+
+
+def test_a_falling_chainage_counts_along_the_run() -> None:
+    view, braking = View(), curve(CRH3, 80.0, 0.07)
+    view.curve("safe", StampedCurve(0, 8000.0, braking, -1))
+    view.train(TrainState(S, 8000.0, -80.0))
+    view.curve("safe", StampedCurve(0, 8000.0, braking, -1))
+    view.place(8000.0)
+    view.supervised(STATUS | {"target_position_m": "2000.0", "distance_to_target_m": "6000.0"}, "brake")
+    parts = view.parts(0.0)
+    assert (parts["sign"], parts["place_m"], parts["train"]["speed"]) == (-1, -8000.0, 288.0)
+    assert (parts["supervision"]["target_m"], parts["passed"].rows[0]["position"]) == (-2000.0, -8000.0)
+    assert parts["curves"]["safe"]["x"][:2] == sorted(parts["curves"]["safe"]["x"][:2])

@@ -1,125 +1,348 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The pages in a real browser: they draw without a complaint, and follow the slider and the stream."""
+"""The live page in a real browser: every state of it, by what it says."""
 
 from __future__ import annotations
 
-import re
-from pathlib import Path
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
 
 import pytest
 from test_live_view import STATUS, S, estimate
-from test_picture import TRUTH, record
 
-from adhesion_node.core.atp.received import TrainState
+from adhesion_node.core.atp.config import SupervisionConfig
+from adhesion_node.core.atp.received import StampedCurve, TrainState
+from adhesion_node.core.atp.supervision import read
+from adhesion_node.core.physics.braking import curve
+from adhesion_node.core.physics.train import CRH3
 from adhesion_node.live.view import View
-from adhesion_node.report.__main__ import main
-from adhesion_node.wire.topics import POSITION
+from adhesion_node.wire.topics import ATP_STATUS, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
 
 browser = pytest.importorskip("browser", reason="playwright, of the extra `test`, is not installed")
 server = pytest.importorskip("adhesion_node.live.server", reason="the extra `live` is not installed")
 
 
-@pytest.fixture
-def report(tmp_path: Path) -> str:
-    """Return the address of a report of two runs, the second without truth: 80 m/s, 2 m/s^2 slower each second."""
-    bags = [str(record(tmp_path / "with")), str(record(tmp_path / "without", *TRUTH))]
-    assert main([*bags, "--output", str(tmp_path / "report"), "--target", "180"]) == 0
-    return (tmp_path / "report" / "report.html").as_uri()
+@pytest.fixture(autouse=True, scope="module")
+def chromium() -> Iterator[None]:
+    with browser.launched():
+        yield
 
 
-def test_the_report_draws_every_chart_of_every_run(report: str) -> None:
-    with browser.open_page() as (page, troubles):
-        page.goto(report)
-        assert page.locator("figure.chart").count() == 12
-        assert page.locator("section.run h2").all_inner_texts() == ["with", "without"]
-        assert page.locator("section.run").nth(0).locator("path.line.truth").count() > 2
-        for line in page.locator("section.run:first-child path.line.identified").all():
-            assert "NaN" not in (line.get_attribute("d") or "NaN")
-        assert page.locator(".bands .adhesion_limited").count() == 10
-        assert troubles == []
+SHOWN = (STATE, MU, BRAKING_CURVE, ATP_STATUS, POSITION)
 
 
-def test_a_chart_is_drawn_in_the_size_that_it_has_and_over_the_range_of_its_values(tmp_path: Path) -> None:
-    assert main([str(record(tmp_path / "bag", *TRUTH)), "--output", str(tmp_path / "report")]) == 0
-    with browser.open_page() as (page, troubles):
-        page.goto((tmp_path / "report" / "report.html").as_uri())
-        for picture in page.locator("figure.chart > svg").all():
-            box = picture.bounding_box()
-            assert box is not None
-            assert float((picture.get_attribute("viewBox") or "").split()[2]) == pytest.approx(box["width"], abs=1.5)
-        adhesion = page.locator("figure.chart", has_text="Adhesion coefficient")
-        assert max(map(float, adhesion.locator("text.y").all_text_contents())) == 0.08  # 0.09 is the largest value
-        assert troubles == []
+class Line:
+    """A view whose clock the test sets, and its page."""
+
+    def __init__(self, page: Any, served: Any, view: View) -> None:
+        self.page, self.view, self.served = page, view, served
+        self.now_s = 0.0
+
+    def hear(self, *topics: Topic) -> None:
+        for topic in topics or SHOWN:
+            self.view.heard(topic, self.now_s)
+
+    def says(self, where: str) -> str:
+        return str(self.page.locator(where).text_content())
+
+    def wait(self, text: str, **options: Any) -> None:
+        self.page.get_by_text(text, **options).first.wait_for()
+
+    def level(self, level: str, **values: float) -> None:
+        said = STATUS | {"level": level} | {name: str(value) for name, value in values.items()}
+        self.view.supervised(said, level.lower())
+        self.hear()
 
 
-def test_the_slider_moves_the_present_of_all_runs(report: str) -> None:
-    with browser.open_page() as (page, troubles):
-        page.goto(f"{report}#t=12")
-        for readout in page.locator(".readout").all():
-            assert readout.inner_text().startswith("201.6 km/h")  # 80 - 2 * 12 m/s
-        curve = page.locator("figure.chart path.line.fixed").first
-        before, cursor = curve.get_attribute("d"), page.locator("path.cursor").nth(1).get_attribute("d")
-        page.locator("#slider").fill("5")
-        assert page.locator("#time").inner_text() == "5 s"
-        for readout in page.locator(".readout").all():
-            assert readout.inner_text().startswith("252.0 km/h")
-        assert curve.get_attribute("d") != before
-        assert page.locator("path.cursor").nth(1).get_attribute("d") != cursor
-        assert troubles == []
-
-
-def test_the_report_needs_nothing_but_itself(report: str) -> None:
-    asked: list[str] = []
-    with browser.open_page() as (page, troubles):
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(report)
-        page.locator("summary").click()
-        assert page.locator("details table tr").count() > 30
-        assert troubles == []
-    assert asked == [report]
-
-
-def test_the_live_page_follows_the_stream() -> None:
+@contextmanager
+def line(**context: Any) -> Iterator[Line]:
+    """Serve a view and open it; nothing may go wrong in the page but that the server has gone."""
     view = View()
-    served = server.Server("127.0.0.1", 0, lambda: view.parts(0.2), 0.05)
+    made: list[Line] = []
+    served = server.Server("127.0.0.1", 0, lambda: view.parts(made[0].now_s if made else 0.0), 0.05)
     try:
-        with browser.open_page() as (page, troubles):
-            page.goto(served.url)
-            state = page.locator("#state")
-            state.get_by_text("waiting for the estimator").wait_for()
-            view.heard(POSITION, 0.0)
-            estimate(view, 0)
-            estimate(view, 7, mu=0.09)
-            view.supervised(STATUS, "above the permitted speed")
-            page.get_by_text("OVERSPEED: above the permitted speed").wait_for()
-            page.get_by_text("identified μ̂ 0.0900").wait_for()
-            assert state.inner_text() == "7 s"
-            assert page.locator("#dial svg").get_attribute("aria-label") == "speed 288 km/h"
-            assert page.locator("#dial .arc").count() == 4  # up to the target, permitted, warning, intervention
-            limits = page.locator("#limits td:last-child").all_inner_texts()
-            assert limits[1:5] == ["180 km/h", "184 km/h", "187 km/h", "194 km/h"]
-            assert page.locator("#inputs td.good").count() == 1
-            assert page.locator("#inputs td.never").count() == 5
-            left = page.locator("#gauge .identified").get_attribute("style") or ""
-            assert re.search(r"left: ?45(\.00)?%", left)  # 0.09 on a scale to 0.2
-            view.train(TrainState(1009 * S, 900.0, 50.0))
-            state.get_by_text("9 s").wait_for()
-            assert page.locator("#dial svg").get_attribute("aria-label") == "speed 180 km/h"
-            view.end(1.0)
-            state.get_by_text("the run has ended").wait_for()
-            assert troubles == []
-    finally:
-        served.close()
-
-
-def test_the_live_page_says_when_the_program_has_gone() -> None:
-    served = server.Server("127.0.0.1", 0, lambda: View().parts(0.0), 0.05)
-    try:
-        with browser.open_page() as (page, _):
+        with browser.open_page(**context) as (page, troubles):
+            made.append(Line(page, served, view))
             page.goto(served.url)
             page.get_by_text("waiting for the estimator").wait_for()
-            served.close()
-            page.get_by_text("connection lost").wait_for()
+            yield made[0]
+            assert [trouble for trouble in troubles if "ERR_CONNECTION_REFUSED" not in trouble] == []
     finally:
         served.close()
+
+
+def test_the_page_follows_the_line() -> None:
+    with line() as shown:
+        estimate(shown.view, 0)
+        estimate(shown.view, 7, mu=0.09)
+        shown.view.place(2500.0)
+        shown.level("OVERSPEED")
+        shown.wait("OVERSPEED: overspeed")
+        assert shown.says("#state") == "7 s"
+        assert shown.page.locator("#dial svg").get_attribute("aria-label") == "speed 288 km/h"
+        limits = shown.page.locator("#limits td:last-child").all_inner_texts()
+        assert limits == ["100 km/h in 3500 m", "–", "180 km/h", "184 km/h", "187 km/h", "194 km/h", "369 m"]
+        assert shown.says("#mu") == "identified μ̂ 0.0900, at least 0.0850 (95 %)"
+        assert shown.page.locator("#inputs td.good").count() == 5
+        assert shown.page.locator("#inputs td.never").count() == 2
+        shown.view.train(TrainState(1009 * S, 900.0, 50.0))
+        shown.wait("9 s", exact=True)
+        assert shown.page.locator("#dial svg").get_attribute("aria-label") == "speed 180 km/h"
+        shown.view.end(1.0)
+        shown.wait("9 s, the run has ended")
+
+
+def test_a_value_that_is_old_is_blank_and_the_others_stay() -> None:
+    """The estimator has ended: before, dial and regime went on with the old speed at the new place."""
+    with line() as shown:
+        estimate(shown.view, 0)
+        shown.level("WARNING")
+        shown.wait("WARNING: warning")
+        shown.now_s = 3.0
+        shown.view.place(2600.0)
+        shown.hear(POSITION, ATP_STATUS)
+        shown.wait("estimator silent for 3 s")
+        assert shown.page.locator("#dial svg").get_attribute("aria-label") == "speed unknown"
+        assert shown.says("#dial .digits") == "–"
+        assert shown.says("#regime") == "Adhesion: not known"
+        assert shown.says("#mu") == "nothing is known of μ: the last value is 3 s old"
+        assert shown.page.locator("#gauge .identified").count() == 0
+        assert shown.says("#level") == "WARNING: warning"
+        states = shown.page.locator("#inputs tr").all_inner_texts()
+        assert "late" in states[3]
+        assert "good" in states[0]
+        shown.now_s = 6.0
+        shown.hear(STATE)
+        shown.wait("NO SUPERVISION for 3 s")
+        assert shown.page.locator("#limits td:last-child").all_inner_texts() == ["– in –", *["–"] * 6]
+
+
+def test_a_program_that_says_nothing_for_a_second_is_no_data_and_one_that_comes_back_begins_anew() -> None:
+    with line() as shown:
+        estimate(shown.view, 0)
+        shown.level("NORMAL")
+        shown.wait("NORMAL: below all limits")
+        shown.page.evaluate("window.silentAt = performance.now()")
+        port = int(shown.served.url.rsplit(":", 1)[1].strip("/"))
+        shown.served.close()
+        shown.wait("NO DATA since")
+        assert shown.page.evaluate("performance.now() - window.silentAt") < 2500.0
+        assert "is the program still running?" in shown.says("#nodata")
+        size = shown.page.locator("#nodata").evaluate("(banner) => parseFloat(getComputedStyle(banner).fontSize)")
+        assert size > 30.0
+        assert shown.page.evaluate("getComputedStyle(document.querySelector('main')).filter") == "grayscale(1)"
+        assert (shown.says("#level"), shown.says("#dial .digits")) == ("NO DATA", "–")
+        assert set(shown.page.locator("#limits td:last-child").all_inner_texts()[1:]) == {"–"}
+        assert shown.says("#regime") == "Adhesion: not known"
+        assert shown.says("#announce") == "No data"
+        again = server.Server("127.0.0.1", port, lambda: View().parts(0.0), 0.05)
+        try:
+            shown.wait("waiting for the estimator")
+            assert not shown.page.locator("#nodata").is_visible()
+            assert shown.page.evaluate("course.plot.data[0].length") == 2, "the charts of the run before"
+            assert shown.page.locator("#events li").count() == 0
+        finally:
+            again.close()
+
+
+def test_a_new_run_clears_the_charts() -> None:
+    with line() as shown:
+        for second in range(20):
+            estimate(shown.view, second)
+        shown.hear()
+        shown.wait("19 s", exact=True)
+        assert shown.page.evaluate("course.plot.data[0].length") > 20
+        estimate(shown.view, 0)
+        shown.wait("0 s", exact=True)
+        assert shown.page.evaluate("course.plot.data[0].length") < 5
+
+
+@pytest.mark.parametrize(
+    ("regime", "kind", "said"),
+    [
+        ("ADHESION_LIMITED", "identified", "identified μ̂ 0.0945, at least 0.0895 (95 %)"),
+        ("BRAKE_LIMITED", "atleast", "μ ≥ 0.0945, which the brake uses; at least 0.0895 (95 %)"),
+        ("COASTING", "prior", "not identified; prior 0.0945, not claimed; at least 0.0895 (95 %)"),
+    ],
+)
+def test_only_what_is_identified_is_called_so(regime: str, kind: str, said: str) -> None:
+    """A brake-limited adhesion of 0.0945 was labelled identified while the true one was 0.239, off the scale."""
+    with line() as shown:
+        shown.view.adhesion("true_mu", 0.239)
+        for second in (0, 1, 2):
+            estimate(shown.view, second, mu=0.0945, regime=regime)
+        shown.hear()
+        shown.wait(said)
+        drawn = {
+            name: shown.page.evaluate(
+                "(label) => course.plot.data[course.plot.series.findIndex((s) => s.label.startsWith(label))]"
+                ".filter((y) => y != null)",
+                label,
+            )
+            for name, label in (("identified", "identified"), ("atleast", "≥"), ("prior", "prior"))
+        }
+        assert drawn == {name: [0.0945] * 3 if name == kind else [] for name in drawn}
+        assert shown.page.evaluate("course.plot.scales.y.max") >= 0.239
+        assert shown.page.locator("#gauge .at.truth").evaluate("(at) => parseFloat(at.style.left)") < 99.0
+        right = shown.page.locator(f"#gauge .span.{kind}").evaluate(
+            "(span) => span.getBoundingClientRect().right - span.parentElement.getBoundingClientRect().right"
+        )
+        assert (abs(right) < 2.0) is (kind == "atleast"), "open above only where the brake limits"
+
+
+@pytest.mark.parametrize(
+    ("level", "pointer", "digits", "text"),
+    [
+        ("NORMAL", "rgb(195, 195, 195)", "rgb(0, 0, 0)", "NORMAL: below all limits"),
+        ("INDICATION", "rgb(223, 223, 0)", "rgb(0, 0, 0)", "INDICATION: indication"),
+        ("OVERSPEED", "rgb(234, 145, 0)", "rgb(0, 0, 0)", "OVERSPEED: overspeed"),
+        ("WARNING", "rgb(234, 145, 0)", "rgb(0, 0, 0)", "WARNING: warning"),
+        ("SERVICE_BRAKE", "rgb(191, 0, 2)", "rgb(255, 255, 255)", "SERVICE BRAKE: service_brake"),
+        ("EMERGENCY_BRAKE", "rgb(191, 0, 2)", "rgb(255, 255, 255)", "EMERGENCY BRAKE: emergency_brake"),
+    ],
+)
+def test_every_level_has_its_colour(level: str, pointer: str, digits: str, text: str) -> None:
+    with line() as shown:
+        estimate(shown.view, 0)
+        shown.view.place(2500.0)
+        shown.level(level)
+        shown.wait(text)
+        fills = [
+            shown.page.locator(where).evaluate("(part) => getComputedStyle(part).fill")
+            for where in ("#dial circle", "#dial .digits")
+        ]
+        assert fills == [pointer, digits]
+        looks = shown.page.locator("#level").evaluate("(box) => getComputedStyle(box).backgroundColor + box.className")
+        others = shown.page.evaluate(
+            "(own) => ['normal', 'indication', 'overspeed', 'warning', 'service_brake'].filter((name) => name !== own)"
+            ".map((name) => { const box = document.getElementById('level'), was = box.className;"
+            " box.className = `level ${name}`; const look = getComputedStyle(box).backgroundColor;"
+            " box.className = was; return look + was; })",
+            level.lower(),
+        )
+        assert level.endswith("_BRAKE") or looks not in others, "a level looks like another one"
+        assert (shown.page.locator("#dial .bar").count() == 1) is (level != "NORMAL"), "the target bar"
+
+
+def test_limits_ahead_and_the_time_to_the_indication() -> None:
+    with line() as shown:
+        config, braking = SupervisionConfig(), curve(CRH3, 80.0, 0.09)
+        state = TrainState(1000 * S, 1500.0, 80.0, 0.5, 0.1)
+        reading = read(config, braking, state, 1000 * S)
+        estimate(shown.view, 0)
+        shown.view.place(1500.0)
+        shown.view.curve("safe", StampedCurve(0, 1500.0, braking))
+        numbers = {"target_position_m": 6000.0, "target_speed_mps": config.target_speed_mps, **reading._asdict()}
+        shown.level("NORMAL", **numbers)
+        shown.wait("100 km/h in 4500 m")
+        ends = shown.page.evaluate(
+            "way.plot.series.slice(1, 5).map((series, i) =>"
+            " [series.label, way.plot.data[i + 1].findLast((y) => y != null)])"
+        )
+        assert [label for label, _ in ends] == ["permitted", "warning", "service brake", "emergency brake"]
+        assert dict(ends)["permitted"] == pytest.approx(100.0, abs=0.1)
+        assert dict(ends)["emergency brake"] == pytest.approx(107.5, abs=0.1)
+        soon = shown.page.locator("#limits tr", has_text="indication in").locator("td").nth(1).inner_text()
+        indicated_s = shown.view.parts(0.0)["supervision"]["to_indication_s"]
+        assert indicated_s > 1.0
+        assert soon == f"{indicated_s:.0f} s"
+
+
+def test_a_target_that_is_passed_is_said_so() -> None:
+    with line() as shown:
+        estimate(shown.view, 0)
+        shown.view.place(9322.0)
+        shown.level("NORMAL", distance_to_target_m=-3322.0)
+        shown.wait("100 km/h, passed")
+        assert "-3322" not in shown.says("body")
+
+
+def test_events_are_listed_and_marked() -> None:
+    with line() as shown:
+        estimate(shown.view, 0, regime="COASTING")
+        estimate(shown.view, 4)
+        shown.view.heard(SPEED, 0.0, "speed = nan")
+        shown.level("EMERGENCY_BRAKE")
+        shown.wait("4 s: EMERGENCY BRAKE")
+        assert shown.page.locator("#events li").all_inner_texts() == [
+            "4 s: EMERGENCY BRAKE",
+            "4 s: speed refused: speed = nan",
+            "4 s: the adhesion limits",
+            "0 s: nothing is claimed",
+        ]
+
+
+def test_ten_tabs_see_the_line() -> None:
+    """A browser opens six streams of events to one host: the seventh tab stayed empty."""
+    with line() as shown:
+        tabs = [shown.page.context.new_page() for _ in range(9)]
+        for tab in tabs:
+            tab.goto(shown.served.url)
+        estimate(shown.view, 3)
+        shown.hear()
+        for tab in tabs:
+            tab.get_by_text("identified μ̂ 0.0800").wait_for()
+
+
+def test_a_reader_hears_what_changes_and_not_every_second() -> None:
+    with line() as shown:
+        shown.page.evaluate(
+            "window.heard = []; new MutationObserver(() => window.heard.push(byId('announce').textContent))"
+            ".observe(byId('announce'), { childList: true, characterData: true, subtree: true })"
+        )
+        for second in range(30):
+            estimate(shown.view, second)
+            shown.level("NORMAL", distance_to_target_m=3500.0 - 80.0 * second)
+            shown.wait(f"{second} s", exact=True)
+        shown.level("WARNING")
+        shown.wait("WARNING: warning")
+        assert shown.page.locator("[role=status], [role=alert], [aria-live]").count() == 1
+        assert shown.page.evaluate("window.heard.length") <= 4
+        assert shown.page.evaluate("window.heard.at(-1)") == "WARNING: warning. Adhesion: the adhesion limits"
+
+
+STATES: dict[str, Any] = {
+    "dark": {"color_scheme": "dark"},
+    "light": {},
+    "phone": {"viewport": {"width": 360, "height": 740}},
+}
+
+
+@pytest.mark.parametrize("look", [*STATES, "no data"])
+def test_the_page_can_be_used_by_everybody(look: str) -> None:
+    with line(**STATES.get(look, {})) as shown:
+        for second, regime in enumerate(("COASTING", "BRAKE_LIMITED", "ADHESION_LIMITED")):
+            estimate(shown.view, second, regime=regime)
+        shown.level("WARNING")
+        shown.wait("WARNING: warning")
+        if look == "no data":
+            shown.served.close()
+            shown.wait("NO DATA since")
+        browser.assert_accessible(shown.page)
+        assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "columns are cut off"
+
+
+def test_forced_colours_leave_nothing_invisible() -> None:
+    with line(forced_colors="active") as shown:
+        estimate(shown.view, 0)
+        shown.level("EMERGENCY_BRAKE")
+        shown.wait("EMERGENCY BRAKE")
+        digits, hub, line_, paper = shown.page.evaluate(
+            "[getComputedStyle(document.querySelector('#dial .digits')).fill, getComputedStyle(document.querySelector("
+            "'#dial circle')).fill, ink('identified'), getComputedStyle(document.body).backgroundColor]"
+        )
+        assert digits != hub
+        assert line_ != paper
+
+
+def test_a_laptop_shows_it_all_without_scrolling() -> None:
+    with line(viewport={"width": 1366, "height": 768}) as shown:
+        for second in range(30):
+            estimate(shown.view, second, regime=("COASTING", "BRAKE_LIMITED", "ADHESION_LIMITED")[second % 3])
+        shown.level("WARNING")
+        shown.wait("WARNING: warning")
+        assert shown.page.evaluate("document.documentElement.scrollHeight <= innerHeight")
+        for part in ("#inputs", "#adhesion .u-legend", "#limits"):
+            box = shown.page.locator(part).bounding_box()
+            assert box["y"] + box["height"] <= 768.0, part
