@@ -62,7 +62,8 @@ def _groups(specs: Sequence[Setting]) -> Iterator[str]:
 
 def _parameter(spec: Setting) -> tuple[str, ...]:
     default = f"{spec.default:.6g}" if isinstance(spec.default, float) else str(spec.default).lower()
-    return f"`{spec.name}`", default, spec.unit, _range(spec), spec.description
+    meaning = f"{spec.description} (may change at run time)" if spec.changes else spec.description
+    return f"`{spec.name}`", default, spec.unit, _range(spec), meaning
 
 
 def _range(spec: Setting) -> str:

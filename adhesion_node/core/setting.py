@@ -28,6 +28,8 @@ class Setting(NamedTuple):
     choices: tuple[str, ...] = ()
     group: str = ""
     """What the setting belongs to, for people who look for it."""
+    changes: bool = False
+    """Whether it may change while a node runs."""
 
     @property
     def is_number(self) -> bool:

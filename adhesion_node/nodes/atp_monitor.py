@@ -4,24 +4,26 @@
 
 ::
 
-    adhesion/state, adhesion/braking_curve  ->  atp/status, /diagnostics
+    adhesion/state, adhesion/braking_curve, atp/target  ->  atp/status, /diagnostics
 
 It judges a state and the curve made of it as a pair. Two watchdogs judge when no pair comes, because silence is no
 message: one on the ROS clock, and one on the machine's own for the case that the ROS clock stands still.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
+from rclpy.parameter import Parameter
 
 from adhesion_node.core.atp.config import SupervisionConfig
 from adhesion_node.core.atp.plausibility import Course
 from adhesion_node.core.atp.received import NS_PER_S, StampedCurve, TrainState, Unavailable
 from adhesion_node.core.atp.supervision import Decision, Level, Severity, decide, unsafe
+from adhesion_node.core.physics.train import KMH
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Line, Rejected
@@ -30,7 +32,7 @@ from adhesion_node.wire.topics import Topic
 
 from .ros import qos, runtime
 from .ros.diagnostics import Diagnostics, Finding, Told
-from .ros.params import declare
+from .ros.params import SettingsNode, declare
 from .ros.types import new
 
 PARAMETERS = ATP_SETTINGS
@@ -43,7 +45,7 @@ EXAMPLES = (
 _SILENCE = "none received yet; is the estimator running, are topic names and QoS right?"
 
 
-class AtpMonitor(Node):
+class AtpMonitor(SettingsNode):
     """Supervises a target by the braking curve in the manner of ETCS, from NORMAL to EMERGENCY_BRAKE.
 
     Whatever is missing, old or not understood is an EMERGENCY_BRAKE. `heard` counts the messages received by topic,
@@ -52,7 +54,7 @@ class AtpMonitor(Node):
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__("atp_monitor", automatically_declare_parameters_from_overrides=True, **kwargs)
-        values = declare(self, PARAMETERS)
+        values = declare(self, PARAMETERS, change=self._change)
         watchdogs = make(Watchdogs, values)
         self._clock_timeout_s = watchdogs.clock_timeout_s
         self._line = make(Line, values)
@@ -61,6 +63,7 @@ class AtpMonitor(Node):
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
         self._course = Course()
         self._judged = self._apart = False
+        self._refused_target = ""
         self.heard: Counter[Topic] = Counter()
         self.published: Counter[Topic] = Counter()
         self._now_ns = self._stamp_ns = self._seen_ns = 0
@@ -71,6 +74,7 @@ class AtpMonitor(Node):
         self._diagnostics = Diagnostics(self, "supervision", make(Telling, values), self._told, self.published)
         qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve)
         qos.subscribe(self, topics.STATE, self._on_state)
+        qos.subscribe(self, topics.ATP_TARGET, self._on_target)
         period_s = 1.0 / watchdogs.check_rate_hz
         self.create_timer(period_s, self._on_watchdog)
         self.create_timer(period_s, self._on_steady_watchdog, clock=self._steady)
@@ -95,6 +99,31 @@ class AtpMonitor(Node):
         except Rejected as refusal:
             self._state = Unavailable(f"refused: {refusal}")
         self._judge_pair()
+
+    def _on_target(self, message: Any) -> None:
+        """Set the parameters of the target; one that is not understood is an emergency until one that is comes."""
+        self.heard[topics.ATP_TARGET] += 1
+        try:
+            target = topics.ATP_TARGET.read(message, self._line)
+            asked = {
+                "target_position_m": self._line.sign * target.position_m,
+                "target_speed_kmh": target.speed_mps / KMH,
+            }
+            result = self.set_parameters_atomically([Parameter(name, value=value) for name, value in asked.items()])
+            self._refused_target = "" if result.successful else result.reason
+        except Rejected as refusal:
+            self._refused_target = str(refusal)
+        self._judge()
+
+    def _change(self, values: Mapping[str, Any]) -> Callable[[], None]:
+        """A new target, or whatever of the supervision, holds from the next judgement on."""
+        config = make(SupervisionConfig, values)
+
+        def put_in_force() -> None:
+            self._config, self._refused_target = config, ""
+            self._judge()
+
+        return put_in_force
 
     def _judge_pair(self) -> None:
         """Judge, unless the other half is still on its way: then a watchdog waits for it as for one that is silent."""
@@ -133,6 +162,8 @@ class AtpMonitor(Node):
         self._now_ns = now_ns
         if stands_s > self._clock_timeout_s:
             decision = unsafe(f"the clock has stood still for {stands_s:.3g} s; is /clock published?")
+        elif self._refused_target:
+            decision = unsafe(f"target: refused: {self._refused_target}")
         else:
             decision = decide(self._along_run(), now_ns, self._state, self._curve, self._level or Level.NORMAL)
         changed = decision.level is not self._level

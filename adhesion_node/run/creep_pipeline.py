@@ -18,6 +18,7 @@ class CreepPipeline(EstimatorPipeline[CreepState, CreepEstimate, CreepEstimate])
     """From samples to estimates of the creep curve."""
 
     anchors = (WHEEL_SPEED,)
+    config: CreepConfig
 
     def __init__(self, config: CreepConfig) -> None:
         verbs = (creep.advance, creep.settle, creep.finish)

@@ -6,7 +6,7 @@ import hashlib
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import Generic, NamedTuple, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, Self, TypeVar
 
 from ..core import Event, Outcome, Sample
 from ..core.intake.outcome import DROPS
@@ -51,6 +51,7 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
 
     anchors: tuple[Topic, ...]
     """Their messages are the measurements; what the other sensors send belongs to them."""
+    config: Any
 
     def __init__(self, verbs: Verbs[S, E]) -> None:
         self._verbs = verbs
@@ -80,6 +81,10 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
         self._before = self._counts() + Counter({Outcome.RESET.name: 1})
         self.state = self._verbs.init()
         return outputs
+
+    def adopt(self, other: Self) -> None:
+        """Go on with what another one is configured with; what is known stays."""
+        self._verbs, self.config = other._verbs, other.config
 
     def refuse(self, topic: str, reason: str) -> None:
         """Count a message of a topic that never became a sample."""

@@ -28,6 +28,7 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     """
 
     anchors = POSITIONS
+    config: Config
 
     def __init__(self, config: Config, seed: int) -> None:
         verbs = (estimator.advance, estimator.settle, estimator.finish)

@@ -171,6 +171,7 @@ class Reason(Enum):
         f"give one joint '{TRAIN}', at least two points, each with one position, velocity and acceleration; "
         "positions and times rise, speeds fall and are not negative, accelerations are below 0"
     )
+    BAD_TARGET = f"give one joint '{TRAIN}' and one point with one position, m, and one velocity, m/s"
     IMPLAUSIBLE_CURVE = (
         "between two points v^2 falls by 2 a ds: give positions in m, velocities in m/s, accelerations in m/s^2"
     )

@@ -1,18 +1,18 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The codec of the braking curves."""
+"""The codecs of the braking curves and of their target."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ..core.atp.received import StampedCurve
-from ..core.intake.samples import MAX_POSITION_M
+from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import Array
-from .codecs import NS, TRAIN, Codec, Fields, Line, New, Reason, Rejected, header, stamp_ns
+from .codecs import FRAME, NS, TRAIN, Codec, Fields, Line, New, Reason, Rejected, header, plausible, stamp_ns
 
 if TYPE_CHECKING:  # see results.py
     from ..core.estimate import Estimate
@@ -67,6 +67,41 @@ def write_curve(new: New, t_ns: int, position_m: float, curve: BrakingCurve) -> 
     return {"header": header(new, t_ns), "joint_names": [TRAIN], "points": points}
 
 
+class Target(NamedTuple):
+    """Where a train may be how fast at most: m along the run, m/s."""
+
+    position_m: float
+    speed_mps: float
+
+
+def read_target(message: Any, line: Line) -> Target:
+    """Read a target from a JointTrajectory of one point; raises Rejected. A speed has no sign here."""
+    points = message.points
+    if list(message.joint_names) != [TRAIN] or len(points) != 1:
+        raise Rejected(Reason.BAD_TARGET, f"target joints = {list(message.joint_names)}, points = {len(points)}")
+    (point,) = points
+    if not len(point.positions) == len(point.velocities) == 1:
+        raise Rejected(
+            Reason.BAD_TARGET, f"target positions = {len(point.positions)}, velocities = {len(point.velocities)}"
+        )
+    place = plausible("target position", point.positions[0], Reason.IMPLAUSIBLE_POSITION, MAX_POSITION_M)
+    speed = plausible("target speed", point.velocities[0], Reason.IMPLAUSIBLE_SPEED, MAX_SPEED_MPS)
+    return Target(line.sign * place, abs(speed))
+
+
+def write_target(new: New, t_ns: int, target: Target, frame: str = FRAME) -> Fields:
+    """Write a target where the chainage rises along the run."""
+    point = new(
+        "trajectory_msgs/msg/JointTrajectoryPoint",
+        positions=(target.position_m,),
+        velocities=(target.speed_mps,),
+        accelerations=(),
+        effort=(),
+        time_from_start=new("builtin_interfaces/msg/Duration", sec=0, nanosec=0),
+    )
+    return {"header": header(new, t_ns, frame), "joint_names": [TRAIN], "points": [point]}
+
+
 def _predicted(new: New, estimate: Estimate, curve: BrakingCurve | None) -> Fields | None:
     return None if curve is None else write_curve(new, estimate.t_ns, estimate.position_m, curve)
 
@@ -104,5 +139,6 @@ def _check_ways(curve: BrakingCurve) -> None:
         raise Rejected(Reason.IMPLAUSIBLE_CURVE, f"braking curve: {told}, on {given}")
 
 
+TARGET = Codec(read_target, write_target)
 SAFE = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.safe))
 NOMINAL = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.nominal))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core.atp.received import TrainState
@@ -59,14 +60,13 @@ def read_deceleration(message: Any, _line: Line) -> Deceleration:
     return Deceleration(stamp_ns(message.header), along, variance)
 
 
-def write_deceleration(new: New, prediction: Prediction) -> Fields | None:
-    """Write the largest deceleration, -mu g along x, and its variance (g mu_std)^2."""
+def write_deceleration(new: New, prediction: Prediction, *, lower: bool = False) -> Fields | None:
+    """Write the largest deceleration, -mu g along x, or of its bound, and its variance (g mu_std)^2."""
     if prediction.estimate.withheld:
         return None
     estimate = prediction.estimate
-    along = new(
-        "geometry_msgs/msg/Accel", linear=codecs.vector(new, -estimate.mu * GRAVITY), angular=codecs.vector(new, 0.0)
-    )
+    mu = estimate.mu_lower if lower else estimate.mu
+    along = new("geometry_msgs/msg/Accel", linear=codecs.vector(new, -mu * GRAVITY), angular=codecs.vector(new, 0.0))
     spread = codecs.covariance((GRAVITY * estimate.mu_std) ** 2)
     accel = new("geometry_msgs/msg/AccelWithCovariance", accel=along, covariance=spread)
     return {"header": header(new, estimate.t_ns), "accel": accel}
@@ -138,6 +138,7 @@ MU_LOWER = Codec(read_number, lambda _, made: None if made.estimate.withheld els
 CREEP_MU_MAX = Codec(read_number, lambda _, found: {"data": found.mu_max} if found.known else None)
 CREEP_LAMBDA_M = Codec(read_number, lambda _, found: {"data": found.lambda_m} if found.known else None)
 DECELERATION = Codec(read_deceleration, write_deceleration)
+DECELERATION_LOWER = Codec(read_deceleration, partial(write_deceleration, lower=True))
 STATE, ESTIMATED_STATE = Codec(read_state, write_state), Codec(read_estimated_state, write_estimated_state)
 STATUS = Codec(read_statuses, write_status)
 CLOCK = Codec(

@@ -94,15 +94,28 @@ class Watchdogs:
         check_settings(self, "")
 
 
+CHANGING = frozenset(
+    {
+        *("confidence", "curve_confidence", "sensor_timeout_s"),
+        *("ambient_pressure_pa", "position_std_m", "max_cross_track_m"),
+    }
+)
+"""What may change while an estimator runs: what is read and what is said of what is known, never what was learnt."""
+
+
+def _marked(*settings: Setting) -> tuple[Setting, ...]:
+    return tuple(one._replace(changes=one.name in CHANGING) for one in settings)
+
+
 _OF_TRAIN = settings_of(Train, "train.", "train")
 _OF_TELLING = settings_of(Telling)
-SETTINGS = (
+SETTINGS = _marked(
     *(SEED, *OF_LINE, SENSOR_TIMEOUT, *_OF_TELLING),
     *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
 )
 """All settings of the estimator."""
 
-CREEP_SETTINGS = (
+CREEP_SETTINGS = _marked(
     SENSOR_TIMEOUT,
     *_OF_TELLING,
     *settings_of(Vehicle, group="vehicle"),
@@ -111,7 +124,7 @@ CREEP_SETTINGS = (
 """All settings of the creep estimator."""
 
 ATP_SETTINGS = (
-    *settings_of(SupervisionConfig, group="supervision"),
+    *(one._replace(changes=True) for one in settings_of(SupervisionConfig, group="supervision")),
     *settings_of(Watchdogs),
     *(FRAME_ID, DIRECTION, *_OF_TELLING),
 )

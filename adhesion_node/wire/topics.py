@@ -20,6 +20,7 @@ class Role(Enum):
     ADHESION = "found out by the estimator; its writers take a Prediction"
     CREEP = "found out by the creep estimator; its writers take a CreepEstimate"
     STATUS = "how things stand"
+    COMMAND = "what is asked of the package"
     CLOCK = "time"
     OTHER = "not ours"
 
@@ -172,18 +173,24 @@ TRUTH_MU = _number(
     "`slip_simulator` the peak",
 )
 
-MU = _number("adhesion/mu", Role.ADHESION, results.MU, "μ̂, one per window")
+MU = _number("adhesion/mu", Role.ADHESION, results.MU, "μ̂, one per estimate, for plots: it has no stamp")
 MU_LOWER = _number(
     "adhesion/mu_lower",
     Role.ADHESION,
     results.MU_LOWER,
-    "its lower bound at the one-sided `confidence`, one per window",
+    "its lower bound at the one-sided `confidence`, likewise",
 )
 DECELERATION = _result(
     "adhesion/deceleration",
     "geometry_msgs/msg/AccelWithCovarianceStamped",
     results.DECELERATION,
     "−μ̂ g, m/s², and its variance, stamped: the form for machines",
+)
+DECELERATION_LOWER = _result(
+    "adhesion/deceleration_lower",
+    "geometry_msgs/msg/AccelWithCovarianceStamped",
+    results.DECELERATION_LOWER,
+    "the same of the lower bound at `confidence`, with the same variance: bound and σ, stamped",
 )
 STATE = _result(
     "adhesion/state", "nav_msgs/msg/Odometry", results.ESTIMATED_STATE, "position and speed with their variances"
@@ -201,6 +208,15 @@ CREEP_MU_MAX = _number(
 )
 CREEP_LAMBDA_M = _number("creep/lambda_m", Role.CREEP, results.CREEP_LAMBDA_M, "the creep at that peak")
 
+ATP_TARGET = Topic(
+    "atp/target",
+    "trajectory_msgs/msg/JointTrajectory",
+    Role.COMMAND,
+    Quality.RESULT,
+    Frame.LINE,
+    curves.TARGET,
+    "**in** of `atp_monitor`: a new target; joint `train`, one point: its chainage, m, and the speed allowed, m/s",
+)
 ATP_STATUS = _status("atp/status", "supervision: `level`, its limits in m/s, distance and margin in m")
 DIAGNOSTICS = _status(
     "/diagnostics",

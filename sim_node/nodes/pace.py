@@ -14,11 +14,10 @@ from typing import Any
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
-from rclpy.node import Node
 
 from adhesion_node.core.setting import Setting
 from adhesion_node.nodes.ros.discovery import PERIOD_S, Subscribers
-from adhesion_node.nodes.ros.params import declare
+from adhesion_node.nodes.ros.params import SettingsNode, declare
 from adhesion_node.nodes.ros.qos import advertise
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire.codecs import NS
@@ -30,7 +29,7 @@ MAX_BURST = 10
 SHORTEST_TIMER_S = 1e-3
 
 
-class RunNode(Node, ABC):
+class RunNode(SettingsNode, ABC):
     """Publishes the samples of a simulated run in time until it ends; logs its beginning, what changes, and its end."""
 
     def __init__(self, name: str, specs: Sequence[Setting], **kwargs: Any) -> None:

@@ -4,17 +4,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
 import pytest
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import ROSClock
 from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
-from adhesion_node.nodes.ros.params import declare, unknown
+from adhesion_node.nodes.ros.params import SettingsNode, declare, unknown
 
 SPECS = (
     Setting("start_mu", 0.09, "first guess of the adhesion coefficient", low=0.0, high=0.5),
@@ -30,16 +31,16 @@ DEFAULTS = {"start_mu": 0.09, "particles": 20, "law": "wet", "verbose": False, "
 class Make(Protocol):
     """Type of the fixture `make`."""
 
-    def __call__(self, overrides: dict[str, Any] | None = None, *, automatic: bool = True) -> Node: ...
+    def __call__(self, overrides: dict[str, Any] | None = None, *, automatic: bool = True) -> SettingsNode: ...
 
 
 @pytest.fixture
 def make(context: Context) -> Iterator[Make]:
     """Make nodes with given parameters; they are destroyed after the test."""
-    made: list[Node] = []
+    made: list[SettingsNode] = []
 
-    def _make(overrides: dict[str, Any] | None = None, *, automatic: bool = True) -> Node:
-        node = Node(
+    def _make(overrides: dict[str, Any] | None = None, *, automatic: bool = True) -> SettingsNode:
+        node = SettingsNode(
             "probe",
             context=context,
             parameter_overrides=[Parameter(name, value=value) for name, value in (overrides or {}).items()],
@@ -112,7 +113,7 @@ def test_a_bad_value_is_refused_with_name_value_and_what_is_allowed(
 
 @pytest.mark.parametrize(
     "changes",
-    [{"start_mu": 0.1}, {"law": "dry"}, {"particles": 20.5}, {"start_mu": 1}, {"use_sim_time": True, "law": "dry"}],
+    [{"start_mu": 0.1}, {"law": "dry"}, {"particles": 20.5}, {"use_sim_time": True, "law": "dry"}],
 )
 def test_nothing_changes_while_running(make: Make, changes: dict[str, Any]) -> None:
     node = make()
@@ -127,19 +128,65 @@ def test_nothing_changes_while_running(make: Make, changes: dict[str, Any]) -> N
     assert node.get_parameter("use_sim_time").value is False
 
 
-def test_a_value_out_of_range_is_refused_while_running(make: Make) -> None:
-    node = make()
+def test_what_is_so_already_is_accepted(make: Make) -> None:
+    """An own dump, loaded again; an integer for a float; beside it what changes."""
+    node = make({"use_sim_time": True})
     declare(node, SPECS)
-    (result,) = node.set_parameters([Parameter("start_mu", value=7.5)])
-    assert not result.successful
-    for word in ("start_mu", "7.5", "0.0", "0.5"):
-        assert word in result.reason
+    for name, value in (DEFAULTS | {"length_m": 200, "use_sim_time": True}).items():
+        assert node.set_parameters_atomically([Parameter(name, value=value)]).successful
+    assert type(node.get_parameter("length_m").value) is float
+    refused = node.set_parameters_atomically([Parameter("law", value="wet"), Parameter("particles", value=21)])
+    assert (
+        refused.reason
+        == "particles = 21: fixed at start; restart the node to change it, with a finite value of at least 2"
+    )
+
+
+CHANGING = (
+    *SPECS,
+    Setting("wait_s", 2.0, "how long", "s", 1.0, 9.0, changes=True),
+    Setting("name", "", "whose", changes=True),
+)
+
+
+def test_what_may_change_does_so_together_and_only_as_a_whole(make: Make) -> None:
+    node, seen = make(), []
+
+    def change(values: Mapping[str, Any]) -> Callable[[], None]:
+        if values["wait_s"] > 5.0 and not values["name"]:
+            raise ValueError(f"wait_s = {values['wait_s']}: give a name, too")
+        return lambda: seen.append((values["wait_s"], values["name"], values["law"]))
+
+    declare(node, CHANGING, change=change)
+
+    def set_(**values: Any) -> SetParametersResult:
+        return node.set_parameters_atomically([Parameter(name, value=value) for name, value in values.items()])
+
+    assert set_(wait_s=3).successful
+    assert set_(wait_s=6.0, name="a").successful
+    assert seen == [(3.0, "", "wet"), (6.0, "a", "wet")]
+    for bad, reason in (
+        ({"name": "", "wait_s": 7}, "wait_s = 7.0: give a name, too"),
+        ({"name": "b", "wait_s": "long"}, "wait_s = 'long': give a value of type float"),
+        ({"name": "b", "law": "dry"}, "law = dry: fixed at start"),
+        ({"name": 5}, "name = 5: give a value of type str"),
+    ):
+        result = set_(**bad)
+        assert not result.successful
+        assert reason in result.reason
+    out_of_range = set_(name="b", wait_s=9.5)
+    assert not out_of_range.successful
+    assert "wait_s" in out_of_range.reason
+    gone = node.set_parameters_atomically([Parameter("wait_s", Parameter.Type.NOT_SET)])
+    assert not gone.successful
+    assert (node.get_parameter("wait_s").value, node.get_parameter("name").value) == (6.0, "a")
+    assert len(seen) == 2
 
 
 def test_a_parameter_cannot_be_removed(make: Make) -> None:
     node = make()
     declare(node, SPECS)
-    (result,) = node.set_parameters([Parameter("start_mu", Parameter.Type.NOT_SET)])
+    result = node.set_parameters_atomically([Parameter("start_mu", Parameter.Type.NOT_SET)])
     assert "fixed at start" in result.reason
     assert node.get_parameter("start_mu").value == 0.09
 
@@ -152,7 +199,12 @@ def test_tools_see_unit_range_and_choices(make: Make) -> None:
     (least,) = node.describe_parameter("particles").integer_range
     assert (least.from_value, least.to_value) == (2, 2**63 - 1)
     assert node.describe_parameter("length_m").description == "length of the train [m]"
-    assert "one of dry, wet" in node.describe_parameter("law").additional_constraints
+    assert node.describe_parameter("law").additional_constraints == "one of dry, wet; fixed at start"
+    assert node.describe_parameter("law").read_only
+    changing = make()
+    declare(changing, CHANGING)
+    assert not changing.describe_parameter("wait_s").read_only
+    assert "may change at run time" in changing.describe_parameter("wait_s").additional_constraints
 
 
 def test_sim_time_still_works(make: Make) -> None:

@@ -21,8 +21,10 @@ from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.nodes.ros import types
 from adhesion_node.wire.codecs import ATMOSPHERE_PA, Line, Rejected, plain
+from adhesion_node.wire.curves import Target
 from adhesion_node.wire.results import Status
 from adhesion_node.wire.topics import (
+    ATP_TARGET,
     BRAKE_DEMAND,
     BRAKE_PRESSURE,
     CLOCK,
@@ -76,6 +78,7 @@ def values_of(topic: Topic) -> tuple[Any, ...]:
     others: dict[Topic, tuple[Any, ...]] = {
         TRUTH_STATE: (T_NS, 1500.0, 70.0),
         TRUTH_MU: (0.0726,),
+        ATP_TARGET: (T_NS, Target(6000.0, 27.8)),
         CLOCK: (T_NS,),
     }
     return others.get(topic, (PEAK,))

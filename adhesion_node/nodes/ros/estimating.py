@@ -9,7 +9,6 @@ from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from rclpy.node import Node
 from std_srvs.srv import SetBool, Trigger
 
 from adhesion_node.core import Event
@@ -26,7 +25,7 @@ from adhesion_node.wire.topics import Topic
 from . import qos
 from .diagnostics import Diagnostics, Finding, Told
 from .intake import Intake
-from .params import declare
+from .params import SettingsNode, declare
 from .types import new
 
 P = TypeVar("P", bound=EstimatorPipeline[Any, Any, Any])
@@ -60,13 +59,14 @@ class Kind(NamedTuple, Generic[P]):
     values: Callable[[P], dict[str, str]]
 
 
-class EstimatingNode(Node, Generic[P]):
+class EstimatingNode(SettingsNode, Generic[P]):
     """`heard` counts the messages received by topic, refused ones included; `published` those sent."""
 
     def __init__(self, kind: Kind[P], **kwargs: Any) -> None:
         super().__init__(kind.name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self._kind = kind
-        self.pipeline, line, timeout_s, telling = kind.set_up(declare(self, kind.parameters, preset))
+        values = declare(self, kind.parameters, preset, self._change)
+        self.pipeline, line, timeout_s, telling = kind.set_up(values)
         self._resets: deque[int] = deque(maxlen=OFTEN)
         """When the latest ones were seen."""
         self._seen_resets = 0
@@ -98,6 +98,16 @@ class EstimatingNode(Node, Generic[P]):
     def digest(self) -> str:
         """SHA-256 over every number so far, the same as that of an offline replay."""
         return self.pipeline.digest
+
+    def _change(self, values: Mapping[str, Any]) -> Callable[[], None]:
+        """What is known of train and rail stays; an offline replay gives other numbers from here on."""
+        pipeline, line, timeout_s, _ = self._kind.set_up(values)
+
+        def put_in_force() -> None:
+            self.pipeline.adopt(pipeline)
+            self._intake.change(line, timeout_s)
+
+        return put_in_force
 
     def close(self) -> None:
         """Use what still waits and publish what it gives."""

@@ -13,7 +13,7 @@ from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import Reason, Rejected
+from adhesion_node.wire.codecs import Line, Reason, Rejected
 from adhesion_node.wire.topics import Topic
 
 from . import qos
@@ -56,6 +56,11 @@ class Intake:
         for topic in reader.inputs:
             qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
         node.get_logger().info(f"ready: waiting for {' or '.join(self._watched)}")
+
+    def change(self, line: Line, timeout_s: float) -> None:
+        """Read and wait from now on with what has changed."""
+        self._reader.line = line
+        self._silence.wait(timeout_s)
 
     def note(self, reason: str, text: str) -> None:
         """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of a reason is told at once."""

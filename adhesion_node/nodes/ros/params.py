@@ -1,6 +1,10 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Settings as ROS parameters: typed, with ranges, checked as a whole before the node does anything."""
+"""Settings as ROS parameters: typed, with ranges, checked as a whole before the node does anything.
+
+Most are fixed at start, as a configuration holds for a whole run; some may change while the node runs, all that are
+changed together or none.
+"""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -23,12 +27,49 @@ _OF_RCLPY_QOS = "qos_overrides."
 Preset = Callable[[Sequence[Setting], Mapping[str, Any]], Sequence[Setting]]
 """Settings whose defaults hold where a node was given some values."""
 
+FIXED = "fixed at start"
+
+Change = Callable[[Mapping[str, Any]], Callable[[], None]]
+"""Takes all values, the new ones among them; ValueError where they do not fit. Returns what puts them in force."""
+
+
+class SettingsNode(Node):
+    """A node whose parameters are settings: those that it has already it accepts, whether or not they may change."""
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters together, an integer for a float included, or none of them."""
+        changes = [change for change in map(self._typed, parameter_list) if not self._has(change)]
+        refused = [refusal for refusal in map(self._refusal, changes) if refusal]
+        if refused or not changes:
+            return SetParametersResult(successful=not refused, reason="; ".join(refused))
+        result: SetParametersResult = super().set_parameters_atomically(changes)
+        return result
+
+    def _refusal(self, change: Parameter) -> str:
+        """Say what a restart may set, where a parameter is fixed at start."""
+        if not (self.has_parameter(change.name) and self.describe_parameter(change.name).read_only):
+            return ""
+        allowed = self.describe_parameter(change.name).additional_constraints.removesuffix(f"; {FIXED}")
+        remedy = "restart the node to change it" + (f", with {allowed}" if allowed else "")
+        return f"{change.name} = {change.value}: {FIXED}; {remedy}"
+
+    def _typed(self, change: Parameter) -> Parameter:
+        is_float = self.has_parameter(change.name) and type(self.get_parameter(change.name).value) is float
+        return Parameter(change.name, value=float(change.value)) if is_float and type(change.value) is int else change
+
+    def _has(self, change: Parameter) -> bool:
+        if not self.has_parameter(change.name):
+            return False
+        present = self.get_parameter(change.name)
+        return bool((present.type_, present.value) == (change.type_, change.value))
+
 
 def descriptor(setting: Setting) -> ParameterDescriptor:
     """Describe a setting to `ros2 param describe` and to graphical tools."""
     described = ParameterDescriptor(
         description=f"{setting.description} [{setting.unit}]" if setting.unit else setting.description,
-        additional_constraints=f"{setting.allowed()}; fixed at start",
+        additional_constraints=f"{setting.allowed()}; {'may change at run time' if setting.changes else FIXED}",
+        read_only=not setting.changes,
         # A static type would refuse an integer for a float before `check` can accept it.
         dynamic_typing=True,
     )
@@ -43,29 +84,56 @@ def descriptor(setting: Setting) -> ParameterDescriptor:
     return described
 
 
-def declare(node: Node, settings: Sequence[Setting], preset: Preset | None = None) -> dict[str, Any]:
+def declare(
+    node: Node, settings: Sequence[Setting], preset: Preset | None = None, change: Change | None = None
+) -> dict[str, Any]:
     """Declare every setting as a parameter of `node` and return the effective values as plain Python ones.
 
     `preset` changes defaults by what the node was given, a train's file for one. All values are checked before the
-    first is accepted; a bad one raises ValueError with name, value and what is allowed. Afterwards a change is refused:
-    a configuration holds for a whole run. The effective configuration is logged once. Construct the node with
-    `automatically_declare_parameters_from_overrides=True`: then parameters that it was given but does not have are
-    logged as well.
+    first is accepted; a bad one raises ValueError with name, value and what is allowed. Afterwards those that may
+    change do so through `change`; the others are read-only. The effective configuration is logged once. Construct the
+    node with `automatically_declare_parameters_from_overrides=True`: then parameters that it was given but does not
+    have are logged as well.
     """
     if node.has_parameter(_USE_SIM_TIME.name):
         _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
     given = {one.name: node.get_parameter(one.name).value for one in settings if node.has_parameter(one.name)}
     settings = settings if preset is None else preset(settings, given)
     values = {setting.name: setting.check(_given(node, setting)) for setting in settings}
+    for name in values:  # an integer may have been given for a float
+        node.set_descriptor(name, ParameterDescriptor(dynamic_typing=True))
+    node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
     for setting in settings:
         node.set_descriptor(setting.name, descriptor(setting))
-    node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
-    allowed = {setting.name: setting.allowed() for setting in settings}
-    node.add_on_set_parameters_callback(lambda changes: _refuse(changes, allowed))
+    if change is not None:
+        _let_change(node, settings, change)
     for message in unknown(node, settings):
         node.get_logger().warning(message)
     node.get_logger().info("parameters: " + ", ".join(f"{name} = {value}" for name, value in values.items()))
     return values
+
+
+def _let_change(node: Node, settings: Sequence[Setting], change: Change) -> None:
+    """Check new values together, before any of them is set, and put them in force once all are."""
+    by_name = {setting.name: setting for setting in settings}
+    ready: list[Callable[[], None]] = []
+
+    def check(changes: Sequence[Parameter]) -> SetParametersResult:
+        try:
+            new = {one.name: by_name[one.name].check(one.value) for one in changes if one.name in by_name}
+            ready[:] = [change({name: node.get_parameter(name).value for name in by_name} | new)] if new else []
+        except (ValueError, OSError) as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def put_in_force(changes: Sequence[Parameter]) -> None:
+        for done in ready:
+            done()
+            node.get_logger().info("changed: " + ", ".join(f"{one.name} = {one.value}" for one in changes))
+        ready.clear()
+
+    node.add_on_set_parameters_callback(check)
+    node.add_post_set_parameters_callback(put_in_force)
 
 
 def unknown(node: Node, settings: Sequence[Setting]) -> list[str]:
@@ -85,16 +153,6 @@ def _given(node: Node, setting: Setting) -> object:
     if node.has_parameter(setting.name):  # declared from what the node was given
         return node.get_parameter(setting.name).value
     return node.declare_parameter(setting.name, setting.default, ParameterDescriptor(dynamic_typing=True)).value
-
-
-def _refuse(changes: Sequence[Parameter], allowed: Mapping[str, str]) -> SetParametersResult:
-    """Refuse all changes together when one of them is to what `allowed` says of every parameter fixed at start."""
-    refused = [
-        f"{change.name} = {change.value}: fixed at start; restart the node to change it, with {allowed[change.name]}"
-        for change in changes
-        if change.name in allowed
-    ]
-    return SetParametersResult(successful=not refused, reason="; ".join(refused))
 
 
 def _hint(name: str, names: Sequence[str]) -> str:

@@ -30,10 +30,18 @@ class Silence:
         """How long the topic has been silent; None while it is not."""
         self.ever_heard = False
         self._node, self._timeout_s, self._report = node, timeout_s, report
-        self._period_s = timeout_s / TICKS
         self._ticks = 0
         self._heard_ns = 0
-        node.create_timer(self._period_s, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+        self._timer = node.create_timer(self._period_s, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
+
+    def wait(self, timeout_s: float) -> None:
+        """Wait so long from now on."""
+        self._timeout_s, self._ticks = timeout_s, 0
+        self._timer.timer_period_ns = round(self._period_s * 1e9)
+
+    @property
+    def _period_s(self) -> float:
+        return self._timeout_s / TICKS
 
     def heard(self) -> None:
         """Note a message."""
