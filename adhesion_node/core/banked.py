@@ -102,7 +102,7 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     nothing = unknown(config, float(mean[1]))
     findings = found(config, memory, knowledge.aged(config, newest.t_ns, belief), nothing)
     verdict = _verdict(memory, findings)._replace(changed=memory.changes > knowledge.changes)
-    knowledge = knowledge.after(newest.t_ns, verdict)
+    knowledge = knowledge.after(newest.t_ns, verdict._replace(rail=findings.known))
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(
         ahead=findings.ahead, withheld=memory.misled
     )

@@ -61,10 +61,10 @@ SHOWN_EVERY_S = 5.0
 TRACK_LINE = "track.geojson"
 """File with the centre line of a real train's track, where it is fitted with `fix`."""
 
-TARGET_MPS2 = 0.3
+TARGET_MPS2 = 0.18
 """A real train's target to stop at: as far as this deceleration takes, or half of what its full brake should give."""
 
-TARGET_M, STOP_M = 8250.0, 9000.0
+TARGET_M, STOP_M = 14500.0, 16000.0
 """The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
 
 POLL_S = 0.05

@@ -9,7 +9,11 @@ from adhesion_node.core.physics.track import Grade, Track
 from adhesion_node.core.physics.train import GRAVITY, KMH, Train
 
 from .plant.scenarios import Scenario
+from .plant.way import LEVEL
 from .sensors.fitted import Fitted
+
+LONG_M = 1e5
+"""So far a profile tells that a line is level."""
 
 
 def train(scenario: Scenario) -> Train:
@@ -42,9 +46,10 @@ def parameters(scenario: Scenario, fitted: Fitted) -> dict[str, Any]:
 
 
 def track(scenario: Scenario) -> Track:
-    """Return the grades that are known."""
+    """Return the profile: the grades that are known, that the line is level, or where it undulates nothing."""
     return Track(_grades(scenario), scenario.nominal.length_m)
 
 
 def _grades(scenario: Scenario) -> tuple[Grade, ...]:
-    return tuple(Grade(start, end, slope * (end - start)) for start, end, slope in scenario.known_grade)
+    level = ((-LONG_M, LONG_M, 0.0),) if scenario.grade is LEVEL else ()
+    return tuple(Grade(start, end, slope * (end - start)) for start, end, slope in scenario.known_grade or level)

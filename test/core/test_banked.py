@@ -156,3 +156,6 @@ def test_one_second_of_braking_claims_nothing() -> None:
     _, estimates = drive(BANK, ride([(5.0, 0.0), (1.0, 410e3)]))
     assert estimates[-1].regime is Regime.COASTING
     assert estimates[-1].mu_lower <= 0.05
+    for early in estimates[-2:]:
+        assert early.ahead is not None
+        assert max(early.ahead.mu) <= 0.05

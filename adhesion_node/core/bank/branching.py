@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.special import ndtr
 
+from ..belief.rail import Rail
 from ..physics.train import Array
 from .kernels import weighing
 from .kernels.weighing import Pruning
@@ -27,9 +28,15 @@ if TYPE_CHECKING:
 LEAST, MOST = 1e-4, 40
 """Probability below which a hypothesis ends, and how many there may be."""
 
-WIDE, SPLIT, SPLIT_STD = 0.3, (-1.1, -0.35, 0.35, 1.1), 0.45
-"""Adhesion known worse than to this share is divided into Gaussians so many standard deviations off its mean, each with
-this share of its standard deviation."""
+WIDE, SPLIT, SPLIT_STD = 0.3, (-1.2, -0.4, 0.4, 1.2), 0.5
+"""Adhesion is above 0, and known in proportion. Where its logarithm is known worse than so, it is divided into Gaussians
+so many of its standard deviations off, each with this share of it."""
+
+BOUND_STD = 1.645
+"""Standard deviations from which a bound counts as one of 95 %."""
+
+LEAST_MU, LEAST_PART, LEAST_STD = 0.005, 0.1, 0.02
+"""What is known of a rail is no less than so, its bound no less a part of it, and its logarithm no better."""
 
 STRONG = 0.03
 """Probability from which a hypothesis has others spring from it."""
@@ -49,21 +56,23 @@ ALIKE, ALIKE_STD = 0.3, 1.4
 deviations, and these by less than this factor."""
 
 
-def opened(config: Config, bank: Bank, mu: float, std: float, now_s: float) -> Bank:
-    """A braking begins on a rail that is known so: every law, every kind.
+def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
+    """A braking begins on a rail that is known so: every law, every kind. `rail.lower` is a bound of `BOUND_STD`.
 
     What is known badly is divided into parts that are narrow enough for each to know when its axles begin to slide.
     """
-    split = std > WIDE * mu
-    parts = [bank.with_fresh(MU, mu, std).labelled(HELD, 0, now_s, math.log(KINDS[HELD].prior))]
+    mu = max(rail.mu, LEAST_MU)
+    std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
+    steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
+    parts = [bank.with_fresh(MU, mu, std * mu).labelled(HELD, 0, -math.inf, math.log(KINDS[HELD].prior))]
     for law, (_, probability) in enumerate(laws_of(config)):
         for kind in SLIDING:
-            for step in SPLIT if split else (0.0,):
-                prior = KINDS[kind].prior * probability / (len(SPLIT) if split else 1)
+            for off, within in steps:
+                prior = KINDS[kind].prior * probability / len(steps)
                 if prior > 0.0:
-                    part = bank.with_fresh(MU, max(mu + step * std, 0.01), std * (SPLIT_STD if split else 1.0))
-                    part = part.with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
-                    parts.append(part.labelled(kind, law, now_s, math.log(prior)))
+                    middle = mu * math.exp(off)
+                    part = bank.with_fresh(MU, middle, within * middle).with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
+                    parts.append(part.labelled(kind, law, -math.inf, math.log(prior)))
     return joined(parts).normalised()
 
 

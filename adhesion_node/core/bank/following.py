@@ -15,9 +15,9 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import Array
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
-from .kinds import FREE, FREE_STD, NOISES, SLIDES
+from .kinds import FREE, FREE_STD, NOISES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
-from .motion import Braking, moved, open_variance, slow_variance, white_variance
+from .motion import Braking, moved, open_variance, sliding, slow_variance, white_variance
 from .plausible import Course
 from .seeing import Observation, acceleration_seen, corrected, not_slower, position_seen, speed_seen
 from .wheels import WheelsSeen, told
@@ -268,9 +268,7 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if braked and not memory.braked:
         likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
         known = rail()
-        return memory._replace(
-            bank=opened(config, likely, known.mu, known.std, now_s), since_s=0.0, seen=1, told_s=0.0, known=known
-        )
+        return memory._replace(bank=opened(config, likely, known), since_s=0.0, seen=1, told_s=0.0, known=known)
     if memory.braked and not braked:
         return memory._replace(bank=closed(bank), seen=0)
     if not memory.braked:
@@ -278,8 +276,9 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):
             return misled(config, memory)
-        odds = memory.since_s * memory.braking.told
-        bank = bank._replace(log_weight=bank.log_weight + odds * SLIDES[bank.kind]).normalised()
+        times = math.exp(memory.since_s * memory.braking.told)
+        evidence = np.log1p((times - 1.0) * sliding(config, bank, memory.braking))
+        bank = bank._replace(log_weight=bank.log_weight + evidence).normalised()
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))

@@ -41,7 +41,7 @@ class Bank(NamedTuple):
     kind: Indices
     """What limits the motion: index into `KINDS`."""
     born_s: Array
-    """When the hypothesis says that this began."""
+    """When the hypothesis says that this began; -inf: with the braking."""
     changed_s: Array
     """When it says that the rail changed last."""
 

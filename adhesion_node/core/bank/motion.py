@@ -15,6 +15,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..physics.adhesion import SpeedLaw
 from ..physics.train import Array
@@ -22,7 +23,7 @@ from . import kinds
 from .kernels import moving
 from .kernels.weighing import variances
 from .kinds import SLIDES
-from .layout import POSITION, SPEED, Bank, Mask
+from .layout import BRAKE, MU, POSITION, ROUGH, SPEED, Bank, Mask
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -75,6 +76,15 @@ def resistance(config: Config, bank: Bank) -> Array:
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
     return Use(*moving.used(model_of(config), bank, resisting, _step(0.0, braking, 0.0)))
+
+
+def sliding(config: Config, bank: Bank, braking: Braking) -> Array:
+    """Probability that axles slide, shape (H,): the rail gives less than the brake would use of it."""
+    mean, rotating = bank.mean, config.train.rotating_mass_fraction
+    needed = (mean[:, BRAKE] * braking.applied - rotating * resistance(config, bank)) / (1.0 + rotating)
+    variance = bank.covariance[:, MU, MU] + bank.covariance[:, BRAKE, BRAKE] * braking.applied**2
+    short = needed - mean[:, MU] * (1.0 + mean[:, ROUGH])
+    return np.where(SLIDES[bank.kind], ndtr(short / np.sqrt(np.maximum(variance, 1e-12))), 0.0)
 
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:

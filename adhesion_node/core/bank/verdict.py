@@ -39,6 +39,9 @@ SLOWING = 0.02
 PARTIAL = 0.8
 """Part of the full brake below which adhesion may be more than it shows: what was known before still holds."""
 
+LIKELY = 0.5
+"""Probability of sliding from which what is used is what the rail gives."""
+
 BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
 """Shares of sliding axles that leave no doubt, and the probability from which something is claimed without them."""
 
@@ -75,6 +78,8 @@ class Findings(NamedTuple):
     belief: Gaussian
     """Of (s, v)."""
     ahead: Ahead
+    known: Rail
+    """What it teaches of the rail: where the brake limits, that it gives at least so much."""
 
 
 def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findings:
@@ -83,7 +88,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     mean, covariance = bank.moments()
     belief = Gaussian(mean[:2], covariance[:2, :2] + np.diag([0.0, SPEED_ERROR_MPS**2]))
     if memory.misled:
-        return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower))
+        return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower), nothing)
     used = use(config, bank, memory.braking, resistance(config, bank))
     std = np.hypot(used.std(bank), config.used_ripple * used.value)
     wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)
@@ -92,18 +97,20 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if not memory.braked:
         slows = not memory.brake.known and rail.mu > SLOWING
         free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu))) if slows else before
-        return Findings(Regime.COASTING, free, belief, constant(before.lower))
-    ahead = counted_on(config, _borne_out(memory), 1.0 - config.curve_confidence, memory.braking)
-    full = config.train.specific_brake(config.train.full_pressure_pa)
+        return Findings(Regime.COASTING, free, belief, constant(before.lower), free)
+    ahead = counted_on(config, _borne_out(memory), 1.0 - config.curve_confidence, memory.braking, memory.known)
+    slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
     if rail.std > config.undecided_share * config.unknown_std:
-        least = min(before.lower, memory.known.lower)
-        doubtful = rail._replace(lower=min(max(rail.lower, least), rail.mu))
-        return Findings(Regime.COASTING, doubtful, belief, ahead.at_least(least))
-    regime = _regime(config, memory, float(bank.weight @ used.slides), rail.mu)
-    if regime is not Regime.ADHESION_LIMITED and memory.braking.applied < PARTIAL * full:
-        rail = rail._replace(lower=min(max(memory.known.lower, rail.lower), rail.mu))
-        ahead = ahead.at_least(rail.lower)
-    return Findings(regime, rail, belief, ahead)
+        least = min(before.lower, least)
+        ahead = ahead.at_least(least)
+    else:
+        regime = _regime(config, memory, slides, rail.mu)
+        partial = memory.braking.applied < PARTIAL * config.train.specific_brake(config.train.full_pressure_pa)
+        least = least if partial and regime is not Regime.ADHESION_LIMITED else 0.0
+    lower = max(rail.lower, least)
+    rail = rail._replace(lower=min(lower, rail.mu))
+    known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
+    return Findings(regime, rail, belief, ahead, known)
 
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
@@ -130,10 +137,11 @@ def _borne_out(memory: Memory) -> Bank:
     return bank.part(old).normalised() if old.any() else bank
 
 
-def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> Ahead:
+def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, known: Rail) -> Ahead:
     """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill.
 
-    What is known of roughness and grade here fades along the way, and the way takes the mean of them.
+    What is known of roughness and grade here fades along the way, and the way takes the mean of them. Axles that roll
+    under a weak brake leave the bound as it was `known` when the braking began.
     """
     mean, used = bank.mean, use(config, bank, braking, resistance(config, bank))
     sliding = used.slides
@@ -153,7 +161,10 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking) -> A
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
     rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** COUNTED_RISE
     foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
-    low = quantiles(bank.weight, foreseen, np.sqrt(np.maximum(variance, 1e-12)) * rising, (missed,))[:, 0]
+    std = np.sqrt(np.maximum(variance, 1e-12)) * rising
+    more = ~sliding & (used.value < known.lower)
+    foreseen, std = np.where(more, known.lower, foreseen), np.where(more, 1e-6, std)
+    low = quantiles(bank.weight, foreseen, std, (missed,))[:, 0]
     return Ahead(tuple(speeds.tolist()), tuple(np.maximum(low, 0.0).tolist()))
 
 

@@ -13,14 +13,13 @@ import numpy as np
 from sim_node.real import known
 from sim_node.real.drive import Drive, sense
 from sim_node.real.plant.journey import Journey
-from sim_node.real.plant.scenarios import SCENARIOS, Scenario
+from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.plant.simulate import simulate
 from sim_node.real.sensors import centre_line
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
-from ...core.physics.track import Grade, Track
 from ...wire.codecs import NOMINAL, Line
 from ...wire.track_line import TrackLine, line_of
 from . import point_mass
@@ -31,9 +30,6 @@ AIDED = ("gnss_doppler", "gnss_imu", "radar", "doppler_only", "full")
 
 UNSOUND = ("tacho", "gnss_outages", "gnss_stamps", "one_cylinder", "no_pressure")
 """Sets whose sensors cannot be trusted, or lack what a narrow answer needs."""
-
-UNDULATING, LONG_M = "undulating", 1e5
-"""Scenarios whose grades no profile tells; of the others the profile says, over so far a way, that they are level."""
 
 SLOWEST_BUILD_UP = 1.15
 """A train's brake may take so much longer to build up than its papers say."""
@@ -64,14 +60,7 @@ class Case(NamedTuple):
             return Config()
         scenario = SCENARIOS[self.scenario]
         train, told = known.train(scenario), dict[str, Any](FITTED[self.fitted].told)
-        return Config(train, self._track(scenario), assumed_pressure_pa=train.full_pressure_pa, **told)
-
-    def _track(self, scenario: Scenario) -> Track:
-        """The profile: what is known of it, that the line is level, or where it undulates nothing."""
-        known_track = known.track(scenario)
-        if known_track.sections or self.scenario.startswith(UNDULATING):
-            return known_track
-        return Track((Grade(-LONG_M, LONG_M, 0.0),), scenario.nominal.length_m)
+        return Config(train, known.track(scenario), assumed_pressure_pa=train.full_pressure_pa, **told)
 
     @property
     def line(self) -> Line:

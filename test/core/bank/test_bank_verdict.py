@@ -89,7 +89,7 @@ def ahead_bank(mu: float, speed: float, kinds: list[int] | None = None) -> Bank:
 @pytest.mark.parametrize("mu", [0.01, 0.03, 0.08])
 @pytest.mark.parametrize("speed", [4.0, 30.0, 83.0])
 def test_ahead_is_counted_on_in_the_braking_curve(mu: float, speed: float) -> None:
-    ahead = counted_on(CONFIG, ahead_bank(mu, speed), 0.01, Braking(FULL))
+    ahead = counted_on(CONFIG, ahead_bank(mu, speed), 0.01, Braking(FULL), NOTHING)
     assert ahead.speed_mps[0] == 0.0
     assert list(ahead.speed_mps) == sorted(ahead.speed_mps)
     assert ahead.speed_mps[-1] == pytest.approx(speed, rel=0.05)
@@ -106,7 +106,7 @@ def test_ahead_is_counted_on_in_the_braking_curve(mu: float, speed: float) -> No
 def test_the_safer_the_longer() -> None:
     bank = ahead_bank(0.05, 50.0)
     lengths = [
-        curve(CRH3, 50.0, counted_on(CONFIG, bank, missed, Braking(FULL))).distance_m[-1]
+        curve(CRH3, 50.0, counted_on(CONFIG, bank, missed, Braking(FULL), NOTHING)).distance_m[-1]
         for missed in (0.5, 0.1, 0.05, 0.01, 0.001)
     ]
     assert lengths == sorted(lengths)
