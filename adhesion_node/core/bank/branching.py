@@ -29,8 +29,8 @@ LEAST, MOST = 1e-4, 40
 """Probability below which a hypothesis ends, and how many there may be."""
 
 WIDE, SPLIT, SPLIT_STD = 0.3, (-1.2, -0.4, 0.4, 1.2), 0.5
-"""Adhesion is above 0, and known in proportion. Where its logarithm is known worse than so, it is divided into Gaussians
-so many of its standard deviations off, each with this share of it."""
+"""Adhesion is above 0 and known in proportion. Where its logarithm is known worse than so, it is divided into
+Gaussians: so many of its standard deviations off, each with this share of it."""
 
 BOUND_STD = 1.645
 """Standard deviations from which a bound counts as one of 95 %."""
