@@ -13,7 +13,7 @@ MANIFEST = ElementTree.parse(HERE / "package.xml")
 
 PROGRAMS = (
     *("estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "live", "simulator", "slip_simulator"),
-    *("import_csv", "train", "recover", "demo", "report", "study", "bench"),
+    *("import_csv", "train", "brakings", "recover", "demo", "report", "study", "bench"),
 )
 
 # Recordings, frames, pictures, geographic positions, completion in the shell. The nodes of a train run without.

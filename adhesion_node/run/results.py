@@ -48,7 +48,7 @@ def row_of(pipeline: Pipeline, made: Prediction, sign: int = 1) -> Row:
     mu = (None,) * 3 if e.withheld else (e.mu, e.mu_std, e.mu_lower)
     told = (
         *(e.t_ns, sign * e.position_m, e.position_std_m, e.speed_mps, e.speed_std_mps, *mu, e.regime.name),
-        *(_length_m(made.safe), _length_m(made.nominal), e.window),
+        *(length_m(made.safe), length_m(made.nominal), e.window),
     )
     taught = {} if memory is None else learnt(memory)
     return dict(zip(COLUMNS, (*told, *(taught.get(name) for name in LEARNT)), strict=True))
@@ -103,7 +103,7 @@ def _parquet(path: str) -> Iterator[Write]:
         flush()
 
 
-def _length_m(curve: BrakingCurve | None) -> float | None:
+def length_m(curve: BrakingCurve | None) -> float | None:
     """Way to the standstill, m; None where there is no curve."""
     return None if curve is None else float(curve.distance_m[-1])
 

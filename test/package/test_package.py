@@ -177,7 +177,7 @@ def test_a_node_imports_nothing_heavy_before_it_minds_signals(module: str) -> No
 
 
 def test_the_executables_of_the_design_are_there() -> None:
-    tools = {"recover", "import_csv", "train", "demo", "report", "study", "bench"}
+    tools = {"recover", "import_csv", "train", "brakings", "demo", "report", "study", "bench"}
     assert set(console_scripts()) == NODES | tools
 
 

@@ -62,6 +62,7 @@ COMPLETED = [
     ("recorder --out", {"--output"}),
     ("recover my_run --out", {"--output"}),
     ("import_csv log.csv --pressure-", {"--pressure-unit", "--pressure-kind"}),
+    ("brakings my_run --sched", {"--scheduler"}),
     ("train --est", {"--estimate"}),
     ("report my_run --tar", {"--target"}),
     ("live --po", {"--port"}),

@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...command.running import Arrays
 from ...core.creep import fit as creep_fit
 from ...core.creep.curve import noise_products, peak
 from ...core.creep.recursion import Recursion, full_covariance
 from ...core.physics.train import Array
-from ..trial.running import Arrays
 from . import errors_in_variables as creep_eiv
 from . import runs as he
 

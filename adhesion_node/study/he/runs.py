@@ -12,11 +12,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...command.running import Arrays
 from ...core.creep.config import FIXED, VARYING, CreepConfig
 from ...core.creep.curve import adhesion, parameters, peak
 from ...core.creep.recursion import Recursion, advance, begin
 from ...core.physics.train import Array
-from ..trial.running import Arrays
 
 SLOPE, LAMBDA_M = 20.0, 0.1
 DRY_PEAK, WET_PEAK = 0.35, 0.20

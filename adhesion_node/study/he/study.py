@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ...command.running import add_running_options, run_all, running
 from ...core.physics.train import Array
-from ..trial.running import add_running_options, run_all, running
 from ..trial.text import Column, lines
 from . import runs as he
 from .beyond import BEYOND, Beyond, value_of

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..trial.running import add_running_options, running
+from ...command.running import add_running_options, running
 from ..trial.text import Column, lines
 from .cases import Case, chosen
 from .goals import goals, missed, soonest

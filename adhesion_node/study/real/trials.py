@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from sim_node.real.drive import START_S, Drive
 
+from ...command.running import Arrays, Running, run_all
 from ...core import Config
 from ...core.physics.train import GRAVITY, Array
 from ...run.pipeline import Pipeline
 from ...wire.codecs import NOMINAL, Line
 from ...wire.topics import POSITION
 from ..trial.estimators import LaneResult, through
-from ..trial.running import Arrays, Running, run_all
 from ..trial.trials import DROP, Rows, length_m
 from ..trial.world import Sent, received
 from .cases import Case

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..trial.running import Running
+from ...command.running import Running
 from ..trial.score import score, statistic
 from ..trial.text import Column
 from ..trial.trials import Results, Rows, each_trial, grouped

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..trial.running import Running
+from ...command.running import Running
 from ..trial.score import relative_percent, score
 from ..trial.text import Column
 from ..trial.trials import Results, Rows, each_trial, grouped

@@ -14,7 +14,7 @@ longest time from the end of the fault to a full window.
 import argparse
 from typing import Any
 
-from ..trial.running import add_running_options, running
+from ...command.running import add_running_options, running
 from ..trial.text import lines
 from . import faults, rails
 

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from ...command.running import Running, add_running_options, running
 from ...core.physics import braking
 from ...core.physics.adhesion import WET, AdhesionLaw
 from ...core.physics.train import CRH3, KMH, Array
 from ...run.score import CONVERGED_AFTER_MPS
-from ..trial.running import Running, add_running_options, running
 from ..trial.text import Column, lines
 from ..trial.trials import Results, Rows, each_trial, grouped
 from .methods import METHODS, trials

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ..trial.running import add_running_options, running
+from ...command.running import add_running_options, running
 from ..trial.score import score
 from ..trial.text import Column, lines
 from ..trial.trials import Trials, grouped

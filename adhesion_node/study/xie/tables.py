@@ -19,8 +19,8 @@ from typing import Any
 import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
+from ...command.running import add_running_options, running
 from ..bound.study import Case, nominal
-from ..trial.running import add_running_options, running
 from ..trial.score import over_speed, score
 from ..trial.text import Column, lines
 from ..trial.trials import Results, grouped

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from ...command.running import add_running_options, running
 from ..baselines.ekf import TUNED, Tuning
-from ..trial.running import add_running_options, running
 from ..trial.score import score
 from ..trial.text import Column, lines
 from ..trial.trials import Trials, grouped

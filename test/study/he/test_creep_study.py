@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adhesion_node.command import engines
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.he import figures as creep_models
 from adhesion_node.study.he import runs as creep_runs
 from adhesion_node.study.he import study as creep
-from adhesion_node.study.trial import engines
 
 KEYS = {"experiment", "peak_true", "peak_estimated_mean", "peak_estimated_std", "used_fraction"}
 

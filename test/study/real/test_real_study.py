@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adhesion_node.command.running import Running
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.real import point_mass
 from adhesion_node.study.real.cases import CASES, chosen
 from adhesion_node.study.real.trials import found
 from adhesion_node.study.real.truth import slid
-from adhesion_node.study.trial.running import Running
 from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.sensors.fitted import FITTED
 

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adhesion_node.command.running import Arrays, Running, file_name, load, save
 from adhesion_node.core import Config
 from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning
 from adhesion_node.study.trial.estimators import WAYS, Estimator
-from adhesion_node.study.trial.running import Arrays, Running, file_name, load, save
 from adhesion_node.study.trial.trials import ROW, Trials, grouped
 from adhesion_node.study.trial.world import Refusal, World, simulate, ticks
 from adhesion_node.wire.topics import ADHESION_INPUTS

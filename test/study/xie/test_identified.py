@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from adhesion_node.command.running import Running
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.study.__main__ import main
-from adhesion_node.study.trial.running import Running
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results, Rows, Trials
 from adhesion_node.study.xie import distances, sensitivity, tables
 from adhesion_node.study.xie.methods import METHODS, STARTS, trials

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adhesion_node.command.running import save
 from adhesion_node.study.__main__ import main
-from adhesion_node.study.trial.running import save
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results
 from adhesion_node.study.xie.methods import METHODS, STARTS, trials
 from adhesion_node.study.xie.published import START_OF_MEAN, TABLES

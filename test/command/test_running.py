@@ -16,11 +16,11 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import pytest
 
+from adhesion_node.command import engines, running
+from adhesion_node.command.running import Arrays, Running, Task, file_name, load, run_all, save
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.he.runs import VARYING_ETA, Experiment
-from adhesion_node.study.trial import engines, running
 from adhesion_node.study.trial.estimators import Estimator
-from adhesion_node.study.trial.running import Arrays, Running, Task, file_name, load, run_all, save
 from adhesion_node.study.trial.trials import Trials
 from adhesion_node.study.trial.world import World
 
@@ -179,7 +179,7 @@ import socket, sys
 from pathlib import Path
 from typing import NamedTuple
 from adhesion_node.command.options import run_tool
-from adhesion_node.study.trial.running import Running, run_all
+from adhesion_node.command.running import Running, run_all
 import argparse
 
 class Endless(NamedTuple):

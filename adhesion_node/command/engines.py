@@ -31,7 +31,7 @@ def processes(workers: int) -> Iterator[Executor]:
             yield executor
         except BrokenProcessPool as error:
             reason = "a worker was killed, by lack of memory perhaps: give fewer --workers"
-            raise OSError(errno.ECHILD, reason, "study") from error
+            raise OSError(errno.ECHILD, reason, "workers") from error
 
 
 @contextmanager

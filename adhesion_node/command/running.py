@@ -28,7 +28,7 @@ from . import engines
 Arrays = Mapping[str, NDArray[Any]]
 """A task's result by name."""
 
-PACKAGES = Path(__file__).parents[3]
+PACKAGES = Path(__file__).parents[2]
 """The folder that holds the packages."""
 
 SOURCES = ("adhesion_node/**/*.py", "sim_node/**/*.py")
@@ -50,7 +50,7 @@ class Task(Protocol):
 
     @property
     def weight(self) -> float:
-        """How much work it is beside the other tasks of its study."""
+        """How much work it is beside the other tasks of its call."""
 
     def compute(self) -> Arrays:
         """Do the work."""
@@ -66,7 +66,7 @@ class Running(NamedTuple):
 
 
 def add_running_options(parser: argparse.ArgumentParser) -> None:
-    """Options of every study that runs tasks; `running` reads them."""
+    """Options of every program that runs tasks; `running` reads them."""
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="compute on the Dask cluster of tcp://HOST:PORT instead (extra cluster)"
@@ -76,7 +76,7 @@ def add_running_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="DIR",
         default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
-        help="where finished runs are kept, so that a killed study goes on (default %(default)s)",
+        help="where finished runs are kept, so that a killed call goes on (default %(default)s)",
     )
 
 

@@ -1,0 +1,209 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Replays many recordings on all cores; writes a table of all their brakings, and a map of the rail by place and date.
+
+A recording that cannot be used is said and left out. What is finished is kept, so that a killed call goes on.
+"""
+
+import argparse
+import sys
+from array import array
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from ..bag import BagReader, select_from
+from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
+from ..command.running import Arrays, add_running_options, run_all, running
+from ..run import offline
+from ..run.brakings import BRAKING, CELL, CELL_M, brakings
+from ..run.pipeline import Pipeline
+from ..wire.settings import TRAIN_FILE, setup_of
+from ..wire.train_file import read_train
+
+EXAMPLES = (
+    "brakings monday tuesday --output brakings.parquet --map rail.parquet",
+    "brakings unit_7=runs/4711 unit_8=runs/4712 --train my_train.yaml --output brakings.csv",
+    "brakings runs/* --output brakings.parquet --scheduler tcp://head:8786",
+)
+
+ENDINGS = (".csv", ".parquet")
+
+MB = 1e6
+
+
+class Recording(NamedTuple):
+    """A recording with the settings by which it is replayed: a task."""
+
+    train: str
+    path: str
+    as_of: tuple[tuple[int, int], ...]
+    """Bytes and time of change, of it and of the files that the settings name: other contents are another task."""
+    settings: tuple[tuple[str, Any], ...]
+    remaps: tuple[str, ...]
+    cell_m: float
+
+    @property
+    def name(self) -> str:
+        """Readable beginning of its file's name."""
+        return f"brakings-{Path(self.path).resolve().stem}"
+
+    @property
+    def weight(self) -> float:
+        """How much work it is: its size, MB."""
+        return max(self.as_of[0][0] / MB, 1e-3)
+
+    def compute(self) -> Arrays:
+        """Replay it; what is wrong with it is a result, too."""
+        try:
+            rows, cells = self._replay()
+        except (OSError, ValueError) as error:
+            return {"failed": np.array(str(error))}
+        return {"rows": rows, "cells": cells, "failed": np.array("")}
+
+    def _replay(self) -> tuple[NDArray[np.void], NDArray[np.void]]:
+        setup = setup_of(dict(self.settings))
+        with BagReader(Path(self.path)) as reader:
+            recorded = offline.messages(reader, select_from(reader, self.remaps))
+            pipeline = Pipeline(setup.config, setup.seed)
+            made = offline.predictions(pipeline, None, recorded, setup.line, array("d"))
+            found = list(brakings(made, self.cell_m))
+        if pipeline.last is None:
+            raise ValueError(f"nothing to estimate from; dropped: {pipeline.dropped or 'nothing'}")
+        rows = np.concatenate([np.empty(0, BRAKING), *(one.row for one in found)])
+        return rows, np.concatenate([np.empty(0, CELL), *(one.cells for one in found)])
+
+
+def main(args: Sequence[str] | None = None) -> int:
+    """Run `brakings BAG... --output FILE`."""
+    parser = argparse.ArgumentParser("brakings", parents=[json_option()], **help_texts(__doc__ or "", *EXAMPLES))
+    add = parser.add_argument
+    add("bags", metavar="[TRAIN=]BAG", nargs="+", help="recordings, each with the name of its train, or under its own")
+    add("--output", metavar="FILE", required=True, help="the table of all brakings, .parquet or .csv")
+    add("--map", metavar="FILE", help="the rail by place and date, .parquet or .csv")
+    add(
+        "--cell",
+        metavar="M",
+        type=float,
+        default=CELL_M,
+        help="length of a piece of track (default: %(default)g)",
+    )
+    remap_option(add)
+    add_running_options(parser)
+    setting_options(parser.add_argument_group("the estimator").add_argument)
+    return run_tool(parser, _work, args)
+
+
+def _work(options: argparse.Namespace) -> int:
+    for path in filter(None, (options.output, options.map)):
+        if Path(path).suffix not in ENDINGS:
+            raise ValueError(f"output = {path}: give a file that ends in {' or '.join(ENDINGS)}")
+    if not 1.0 <= options.cell <= 1e5:
+        raise ValueError(f"cell = {options.cell}: give a length of 1 to 100000 m")
+    values = offline.parameters_of(options)
+    setup = setup_of(values)
+    if values.get(TRAIN_FILE.name):  # by its contents, which may change under its name
+        values = {**read_train(values.pop(TRAIN_FILE.name)).values, **values}
+    tasks = [_recording(text, values, options) for text in options.bags]
+    failed, rows, cells = dict[str, str](), [], []
+    for task, found in zip(tasks, run_all(tasks, running(options)), strict=True):
+        if str(found["failed"]):
+            failed[task.path] = str(found["failed"])
+            print(f"brakings: {task.path}: {failed[task.path]}", file=sys.stderr)
+            continue
+        rows.append(pd.DataFrame(found["rows"]).assign(train=task.train, recording=task.path))
+        cells.append(pd.DataFrame(found["cells"]))
+    result: dict[str, Any] = {"train": setup.train, "recordings": len(rows), "failed": failed, "brakings": 0}
+    if rows:
+        table = table_of(rows)
+        _write(table, options.output)
+        result |= {"brakings": len(table), "output": options.output, **_summary(table)}
+    if rows and options.map:
+        rail = map_of(pd.concat(cells), options.cell)
+        _write(rail, options.map)
+        result |= {"map": options.map, "pieces": int(rail["place_m"].nunique())}
+    report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
+    return FAILED if failed or not rows else DONE
+
+
+def table_of(rows: Sequence[pd.DataFrame]) -> pd.DataFrame:
+    """One row per braking, in the order of time."""
+    table = pd.concat(rows).sort_values("t_ns", ignore_index=True)
+    table.insert(0, "time", pd.to_datetime(table["t_ns"], utc=True))
+    return table[["train", "recording", *table.columns.drop(["train", "recording"])]]
+
+
+def map_of(cells: pd.DataFrame, cell_m: float) -> pd.DataFrame:
+    """The rail by piece of track and date.
+
+    `seen` counts brakings, `limited` those whose adhesion limited: `mu` is their mean, `mu_std` has their scatter and
+    their own errors, `mu_lowest` is the least. `used` is the mean of what the trains used, whatever limited them.
+    `mu_lower` is the least bound where adhesion limited, else the highest that was shown.
+    """
+    cells = cells.assign(
+        date=pd.to_datetime(cells["t_ns"], utc=True).dt.strftime("%Y-%m-%d"),
+        least=cells["mu_lower"].where(cells["limited"]),
+        variance=cells["mu_std"] ** 2,
+    )
+    by = cells.groupby(["cell", "date"])
+    rail = by.agg(
+        seen=("t_ns", "size"),
+        limited=("limited", "sum"),
+        mu=("mu", "mean"),
+        mu_lowest=("mu", "min"),
+        variance=("variance", "mean"),
+        scatter=("mu", "var"),
+        used=("used", "mean"),
+        least=("least", "min"),
+        most=("mu_lower", "max"),
+        speed_mps=("speed_mps", "mean"),
+        t_ns=("t_ns", "max"),
+    ).reset_index()
+    rail["mu_std"] = np.sqrt(rail.pop("variance") + rail.pop("scatter").fillna(0.0))
+    rail["mu_lower"] = rail.pop("least").fillna(rail.pop("most"))
+    rail.insert(0, "place_m", rail.pop("cell") * cell_m)
+    rail.insert(1, "length_m", cell_m)
+    return rail
+
+
+def _recording(text: str, values: dict[str, Any], options: argparse.Namespace) -> Recording:
+    name, _, path = ("", "", text) if Path(text).exists() else text.rpartition("=")
+    if not Path(path).exists():
+        raise ValueError(f"bag = {path}: is not there")
+    named = [value for value in values.values() if isinstance(value, str) and value and Path(value).is_file()]
+    as_of = tuple(_as_of(Path(each)) for each in (path, *named))
+    train = name or Path(path).resolve().stem
+    return Recording(train, path, as_of, tuple(sorted(values.items())), tuple(options.remap), options.cell)
+
+
+def _as_of(path: Path) -> tuple[int, int]:
+    """Bytes of a file, or of a folder's files, and when they were last changed, ns."""
+    files = [file for file in (path.rglob("*") if path.is_dir() else [path]) if file.is_file()]
+    return sum(file.stat().st_size for file in files), max((file.stat().st_mtime_ns for file in files), default=0)
+
+
+def _summary(table: pd.DataFrame) -> dict[str, Any]:
+    """What a person looks at first: how many brakings showed the adhesion, and the lowest of all."""
+    limited = table[table["mu"].notna()]
+    if limited.empty:
+        return {"limited": 0, "lowest_mu": None}
+    lowest = limited.loc[limited["mu_least"].idxmin()]
+    return {
+        "limited": len(limited),
+        "lowest_mu": float(lowest["mu_least"]),
+        "lowest_at": f"{lowest['place_m']:.0f} to {lowest['place_end_m']:.0f} m, {lowest['time']:%Y-%m-%d %H:%M}",
+    }
+
+
+def _write(frame: pd.DataFrame, path: str) -> None:
+    if Path(path).suffix == ".csv":
+        frame.to_csv(path, index=False)
+        return
+    try:
+        frame.to_parquet(path, index=False)
+    except ImportError as error:
+        raise ValueError(f"output = {path}: needs pyarrow, pip install '.[parquet]', or write a .csv") from error

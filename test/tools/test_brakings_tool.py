@@ -1,0 +1,104 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""`brakings`: one table of the brakings of many recordings, a map of the rail, and what could not be used."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from test_offline import NO_TRUTH, samples, write_run
+
+from adhesion_node.tools import brakings
+from adhesion_node.tools.brakings import map_of
+
+
+@pytest.fixture(scope="module")
+def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Record a braking twice, and something that is no recording."""
+    folder = tmp_path_factory.mktemp("bags")
+    write_run(folder / "monday", samples(15.0, 30.0), names=NO_TRUTH)
+    write_run(folder / "tuesday", samples(15.0, 26.0), names=NO_TRUTH)
+    (folder / "broken.mcap").write_bytes(b"nothing")
+    return folder
+
+
+def test_all_brakings_are_one_table_whatever_a_single_recording_is_worth(
+    bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    table, rail, result = tmp_path / "brakings.parquet", tmp_path / "rail.csv", tmp_path / "result.json"
+    named = [f"unit_7={bags / 'monday'}", str(bags / "tuesday"), str(bags / "broken.mcap")]
+    options = ["--output", str(table), "--map", str(rail), "--cache", str(tmp_path / "cache"), "--cell", "200"]
+    assert brakings.main([*named, *options, "--json", str(result), "--train", "high_speed"]) == 1
+    out, err = capfd.readouterr()
+    assert f"brakings: {bags / 'broken.mcap'}: " in err
+    found = pd.read_parquet(table)
+    assert list(found["train"]) == ["unit_7", "tuesday"]
+    assert list(found["recording"]) == [str(bags / "monday"), str(bags / "tuesday")]
+    assert (found["from_kmh"] > 290).all()
+    assert found["to_kmh"].is_monotonic_increasing
+    assert str(found["time"].dt.tz) == "UTC"
+    assert (found["time"].dt.year == 2023).all()
+    told = json.loads(result.read_text(encoding="utf-8"))
+    assert (told["recordings"], told["brakings"], list(told["failed"])) == (2, 2, [str(bags / "broken.mcap")])
+    assert told["train"].startswith("high-speed multiple unit (CRH3)")
+    assert "high-speed multiple unit" in out
+    pieces = pd.read_csv(rail)
+    assert (pieces["place_m"] % 200 == 0).all()
+    assert set(pieces["seen"]) <= {1, 2}
+    assert (pieces["mu_lower"] > 0.0).all()
+
+
+def test_what_is_finished_is_kept(bags: Path, tmp_path: Path) -> None:
+    options = ["--output", str(tmp_path / "brakings.csv"), "--cache", str(tmp_path / "cache")]
+    assert brakings.main([str(bags / "monday"), *options]) == 0
+    first = (tmp_path / "brakings.csv").read_bytes()
+    (kept,) = (tmp_path / "cache").iterdir()
+    written = kept.stat().st_mtime_ns
+    assert brakings.main([str(bags / "monday"), *options]) == 0
+    assert ((tmp_path / "brakings.csv").read_bytes(), kept.stat().st_mtime_ns) == (first, written)
+
+
+def test_the_map_says_how_often_where_and_when() -> None:
+    day = 86_400 * 10**9
+    cells = pd.DataFrame(
+        {
+            "cell": [3, 3, 3, 4],
+            "t_ns": [0, 10**9, day, 0],
+            "limited": [True, True, True, False],
+            "speed_mps": 30.0,
+            "mu": [0.05, 0.07, 0.10, float("nan")],
+            "mu_std": [0.003, 0.003, 0.004, float("nan")],
+            "used": [0.05, 0.07, 0.10, 0.08],
+            "mu_lower": [0.045, 0.065, 0.09, 0.075],
+        }
+    )
+    rail = map_of(cells, 100.0).set_index(["place_m", "date"])
+    first = rail.loc[(300.0, "1970-01-01")]
+    assert (first["seen"], first["limited"], first["mu_lowest"], first["mu_lower"]) == (2, 2, 0.05, 0.045)
+    assert first["mu"] == pytest.approx(0.06)
+    assert first["mu_std"] == pytest.approx((0.003**2 + 2 * 0.01**2) ** 0.5)
+    assert rail.loc[(300.0, "1970-01-02"), "mu"] == pytest.approx(0.10)
+    only_brake = rail.loc[(400.0, "1970-01-01")]
+    assert (only_brake["limited"], only_brake["mu_lower"]) == (0, 0.075)
+    assert pd.isna(only_brake["mu"])
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--output", "brakings.xlsx"], "output = brakings.xlsx: give a file that ends in .csv or .parquet"),
+        (["--output", "b.csv", "--cell", "0"], "cell = 0.0: give a length of 1 to 100000 m"),
+        (["--output", "b.csv", "--workers", "0"], "workers = 0: give at least 1"),
+        (["--output", "b.csv", "--set", "start_mu=2"], "start_mu = 2.0: give a value from 0 to 1"),
+    ],
+)
+def test_bad_usage_is_said_before_anything_is_replayed(
+    options: list[str], said: str, bags: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert brakings.main([str(bags / "monday"), *options]) == 2
+    assert said in capfd.readouterr().err
+    assert brakings.main(["nowhere", "--output", "b.csv"]) == 2
+    assert "bag = nowhere: is not there" in capfd.readouterr().err
