@@ -37,15 +37,17 @@ CLUSTER = ["distributed>=2024.8,<2027"]
 
 
 def shared_files() -> list[tuple[str, list[str]]]:
-    """List what goes under share/: marker, manifest, parameters, layouts and recordings."""
+    """List what goes under share/: marker, manifest, parameters, layouts, launch files and recordings."""
     share = Path("share", NAME)
     files = [
         (Path("share/ament_index/resource_index/packages"), f"resource/{NAME}"),
         (share, "package.xml"),
         (share / "config", "adhesion_node/nodes/defaults.yaml"),
+        (share / "config", "launch/analyzers.yaml"),
         (share / "layouts", "adhesion_node/layouts/foxglove.json"),
         (share / "layouts", "adhesion_node/layouts/plotjuggler.xml"),
     ]
+    files += [(share / "launch", str(path.relative_to(HERE))) for path in sorted((HERE / "launch").glob("*.launch.*"))]
     recordings = [path.relative_to(HERE) for path in sorted(HERE.glob("bags/**/*")) if path.is_file()]
     files += [(share / path.parent, str(path)) for path in recordings]
     return [(str(folder), [file]) for folder, file in files if (HERE / file).exists()]

@@ -24,7 +24,7 @@ import pytest
 from conftest import ROOT
 
 OWN = ("adhesion_node", "sim_node")
-ROS = re.compile(r"rclpy|ament_index_python|.*_(msgs|srvs|interfaces)")
+ROS = re.compile(r"rclpy|ament_index_python|launch(_ros|_xml)?|.*_(msgs|srvs|interfaces)")
 OPTIONAL = {"distributed": "cluster", "pyarrow": "parquet"}
 """Imported only where it is asked for: extra by module."""
 
@@ -238,7 +238,7 @@ HEAD = "# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apa
 
 
 def test_every_python_file_states_copyright_and_license() -> None:
-    written = [path for folder in (*OWN, "test", "doc", ".ci") for path in (ROOT / folder).rglob("*.py")]
+    written = [path for folder in (*OWN, "test", "doc", "launch", ".ci") for path in (ROOT / folder).rglob("*.py")]
     assert len(written) > len(sources())
     texts = {path: path.read_text(encoding="utf-8") for path in (*written, ROOT / "setup.py")}
     bare = [str(path) for path, text in texts.items() if not re.match(rf"(#!.*\n)?{re.escape(HEAD)}", text)]
