@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bag import BagReader, select_from
-from ..command.options import DONE, help_texts, json_option, remap_option, report, run_tool, setting_options
+from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
 from ..run.offline import parameters_of
 from ..wire.settings import Setup, setup_of
 from .curves import Subject
@@ -48,14 +48,17 @@ def _work(options: argparse.Namespace) -> int:
     page = output / "report.html"
     page.write_text(html, encoding="utf-8")
     result: dict[str, Any] = {"page": str(page), "train": setup.train, "runs": []}
-    texts = [f"train: {setup.train}"]
+    texts, identified = [f"train: {setup.train}"], False
     for subject in subjects:
         pictures = list(_pictures(subject, output, options.target))
         found = findings(subject.run, setup.config, options.target)
         result["runs"].append({"name": subject.name, "source": subject.source, "pictures": pictures, **found})
+        if found["why"] is not None:
+            print(f"report: {subject.name}: nothing is identified: {found['why']}", file=sys.stderr)
+        identified |= found["why"] is None
         texts.append(f"{subject.name}, {subject.source}\n{table(subject.run, options.target, subject.config.train)}")
     report(options.json, result, "\n\n".join([*texts, str(page)]))
-    return DONE
+    return DONE if identified else FAILED
 
 
 def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:

@@ -10,6 +10,7 @@ import numpy as np
 from ..core import Config, Regime
 from ..core.physics.train import KMH, Array, Train
 from ..run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
+from ..run.seen import Seen
 from .run import FIXED_MU, Run, distance_to_target
 from .series import NONE, Series
 
@@ -71,14 +72,15 @@ def true_way(run: Run, target_mps: float) -> Series:
 def first_identified(run: Run) -> int | None:
     """Index of the first estimate of an adhesion that limits, after 30 km/h of braking; None where there is none."""
     regimes = run.regime.by_time()
-    slow = run.speed.values < np.maximum.accumulate(run.speed.values) - CONVERGED_AFTER_MPS
+    speeds = np.abs(run.speed.values)
+    slow = speeds < np.maximum.accumulate(speeds) - CONVERGED_AFTER_MPS
     shown = (i for i in np.flatnonzero(slow) if regimes.get(int(run.speed.t_ns[i])) == Regime.ADHESION_LIMITED.name)
     return next((int(i) for i in shown), None)
 
 
 def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
     """Return the findings by name; None where the run cannot tell."""
-    speeds = run.speed.values / KMH
+    speeds = np.abs(run.speed.values) / KMH
     found: dict[str, Any] = {
         "seconds": float(run.seconds(run.speed.t_ns)[-1]),
         "from_kmh": float(speeds.max()),
@@ -87,6 +89,7 @@ def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
         "target_kmh": target_kmh,
         **dict.fromkeys(AT_FIRST),
         "dropped": dropped(run.counts),
+        "why": why_not(run),
     }
     at = first_identified(run)
     if at is not None:
@@ -96,6 +99,17 @@ def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
         lengths = (planned.fixed[at], planned.saved[at], planned.saved_at_least[at])
         found |= {name: float(value) for name, value in zip(AT_FIRST, (*identified, *lengths), strict=True)}
     return found
+
+
+def why_not(run: Run) -> str | None:
+    """Why nothing is identified; None where something is."""
+    seen, regimes, times = Seen(), run.regime.by_time(), run.speed.t_ns
+    pressure = run.pressure.at(times) if run.pressure.t_ns.size else np.full(times.shape, np.nan)
+    columns = times, run.mu.at(times), run.mu_lower.at(times), run.speed.values, pressure
+    for t_ns, mu, bound, speed, pressure_pa in zip(*(column.tolist() for column in columns), strict=True):
+        known_pa = None if np.isnan(pressure_pa) else pressure_pa
+        seen.note(t_ns, regimes.get(t_ns, ""), mu, bound, speed, known_pa)
+    return seen.why_not()
 
 
 def dropped(counts: Mapping[str, str]) -> dict[str, int]:

@@ -14,7 +14,9 @@ from .curves import Subject, chart_data
 from .findings import findings, listed
 from .run import FIXED_MU, Run
 from .series import Series
-from .table import rows
+from .table import NO_ROWS, rows, shown
+
+LITTLE = "it limited for less than 30 km/h, or a weaker brake would look the same"
 
 MOST_CHANGES = 40
 """Lines of a list of changes; the rest is counted."""
@@ -26,7 +28,7 @@ FINDINGS: tuple[tuple[str, _Write], ...] = (
     ("Estimates", lambda f, s: escape(s.source)),
     ("Duration", lambda f, s: f"{f['seconds']:.0f} s"),
     ("Speed", lambda f, s: f"{f['from_kmh']:.0f} → {f['to_kmh']:.0f} km/h"),
-    ("Adhesion identified at", lambda f, s: _value(f["identified_at_kmh"], "{:.0f} km/h", "not identified")),
+    ("Adhesion identified at", lambda f, s: escape(_identified(f))),
     ("μ̂ there", lambda f, s: _value(f["mu"], "{:.4f}")),
     ("at least", lambda f, s: _value(f["mu_lower"], "{:.4f}") + _confidence(s)),
     ("Braking distance by the fixed worst case", lambda f, s: _value(f["fixed_m"], "{:.0f} m")),
@@ -75,6 +77,10 @@ def _value(value: float | None, form: str, absent: str = "–") -> str:
     return absent if value is None else form.format(value)
 
 
+def _identified(found: Mapping[str, Any]) -> str:
+    return _value(found["identified_at_kmh"], "{:.0f} km/h", f"not identified: {found['why'] or LITTLE}")
+
+
 def _saved(found: Mapping[str, Any], name: str) -> str:
     if found[name] is None or not found["fixed_m"]:
         return "–"
@@ -94,7 +100,7 @@ def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject],
 def _distances(subject: Subject, target_kmh: float) -> str:
     header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "by bound m", f"fixed {FIXED_MU} m"]
     body = list(rows(subject.run, target_kmh, subject.config.train, "–"))
-    return _table(header, body, "number") if body else "<p>The train did not slow down.</p>"
+    return _table(shown(subject.run, header), body, "number") if body else f"<p>{escape(NO_ROWS)}</p>"
 
 
 def _diagnostics(subject: Subject) -> str:

@@ -131,7 +131,7 @@ def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
 
 
 def read_inputs(reader: BagReader, recorded: Mapping[str, str], line: Line) -> Run:
-    """Read the truth and the brake pressure above the air of `line`.
+    """Read the truth and the brake pressure above the air of `line`, or the demand where there is no pressure.
 
     `recorded` has their names in the recording where these differ.
     """
@@ -139,11 +139,12 @@ def read_inputs(reader: BagReader, recorded: Mapping[str, str], line: Line) -> R
     def series(topic: Topic, value: Callable[[Any], Any]) -> Series:
         return read_series(reader, topic._replace(name=recorded.get(topic.name, topic.name)), value, line)
 
+    pressure = series(topics.BRAKE_PRESSURE, attrgetter("pressure_pa"))
     return Run(
         true_mu=series(topics.TRUTH_MU, float),
         true_position=series(topics.TRUTH_STATE, attrgetter("position_m")),
         true_speed=series(topics.TRUTH_STATE, attrgetter("speed_mps")),
-        pressure=series(topics.BRAKE_PRESSURE, attrgetter("pressure_pa")),
+        pressure=pressure if pressure.t_ns.size else series(topics.BRAKE_DEMAND, attrgetter("pressure_pa")),
     )
 
 

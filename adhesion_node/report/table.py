@@ -2,13 +2,17 @@
 
 """A small table of a recorded run: what was identified at a few speeds, and the braking distances that follow."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from typing import TypeVar
 
 import numpy as np
 
 from ..core.physics.train import CRH3, KMH, Train
+from ..run.seen import is_known
 from .findings import distances
 from .run import FIXED_MU, Run
+
+Column = TypeVar("Column")
 
 ROWS = 6
 """Rows at most, evenly spread over the speeds of the braking."""
@@ -18,33 +22,53 @@ HEADER = (
     "     km/h   true identified  at least    true identified  at least  fixed {fixed}"
 )
 
+HEADER_WITHOUT_TRUTH = (
+    "        adhesion coefficient braking distance to {target:.0f} km/h, m\n"
+    "     km/h identified  at least identified  at least  fixed {fixed}"
+)
+
+TRUTH = (1, 4)
+"""Columns that only a simulation has."""
+
+NO_ROWS = "No rows: the train did not slow down by 10 km/h while it was faster than the target by as much."
+
 FORMS = ("{:.0f}", "{:.4f}", "{:.4f}", "{:.4f}", "{:.0f}", "{:.0f}", "{:.0f}", "{:.0f}")
 WIDTHS = (9, 7, 11, 10, 8, 11, 10, 10)
 """How the columns are written: speed, the true, the identified and the least adhesion, the distances by each, fixed."""
 
 
-def rows(run: Run, target_kmh: float, train: Train = CRH3, absent: str = "") -> Iterator[list[str]]:
+def rows(run: Run, target_kmh: float, train: Train = CRH3, absent: str = "–") -> Iterator[list[str]]:
     """Yield rows as texts, from 10 km/h below the highest speed before down to 10 km/h above the target.
 
-    `absent` stands for the truth where the recording lacks it.
+    `absent` stands for what is not known: the truth at its end, and an adhesion that is only believed.
+    Without any truth its columns are left out.
     """
-    speeds, target_mps = run.speed.values, target_kmh * KMH
-    shown = np.flatnonzero((speeds < np.maximum.accumulate(speeds) - 10.0 * KMH) & (speeds > target_mps + 10.0 * KMH))
-    if shown.size > ROWS:
-        shown = shown[np.linspace(0, shown.size - 1, ROWS).round().astype(int)]
+    speeds, target_mps = np.abs(run.speed.values), target_kmh * KMH
+    within = np.flatnonzero((speeds < np.maximum.accumulate(speeds) - 10.0 * KMH) & (speeds > target_mps + 10.0 * KMH))
+    if within.size > ROWS:
+        within = within[np.linspace(0, within.size - 1, ROWS).round().astype(int)]
     mu, lower = run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns)
     planned = distances(run, target_mps, train)
-    for i in shown:
+    for i in within:
         true_mu, true_m = _truth(run, int(run.speed.t_ns[i]), target_mps)
-        lengths = (float(column[i]) for column in (planned.identified, planned.longest, planned.fixed))
-        row = (float(speeds[i]) / KMH, true_mu, float(mu[i]), float(lower[i]), true_m, *lengths)
-        yield [absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True)]
+        nominal, longest, fixed = (float(column[i]) for column in (planned.identified, planned.longest, planned.fixed))
+        identified = (float(mu[i]), nominal) if is_known(mu[i], lower[i]) else (None, None)
+        row = (float(speeds[i]) / KMH, true_mu, identified[0], float(lower[i]), true_m, identified[1], longest, fixed)
+        texts = (absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True))
+        yield shown(run, list(texts))
+
+
+def shown(run: Run, columns: Sequence[Column]) -> list[Column]:
+    """Those of the columns for which the run has something to show."""
+    return [one for i, one in enumerate(columns) if run.true_mu.t_ns.size or i not in TRUTH]
 
 
 def table(run: Run, target_kmh: float, train: Train = CRH3) -> str:
-    """The table as text; columns of the truth stay empty where the recording holds none."""
-    lines = (map(str.rjust, row, WIDTHS) for row in rows(run, target_kmh, train))
-    return "\n".join([HEADER.format(target=target_kmh, fixed=FIXED_MU), *map("".join, lines)])
+    """The table as text."""
+    widths = shown(run, WIDTHS)
+    lines = ["".join(map(str.rjust, row, widths)) for row in rows(run, target_kmh, train)]
+    header = HEADER if run.true_mu.t_ns.size else HEADER_WITHOUT_TRUTH
+    return "\n".join([header.format(target=target_kmh, fixed=FIXED_MU), *lines]) if lines else NO_ROWS
 
 
 def _truth(run: Run, t_ns: int, target_mps: float) -> tuple[float | None, float | None]:

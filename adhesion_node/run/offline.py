@@ -13,9 +13,10 @@ import numpy as np
 
 from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
+from ..core import Outcome
 from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
-from ..wire.codecs import NOMINAL, Line, Rejected
+from ..wire.codecs import NOMINAL, Line, Reason, Rejected
 from ..wire.settings import SEED, SETTINGS, given, setup_of
 from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE, Topic
 from .engine import EstimatorPipeline
@@ -23,6 +24,7 @@ from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
 from .results import row_of, rows_to
 from .score import Identified, Point, Truth, mean_relative_error_percent
+from .seen import MANY, Seen
 
 Recorded = tuple[str, Any, int]
 """Our name of a message's topic, the message or why it is refused, its log time in ns."""
@@ -43,10 +45,13 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     truth = Truth() if TRUTH_MU.name in selection.values() else None
     recorded = progress(messages(reader, selection), "messages")
     compared: list[Point] = []
+    seen = Seen()
     with rows_to(options.out) as write:
         # nothing is kept of an estimate but what is compared with the truth: a day takes no more memory than an hour
         for made in predictions(pipeline, truth, recorded, setup.line, window_ms):
             write(row_of(pipeline, made, setup.line.sign))
+            e = made.estimate
+            seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, e.speed_mps, pressure_of(pipeline))
             if truth is not None:
                 compared.append(Point(made.estimate.t_ns, made.estimate.mu))
     result = {"train": setup.train, **summary(pipeline, window_ms, truth, compared)}
@@ -54,9 +59,33 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         result["out"] = options.out
     if pipeline.back_m > BACK_M:
         result["back_m"] = pipeline.back_m
-        print(f"replay: {BACKWARDS}", file=sys.stderr)
+    why = seen.why_not()
+    if why is not None:
+        result["why"] = why
+    for remark in _remarks(pipeline, why):
+        print(f"replay: {remark}", file=sys.stderr)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
-    return FAILED if pipeline.last is None else DONE
+    return DONE if seen.identified else FAILED
+
+
+def _remarks(pipeline: Pipeline, why: str | None) -> Iterator[str]:
+    """What a person must hear: that nothing is identified, that much was dropped, that the train runs back."""
+    for reason, count in pipeline.dropped.items():
+        if count > MANY * pipeline.measurements:
+            known = [kind[reason].value for kind in (Outcome, Reason) if reason in kind.__members__]
+            yield f"{count} messages were dropped: {reason}" + "".join(f": {text}" for text in known)
+    if why is not None:
+        yield f"nothing is identified: {why}"
+    elif pipeline.back_m > BACK_M:
+        yield BACKWARDS
+
+
+def pressure_of(pipeline: Pipeline) -> float | None:
+    """The newest brake pressure, or demand where there is none, gauge."""
+    newest = pipeline.state.newest
+    if newest is None or newest.brake_pressure_pa is not None:
+        return newest and newest.brake_pressure_pa
+    return newest.demand_pa
 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:

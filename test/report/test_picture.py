@@ -26,7 +26,7 @@ from adhesion_node.report import picture
 from adhesion_node.report.findings import distances, true_way
 from adhesion_node.report.run import Band, Run, distance_to_target, read_run
 from adhesion_node.report.series import NONE
-from adhesion_node.report.table import ROWS, table
+from adhesion_node.report.table import NO_ROWS, ROWS, table
 from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,
     BRAKING_CURVE,
@@ -267,10 +267,19 @@ def test_the_table_holds_the_runs_numbers(recorded: Run) -> None:
 
 def test_the_table_leaves_the_truth_out_where_there_is_none(tmp_path: Path) -> None:
     run_ = read(record(tmp_path / "bag", *TRUTH))
-    body = [[float(cell) for cell in line.split()] for line in table(run_, 180.0, FREE).splitlines()[2:]]
+    _, names, *lines = table(run_, 180.0, FREE).splitlines()
+    assert "true" not in names
+    body = [[float(cell) for cell in line.split()] for line in lines]
     assert {len(row) for row in body} == {6}
     assert {tuple(row[1:3]) for row in body} == {(0.09, 0.08)}
 
 
 def test_a_run_that_never_slows_down_has_no_rows(tmp_path: Path) -> None:
-    assert len(table(read(record(tmp_path / "bag", seconds=1)), 100.0).splitlines()) == 2
+    assert table(read(record(tmp_path / "bag", seconds=1)), 100.0) == NO_ROWS
+
+
+def test_an_adhesion_that_is_only_believed_is_not_called_identified(recorded: Run) -> None:
+    believed = recorded._replace(mu_lower=recorded.mu_lower.map(lambda bound: np.full_like(bound, 0.02)))
+    body = [line.split() for line in table(believed, 180.0, FREE).splitlines()[2:]]
+    assert {(row[2], row[5]) for row in body} == {("–", "–")}
+    assert {row[3] for row in body} == {"0.0200"}, "the bound is counted on all the same"

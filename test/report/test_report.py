@@ -88,7 +88,7 @@ def test_a_recording_with_results_is_shown_as_recorded(tmp_path: Path) -> None:
 
 
 def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: Path) -> None:
-    write_run(tmp_path / "bag", samples(16.0, 24.0))
+    write_run(tmp_path / "bag", samples())
     _, page = make(tmp_path, str(tmp_path / "bag"), *QUICK)
     assert replay.main([str(tmp_path / "bag"), "--offline", *QUICK, "--json", str(tmp_path / "replay.json")]) == 0
     replayed = json.loads((tmp_path / "replay.json").read_text())

@@ -409,8 +409,11 @@ def test_a_bag_without_any_estimate_has_failed(tmp_path: Path, offline: Offline)
 
     write_run(tmp_path / "bad", samples()[:20], edit=no_variance)
     code, result, _, err = offline(tmp_path / "bad")
-    assert (code, err) == (1, [])
-    assert set(result) == KEYS
+    dropped, why = err
+    assert dropped.startswith("replay: 20 messages were dropped: BAD_VARIANCE: ")
+    assert (code, why) == (1, f"replay: nothing is identified: {result['why']}")
+    assert result["why"] == "no estimate came of it; see what was dropped, and why"
+    assert set(result) == KEYS | {"why"}
     assert (result["measurements"], result["accepted"], result["dropped"]) == (20, 0, {"BAD_VARIANCE": 20})
     assert [result[key] for key in ("mu_final", "mu_lower_final", "regime_final", "windows")] == [None, None, None, 0]
 

@@ -32,6 +32,9 @@ SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
 BRAKES_MPS2, RUNS_MPS2 = -0.3, -0.1
 """A train that slows down more than by the first brakes; by less than the second, it runs or coasts."""
 
+OVER_S = 5
+"""Seconds over which it is seen whether a train brakes, however noisy its positions."""
+
 RELEASED_PIPE_PA = 2.5e5
 """No cylinder has so much while the train runs; the pipe has 5 bar then."""
 
@@ -186,8 +189,8 @@ def _too_fast(motion: Motion, form: Format) -> Iterator[str]:
 
 def _pipe(motion: Motion) -> Iterator[str]:
     """The pressure of a cylinder rises when the train brakes, that of the pipe falls."""
-    speed = motion.speed_mps if np.isfinite(motion.speed_mps).any() else motion.course_mps
-    slows = np.diff(speed, prepend=math.nan)
+    speed, late = motion.fastest_mps, np.full(OVER_S, math.nan)
+    slows = np.append(late, speed[OVER_S:] - speed[:-OVER_S]) / OVER_S
     known = np.isfinite(motion.pressure_pa)
     braking, running = (
         motion.pressure_pa[known & (slows < BRAKES_MPS2)],

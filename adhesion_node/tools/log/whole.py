@@ -51,7 +51,9 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         tell(each)
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
-        notes.append("direction: the chainage falls, positions are minus the chainage; so are those of track")
+        notes.append(
+            "direction: positions are minus the chainage, so are those of track; else: replay --set direction=down"
+        )
     if "brake_pipe" in rows:
         rows, note = _demanded(rows, source.form)
         notes.append(note)

@@ -1,0 +1,125 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Whether a run has identified an adhesion, and if not, why: said instead of a prior that looks like a result."""
+
+import math
+from collections import deque
+from collections.abc import Iterator
+
+from ..core import Config, Regime
+from .pipeline import BACKWARDS
+
+BRAKES_MPS2, SPAN_S = 0.3, 3.0
+"""A train that slows down less, over such a time, does not brake so that it tells of the adhesion."""
+
+BRAKED_PA = 20e3
+"""From this pressure on the brake works."""
+
+PIPE_PA, RUNS_MPS2, RUNS_MPS = 2.5e5, 0.05, 5.0
+"""A train with such a pressure in its cylinders does not run on, slowing down by less than this, at such a speed."""
+
+MANY = 0.2
+"""A part of all that is more than a fault now and then."""
+
+KNOWN_PART, KNOWN_MU = 0.5, 1.25 * Config().lowest_mu
+"""A bound that is no more than this part of the adhesion, or this, says nothing but what was believed before."""
+
+
+def is_known(mu: float, mu_lower: float) -> bool:
+    """Whether an estimate and its bound say more than what was believed before anything was seen.
+
+    >>> is_known(0.08, 0.07), is_known(0.08, 0.02)
+    (True, False)
+    """
+    return mu_lower > max(KNOWN_PART * mu, KNOWN_MU)
+
+
+class Seen:
+    """Takes the estimates of a run as they come; keeps no more than what the newest seconds need."""
+
+    def __init__(self) -> None:
+        self._limited = self._at_brake = self._told = 0
+        """Estimates while the adhesion limited, while the brake did, and while either may and what is used is known."""
+        self.hardest_mps2 = 0.0
+        self.most_pa: float | None = None
+        """Of the brake's pressure or demand; None: neither was measured."""
+        self._at_least = 0.0
+        """The highest bound while the brake limited."""
+        self._estimates = self._moving = self._back = self._pressed = self._held = 0
+        """Estimates, those of a train that runs, and of these: backwards, under pressure, in spite of that."""
+        self._newest: deque[tuple[int, float]] = deque()
+
+    def note(
+        self, t_ns: int, regime: str, mu: float, mu_lower: float, speed_mps: float, pressure_pa: float | None
+    ) -> None:
+        """Take an estimate, and the pressure or demand of its time, gauge."""
+        self._estimates += 1
+        slows_mps2 = self._slows(t_ns, abs(speed_mps))
+        if regime == Regime.ADHESION_LIMITED.name:
+            self._limited += 1
+        elif regime == Regime.BRAKE_LIMITED.name:
+            self._at_brake += 1
+            self._at_least = max(mu_lower, self._at_least)
+        else:
+            self._told += slows_mps2 >= BRAKES_MPS2 and is_known(mu, mu_lower)
+        self.hardest_mps2 = max(self.hardest_mps2, 0.0 if math.isnan(slows_mps2) else slows_mps2)
+        if pressure_pa is not None:
+            self.most_pa = max(pressure_pa, self.most_pa or 0.0)
+        if abs(speed_mps) > RUNS_MPS:
+            self._moving += 1
+            self._back += speed_mps < 0.0
+            under_pressure = (pressure_pa or 0.0) > PIPE_PA
+            self._pressed += under_pressure
+            self._held += under_pressure and slows_mps2 < RUNS_MPS2
+
+    def _slows(self, t_ns: int, speed_mps: float) -> float:
+        """Deceleration over the newest `SPAN_S`, m/s^2; NaN until so much has come without a gap."""
+        newest = self._newest
+        if newest and not 0 < t_ns - newest[-1][0] < SPAN_S * 1e9:
+            newest.clear()
+        newest.append((t_ns, speed_mps))
+        slowed = math.nan
+        while t_ns - newest[0][0] >= SPAN_S * 1e9:
+            before_ns, before_mps = newest.popleft()
+            slowed = (before_mps - speed_mps) / (1e-9 * (t_ns - before_ns))
+        return slowed
+
+    @property
+    def identified(self) -> bool:
+        """Whether the adhesion limited, or most of the braking left open whether it did."""
+        is_open = self._limited > 0 or self._told > self._at_brake
+        return is_open and not (self._runs_back or self._runs_on)
+
+    @property
+    def _runs_back(self) -> bool:
+        return self._back > MANY * self._moving
+
+    @property
+    def _runs_on(self) -> bool:
+        """Whether the brake seems to do nothing."""
+        return self._held > MANY * self._pressed
+
+    def why_not(self) -> str | None:
+        """Say why nothing is identified; None where something is."""
+        return None if self.identified else next(self._reasons())
+
+    def _reasons(self) -> Iterator[str]:
+        """What may be the reason, the one that explains most first."""
+        if not self._estimates:
+            yield "no estimate came of it; see what was dropped, and why"
+        if self._runs_back:
+            yield BACKWARDS
+        if self.most_pa is None:
+            yield "no brake pressure and no demand came: without them mu cannot be told"
+        elif self.most_pa < BRAKED_PA:
+            yield f"the brake pressure is {self.most_pa:.3g} Pa at most: is its unit right, was there a braking?"
+        if self._runs_on:
+            yield "the train runs on under brake pressure: is it the brake pipe's, or absolute and taken as gauge?"
+        if self.hardest_mps2 < BRAKES_MPS2:
+            yield f"no braking harder than {BRAKES_MPS2:g} m/s^2: the hardest was {self.hardest_mps2:.2f}"
+        if self._at_brake:
+            yield f"the brake limited throughout: the adhesion is at least {self._at_least:.2g}"
+        yield (
+            f"braked by up to {self.hardest_mps2:.2f} m/s^2, and a weaker brake would look the same as a slippery rail:"
+            " wheel speeds tell, a speed by radar or Doppler (speed_source), or a brake known better (brake_std)"
+        )

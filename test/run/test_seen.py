@@ -1,0 +1,70 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Why nothing was identified, of runs in which nothing is."""
+
+from __future__ import annotations
+
+import pytest
+
+from adhesion_node.run.pipeline import BACKWARDS
+from adhesion_node.run.seen import Seen
+
+S = 10**9
+
+
+def run(
+    slows_mps2: float, pressure_pa: float | None, regime: str = "COASTING", seconds: int = 20, mu_lower: float = 0.02
+) -> Seen:
+    """A run of mu 0.1 with two estimates a second, the pressure over the last half."""
+    seen = Seen()
+    for i in range(2 * seconds):
+        braked_s = max(i / 2 - seconds / 2, 0.0)
+        pressure = pressure_pa if braked_s or pressure_pa is None else 0.0
+        seen.note(i * S // 2, regime, 0.1, mu_lower, 40.0 - slows_mps2 * braked_s, pressure)
+    return seen
+
+
+@pytest.mark.parametrize(
+    ("seen", "why"),
+    [
+        (run(0.2, 4e5), "no braking harder than 0.3 m/s^2: the hardest was 0.20"),
+        (run(0.9, 4e5, "BRAKE_LIMITED", mu_lower=0.114), "the brake limited throughout: the adhesion is at least 0.11"),
+        (run(0.9, None), "no brake pressure and no demand came"),
+        (run(0.9, 4.1), "the brake pressure is 4.1 Pa at most: is its unit right"),
+        (run(0.0, 5e5, seconds=40), "the train runs on under brake pressure: is it the brake pipe's"),
+        (run(0.9, 4e5), "braked by up to 0.90 m/s^2"),
+    ],
+)
+def test_it_is_said_why_nothing_is_identified(seen: Seen, why: str) -> None:
+    said = seen.why_not()
+    assert said is not None
+    assert said.startswith(why)
+
+
+def test_an_adhesion_that_limits_is_identified_and_one_that_is_known_while_it_is_open_what_limits() -> None:
+    assert run(0.5, 4e5, "ADHESION_LIMITED").why_not() is None
+    assert run(0.9, 4e5, mu_lower=0.08).why_not() is None
+    assert run(0.2, 1e5, mu_lower=0.08).why_not() is not None, "what coasts shows nothing, however sure it is"
+
+
+def test_positions_that_fall_come_first() -> None:
+    seen = Seen()
+    for i in range(40):
+        seen.note(i * S // 2, "ADHESION_LIMITED", 0.1, 0.08, -40.0, None)
+    assert seen.why_not() == BACKWARDS
+
+
+def test_a_gap_is_no_braking() -> None:
+    """40 m/s, then after a minute without estimates 5 m/s: nobody saw how it slowed down."""
+    seen = Seen()
+    for t_s, speed_mps in ((0, 40.0), (2, 40.0), (62, 5.0), (64, 5.0), (66, 5.0)):
+        seen.note(t_s * S, "COASTING", 0.05, 0.02, speed_mps, 4e5)
+    assert seen.hardest_mps2 == 0.0
+
+
+@pytest.mark.parametrize("length", [100, 10_000])
+def test_it_keeps_no_more_of_a_long_run(length: int) -> None:
+    seen = Seen()
+    for i in range(length):
+        seen.note(i * S // 2, "COASTING", 0.05, 0.02, 30.0, 0.0)
+    assert len(seen._newest) <= 7
