@@ -66,7 +66,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         memory = bank.followed(config, memory, measurement._replace(variance_m2=math.inf), rail)
         state = state._replace(memory=memory, outliers=state.outliers + 1)
         return state.told(Event(Outcome.OUTLIER, detail)), None
-    return _accepted(config, state, measurement, bank.followed(config, memory, measurement, rail))
+    return _accepted(config, state, measurement, bank.followed(config, memory, measurement, rail, off.moved))
 
 
 def _anew(state: State, event: Event) -> State:

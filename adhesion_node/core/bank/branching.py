@@ -9,18 +9,19 @@ have changed is a new hypothesis beside the old one (multiple hypotheses, as in 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.special import ndtr
 
 from ..belief.rail import Rail
 from ..physics.train import Array
-from .kernels import weighing
+from .kernels import springing, weighing
+from .kernels.springing import Rule
 from .kernels.weighing import Pruning
-from .kinds import FREE, FREE_STD, HELD, KINDS, SLIDES, SLIDING
-from .layout import BRAKE, MU, ROUGH, Bank, joined
-from .motion import Braking, laws_of, resistance, use
+from .kinds import FREE, FREE_STD, HELD, KINDS, SLIDING
+from .layout import MU, ROUGH, Bank, joined
+from .motion import Braking, laws_of, rolling_use
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -89,65 +90,35 @@ def closed(bank: Bank) -> Bank:
 
 
 def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed_s: float) -> Bank:
-    """With what may have become different within the last `elapsed_s`."""
-    strong = bank.weight > STRONG
-    children = [bank]
-    sliding, held = bank.part(strong & SLIDES[bank.kind]), bank.part(strong & (bank.kind == HELD))
-    if sliding.log_weight.size:
-        children += _changed(config, sliding, now_s, elapsed_s)
-        if braking.told <= 0.0:
-            children += _rolling(sliding, braking, now_s, elapsed_s)
-    if held.log_weight.size and braking.told >= 0.0:
-        children += _begun_to_slide(config, held, braking, now_s, elapsed_s)
-    return joined(children).normalised()
+    """With what may have become different within the last `elapsed_s`, beside what springs from it.
+
+    Of those that slide: the rail has changed, and maybe how its adhesion depends on speed; or that alone; or adhesion
+    has become more than the brake uses, likelier the nearer it was. Of those that roll: adhesion has become less than
+    the brake needs, mostly a little less. Where the wheels tell which it is, the other does not spring.
+    """
+    laws, sliding = _likely(config)
+    rule = Rule(
+        now_s=now_s,
+        elapsed_s=elapsed_s,
+        strong=STRONG,
+        change_std=CHANGE_STD,
+        change_s=CHANGE_S,
+        bend_s=BEND_S,
+        begin_s=RISING_S if braking.rising else STEADY_S,
+        reached_s=REACHED_S,
+        applied=float(braking.applied),
+        told=float(braking.told),
+        laws=laws,
+        sliding=sliding,
+    )
+    return Bank(*springing.branched(bank, rolling_use(config, bank, braking), rule)).normalised()
 
 
-def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> list[Bank]:
-    """The rail has changed, and maybe how its adhesion depends on speed; or that alone."""
-    covariance = sliding.covariance.copy()
-    covariance[:, MU, MU] += CHANGE_STD**2
-    now = np.full(sliding.log_weight.size, now_s)
-    other = sliding._replace(covariance=covariance, changed_s=now)
-    children = []
-    for law, (_, probability) in enumerate(laws_of(config)):
-        if probability > 0.0:
-            laws = np.full(now.size, law)
-            weight = sliding.log_weight + math.log(probability * elapsed_s)
-            children.append(other._replace(log_weight=weight - math.log(CHANGE_S), law=laws, born_s=now))
-            bent = sliding._replace(log_weight=weight - math.log(BEND_S), law=laws, born_s=now)
-            children.append(bent.part(sliding.law != law))
-    return children
-
-
-def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
-    """Adhesion has become more than the brake uses: likelier the nearer it was."""
-    found = []
-    for noise in np.unique(sliding.noise):
-        alike = sliding.part(sliding.noise == noise)
-        one = alike.part(np.array([np.argmax(alike.log_weight)]))
-        most = float(one.mean[0, BRAKE]) * braking.applied
-        spread = math.hypot(math.sqrt(one.covariance[0, MU, MU]), math.sqrt(one.covariance[0, BRAKE, BRAKE]) * most)
-        near = float(ndtr((one.mean[0, MU] - 0.98 * most) / max(spread, 1e-6)))
-        prior = elapsed_s * (1.0 / CHANGE_S + near / REACHED_S)
-        total = np.logaddexp.reduce(alike.log_weight) - one.log_weight
-        found.append(one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0))))
-    return found
-
-
-def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
-    """Adhesion has become less than the brake needs: mostly a little less."""
-    needed = use(config, held, braking, resistance(config, held)).value
-    rate = elapsed_s / (RISING_S if braking.rising else STEADY_S)
-    share = sum(KINDS[kind].prior for kind in SLIDING)
-    slipping = held.with_fresh(MU, 0.9 * needed, 0.2 * needed + 0.003)
-    return [
-        slipping.with_fresh(ROUGH, 0.0, KINDS[kind].roughness).labelled(
-            kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share)
-        )
-        for law, (_, probability) in enumerate(laws_of(config))
-        for kind in SLIDING
-        if probability > 0.0
-    ]
+@lru_cache(maxsize=16)
+def _likely(config: Config) -> tuple[Array, Array]:
+    """Probabilities of the laws; roughness and prior of each kind, 0 of those that do not slide."""
+    kinds = [(kind.roughness, kind.prior if kind.slides else 0.0) for kind in KINDS]
+    return np.array([probability for _, probability in laws_of(config)]), np.array(kinds)
 
 
 def pruned(bank: Bank) -> Bank:

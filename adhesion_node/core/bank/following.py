@@ -125,6 +125,8 @@ class Off(NamedTuple):
     """Of what was foreseen and of the position, over all hypotheses."""
     nearest: float
     """In standard deviations, without sign, by the hypothesis nearest."""
+    moved: Memory | None = None
+    """What was foreseen."""
 
 
 def met(config: Config, measurement: Measurement) -> Memory:
@@ -154,14 +156,22 @@ def met(config: Config, measurement: Measurement) -> Memory:
     return followed(config, memory, measurement, lambda: Rail(0.0, 1.0, 0.0))
 
 
-def followed(config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail]) -> Memory:
-    """The train followed up to a measurement, which is taken in; `rail` is asked for where a braking opens."""
-    pressures, speeds = _pressures(measurement), _speeds(config, measurement)
+def followed(
+    config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail], foreseen: Memory | None = None
+) -> Memory:
+    """The train followed up to a measurement, which is taken in.
+
+    `rail` is asked for where a braking opens; `foreseen` is the memory moved to the measurement, if that is known.
+    """
+    pressures, speeds, start = _pressures(measurement), _speeds(config, measurement), memory
     if measurement.brake_pressure_pa is None and measurement.demand_pa is None:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
     for until_ns in _steps(before_ns, measurement.t_ns, (each.t_ns for each in speeds)):
-        memory = _moved(config, memory, until_ns)
+        if foreseen is not None and memory is start and foreseen.t_ns == until_ns:
+            memory = foreseen
+        else:
+            memory = _moved(config, memory, until_ns)
         since_ns, before_ns = before_ns, until_ns
         now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
         memory = _felt(config, memory, now)
@@ -184,12 +194,13 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
     """How far the measured position lies from what was foreseen; 0 if none was."""
     if not (measurement.has_position and memory.is_placed):
         return Off(0.0, 1.0, 0.0)
-    bank = _moved(config, memory, measurement.t_ns).bank
+    moved_on = _moved(config, memory, measurement.t_ns)
+    bank = moved_on.bank
     seen = position_seen(bank, measurement.position_m, math.sqrt(measurement.variance_m2))
     sigmas = seen.apart(bank)
     metres = float(bank.weight @ seen.innovation)
     each = np.square(seen.innovation / np.maximum(sigmas, 1e-9)) + np.square(seen.innovation - metres)
-    return Off(metres, math.sqrt(bank.weight @ each), float(sigmas.min()))
+    return Off(metres, math.sqrt(bank.weight @ each), float(sigmas.min()), moved_on)
 
 
 def _steps(from_ns: int, to_ns: int, stamps: Iterable[int]) -> Iterator[int]:

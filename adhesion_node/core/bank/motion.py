@@ -78,10 +78,16 @@ def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     return Use(*moving.used(model_of(config), bank, resisting, _step(0.0, braking, 0.0)))
 
 
+def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
+    """Adhesion that the brake asks for where every axle rolls, shape (H,)."""
+    rotating = config.train.rotating_mass_fraction
+    needed = bank.mean[:, BRAKE] * braking.applied - rotating * resistance(config, bank)
+    return np.asarray(needed / (1.0 + rotating))
+
+
 def sliding(config: Config, bank: Bank, braking: Braking) -> Array:
     """Probability that axles slide, shape (H,): the rail gives less than the brake would use of it."""
-    mean, rotating = bank.mean, config.train.rotating_mass_fraction
-    needed = (mean[:, BRAKE] * braking.applied - rotating * resistance(config, bank)) / (1.0 + rotating)
+    mean, needed = bank.mean, rolling_use(config, bank, braking)
     variance = bank.covariance[:, MU, MU] + bank.covariance[:, BRAKE, BRAKE] * braking.applied**2
     short = needed - mean[:, MU] * (1.0 + mean[:, ROUGH])
     return np.where(SLIDES[bank.kind], ndtr(short / np.sqrt(np.maximum(variance, 1e-12))), 0.0)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.train import GRAVITY
+from ..physics.train import GRAVITY, Array
 from . import kinds
 from .layout import SPEED, Bank
 from .motion import white_variance
@@ -61,12 +61,20 @@ class Course(NamedTuple):
             seen = time >= -span_s
             if np.count_nonzero(seen) < LEAST or time[seen][0] > -0.8 * span_s:
                 continue
-            slowing = -2.0 * float(np.polyfit(time[seen], places[seen], 2)[0])
+            slowing = -2.0 * _curvature(time[seen], places[seen] - places[-1])
             error = sigma * _error(bank, declared_m, span_s, int(np.count_nonzero(seen)))
             long = stamps[seen][0] - self.braked_ns >= BRAKED_NS
             if slowing > most + error or (long and slowing < -GAIN_MPS2 - GRAVITY * grade - error):
                 return True
         return False
+
+
+def _curvature(time: Array, places: Array) -> float:
+    """Coefficient of t^2 of the parabola through places, by the polynomial that is orthogonal to 1 and t."""
+    centred = time - time.mean()
+    square = np.square(centred)
+    bend = square - (square @ centred) / square.sum() * centred - square.mean()
+    return float(bend @ places / (bend @ bend))
 
 
 def _error(bank: Bank, declared_m: float, span_s: float, count: int) -> float:

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, kinds, motion
-from adhesion_node.core.bank.kinds import FREE, SLIDES
-from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank
+from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, SLIDES, SLIDING
+from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance
 from adhesion_node.core.bank.seeing import CLIPPED, Observation
 from adhesion_node.core.config import Config
@@ -112,6 +112,68 @@ def moments(bank: Bank) -> tuple[Array, Array]:
     mean = weight @ bank.mean
     apart = bank.mean - mean
     return mean, np.einsum("h,hij->ij", weight, bank.covariance) + (apart.T * weight) @ apart
+
+
+def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed_s: float) -> Bank:
+    """With what may have become different within the last `elapsed_s`."""
+    strong = bank.weight > branching.STRONG
+    children = [bank]
+    sliding, held = bank.part(strong & SLIDES[bank.kind]), bank.part(strong & (bank.kind == HELD))
+    if sliding.log_weight.size:
+        children += _changed(config, sliding, now_s, elapsed_s)
+        if braking.told <= 0.0:
+            children += _rolling(sliding, braking, now_s, elapsed_s)
+    if held.log_weight.size and braking.told >= 0.0:
+        children += _begun_to_slide(config, held, braking, now_s, elapsed_s)
+    return normalised(joined(children))
+
+
+def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> list[Bank]:
+    """The rail has changed, and maybe how its adhesion depends on speed; or that alone."""
+    covariance = sliding.covariance.copy()
+    covariance[:, MU, MU] += branching.CHANGE_STD**2
+    now = np.full(sliding.log_weight.size, now_s)
+    other = sliding._replace(covariance=covariance, changed_s=now)
+    children = []
+    for law, (_, probability) in enumerate(laws_of(config)):
+        if probability > 0.0:
+            laws = np.full(now.size, law)
+            weight = sliding.log_weight + math.log(probability * elapsed_s)
+            children.append(other._replace(log_weight=weight - math.log(branching.CHANGE_S), law=laws, born_s=now))
+            bent = sliding._replace(log_weight=weight - math.log(branching.BEND_S), law=laws, born_s=now)
+            children.append(bent.part(sliding.law != law))
+    return children
+
+
+def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
+    """Adhesion has become more than the brake uses: likelier the nearer it was."""
+    found = []
+    for noise in np.unique(sliding.noise):
+        alike = sliding.part(sliding.noise == noise)
+        one = alike.part(np.array([np.argmax(alike.log_weight)]))
+        most = float(one.mean[0, BRAKE]) * braking.applied
+        spread = math.hypot(math.sqrt(one.covariance[0, MU, MU]), math.sqrt(one.covariance[0, BRAKE, BRAKE]) * most)
+        near = float(ndtr((one.mean[0, MU] - 0.98 * most) / max(spread, 1e-6)))
+        prior = elapsed_s * (1.0 / branching.CHANGE_S + near / branching.REACHED_S)
+        total = np.logaddexp.reduce(alike.log_weight) - one.log_weight
+        found.append(one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0))))
+    return found
+
+
+def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
+    """Adhesion has become less than the brake needs: mostly a little less."""
+    needed = use(config, held, braking, resistance(config, held)).value
+    rate = elapsed_s / (branching.RISING_S if braking.rising else branching.STEADY_S)
+    share = sum(KINDS[kind].prior for kind in SLIDING)
+    slipping = held.with_fresh(MU, 0.9 * needed, 0.2 * needed + 0.003)
+    return [
+        slipping.with_fresh(ROUGH, 0.0, KINDS[kind].roughness).labelled(
+            kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share)
+        )
+        for law, (_, probability) in enumerate(laws_of(config))
+        for kind in SLIDING
+        if probability > 0.0
+    ]
 
 
 def pruned(bank: Bank) -> Bank:

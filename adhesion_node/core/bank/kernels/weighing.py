@@ -37,7 +37,7 @@ class Pruning(NamedTuple):
 
 
 @kernel
-def total(log_weight: Array) -> float:
+def _total(log_weight: Array) -> float:
     """ln of the sum of the weights."""
     most = -np.inf
     for each in log_weight:
@@ -53,7 +53,7 @@ def total(log_weight: Array) -> float:
 @kernel
 def normalised(log_weight: Array) -> Array:
     """With weights that sum to 1."""
-    return log_weight - total(log_weight)
+    return log_weight - _total(log_weight)
 
 
 @kernel
@@ -79,7 +79,7 @@ def _united(weight: Array, mean: Array, covariance: Array, group: Labels, centre
 def moments(log_weight: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
     """Mean and covariance of the mixture."""
     centre, spread = np.empty(SIZE), np.empty((SIZE, SIZE))
-    weight = np.exp(log_weight - total(log_weight))
+    weight = np.exp(log_weight - _total(log_weight))
     _united(weight, mean, covariance, np.arange(weight.size), centre, spread)
     return centre, spread
 

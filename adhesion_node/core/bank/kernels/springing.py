@@ -1,0 +1,141 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The hypotheses that spring from others: the rail has changed, axles begin to slide or roll again."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import kernel
+
+if TYPE_CHECKING:
+    from ..layout import Bank
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
+
+MU, ROUGH, BRAKE, SIZE = 2, 3, 4, 10
+HELD = 1
+RAIL, LAW, ROLLS, SLIDES = 1, 2, 3, 4
+"""What is new of a hypothesis. A row of `rows` is its parent, law, kind, and this."""
+
+
+class Rule(NamedTuple):
+    """What may spring from what, and how likely."""
+
+    now_s: float
+    elapsed_s: float
+    strong: float
+    """Probability from which others spring from a hypothesis."""
+    change_std: float
+    change_s: float
+    bend_s: float
+    begin_s: float
+    """Time in which axles begin to slide."""
+    reached_s: float
+    """Time in which axles roll that the brake no longer makes slide."""
+    applied: float
+    told: float
+    laws: Array
+    """Probabilities."""
+    sliding: Array
+    """Roughness and prior of each kind, shape (K, 2); the prior is 0 where it does not slide."""
+
+
+@kernel
+def _changed(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """The rail has changed, and maybe how its adhesion depends on speed; or that alone."""
+    for law in range(rule.laws.size):
+        for new, every_s in ((RAIL, rule.change_s), (LAW, rule.bend_s)):
+            for h in range(slides.size):
+                if slides[h] and rule.laws[law] > 0.0 and (new == RAIL or bank.law[h] != law):
+                    rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, bank.kind[h], new
+                    weight[size] = bank.log_weight[h] + math.log(rule.laws[law] * rule.elapsed_s / every_s)
+                    size += 1
+    return size
+
+
+@kernel
+def _rolling(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """Adhesion has become more than the brake uses: of each way that positions err the likeliest hypothesis says so."""
+    for noise in range(bank.noise.max() + 1):
+        best, whole = -1, 0.0
+        for h in range(slides.size):
+            if slides[h] and bank.noise[h] == noise:
+                whole += math.exp(bank.log_weight[h])
+                best = h if best < 0 or bank.log_weight[h] > bank.log_weight[best] else best
+        if best >= 0:
+            x, p = bank.mean[best], bank.covariance[best]
+            reach = x[BRAKE] * rule.applied
+            spread = math.hypot(math.sqrt(p[MU, MU]), math.sqrt(p[BRAKE, BRAKE]) * reach)
+            off = (x[MU] - 0.98 * reach) / max(spread, 1e-6)
+            near = 0.5 * math.erfc(-off / math.sqrt(2.0))
+            prior = rule.elapsed_s * (1.0 / rule.change_s + near / rule.reached_s)
+            rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = best, 0, HELD, ROLLS
+            weight[size] = math.log(whole * min(prior, 1.0))
+            size += 1
+    return size
+
+
+@kernel
+def _begun(bank: Bank, holds: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """Adhesion has become less than the brake needs."""
+    rate = rule.elapsed_s / rule.begin_s / rule.sliding[:, 1].sum()
+    for law in range(rule.laws.size):
+        for kind in range(rule.sliding.shape[0]):
+            likely = rate * rule.laws[law] * rule.sliding[kind, 1]
+            for h in range(holds.size):
+                if holds[h] and likely > 0.0:
+                    rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, SLIDES
+                    weight[size] = bank.log_weight[h] + math.log(likely)
+                    size += 1
+    return size
+
+
+@kernel
+def _fresh(x: Array, p: Array, component: int, mean: float, std: float) -> None:
+    x[component] = mean
+    p[component, :] = 0.0
+    p[:, component] = 0.0
+    p[component, component] = std**2
+
+
+@kernel
+def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
+    """All hypotheses, and behind them what may be different now; `needed` is the adhesion that each would use rolling.
+
+    The weights are not normalised.
+    """
+    count = bank.kind.size
+    strong = np.exp(bank.log_weight) > rule.strong
+    slides = strong & (rule.sliding[:, 1][bank.kind] > 0.0)
+    holds = strong & (bank.kind == HELD) & (rule.told >= 0.0)
+    most = count + (2 * rule.laws.size + 1) * slides.sum() + rule.laws.size * rule.sliding.shape[0] * holds.sum()
+    rows, weight = np.zeros((most, 4), np.intp), np.empty(most)
+    for h in range(count):
+        rows[h, 0], rows[h, 1], rows[h, 2], weight[h] = h, bank.law[h], bank.kind[h], bank.log_weight[h]
+    size = _changed(bank, slides, rule, rows, weight, count)
+    if rule.told <= 0.0 and slides.any():
+        size = _rolling(bank, slides, rule, rows, weight, size)
+    size = _begun(bank, holds, rule, rows, weight, size)
+    parent, law, kind = rows[:size, 0].copy(), rows[:size, 1].copy(), rows[:size, 2].copy()
+    mean, covariance = bank.mean[parent], bank.covariance[parent]
+    born, changed = bank.born_s[parent], bank.changed_s[parent]
+    for row in range(count, size):
+        new, x, p = rows[row, 3], mean[row], covariance[row]
+        born[row] = rule.now_s
+        if new == RAIL:
+            changed[row] = rule.now_s
+            p[MU, MU] += rule.change_std**2
+        if new == ROLLS:
+            _fresh(x, p, ROUGH, 0.0, 0.0)
+        if new == SLIDES:
+            _fresh(x, p, ROUGH, 0.0, rule.sliding[kind[row], 0])
+            _fresh(x, p, MU, 0.9 * needed[parent[row]], 0.2 * needed[parent[row]] + 0.003)
+    return mean, covariance, weight[:size].copy(), bank.noise[parent], law, kind, born, changed
