@@ -46,24 +46,36 @@ def _memory(options: Options) -> Section:
     return {"settings": {"rate_hz": 10.0}, "rows": [step.memory(options.minutes, 10.0, options.seed)]}
 
 
+def _trains(options: Options) -> Section:
+    from . import trains  # only here: no other benchmark needs ROS
+
+    rows = [trains.share(one, options.trains, 10.0, options.seconds, options.seed) for one in trains.EXECUTORS]
+    return {"settings": {"rate_hz": 10.0, "seconds": options.seconds}, "rows": rows}
+
+
 BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], str]] = {
     "particle": (_particle, PEERS[1:], "particle E and M step of one window"),
     "gaussian": (_gaussian, (PEERS[0], PEERS[2]), "Gaussian update of one window, EM converged"),
     "step": (_step, (), "a sample through the estimator in steady braking"),
     "memory": (_memory, (), "resident memory over a long journey"),
+    "trains": (_trains, ("rclpy",), "braking trains in one process, an estimator each on one executor, through DDS"),
 }
 """What runs it, the peers it needs, and its title."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the benchmarks and print their tables."""
-    texts = help_texts(PURPOSE, "bench", "bench particle gaussian --rounds 20", "bench step memory --json -")
+    texts = help_texts(
+        PURPOSE, "bench", "bench particle gaussian --rounds 20", "bench step memory --json -", "bench trains"
+    )
     parser = argparse.ArgumentParser("bench", parents=[json_option()], **texts)
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
     add("--rounds", type=int, default=50, help="calls of each contender (default %(default)s)")
     add("--journeys", type=int, default=5, help="brakings for the latency (default %(default)s)")
     add("--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)")
+    add("--trains", type=int, default=20, help="in one process (default %(default)s)")
+    add("--seconds", type=float, default=20.0, help="of them on their way (default %(default)s)")
     add("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
     return run_tool(parser, _run, args)
 
@@ -73,7 +85,7 @@ def _run(options: Options) -> int:
     names = options.names or list(BENCHMARKS)
     missing = sorted({peer for name in names for peer in BENCHMARKS[name][1] if find_spec(peer) is None})
     if missing:
-        raise ValueError(f"{', '.join(missing)} not installed: pip install 'adhesion_node[bench]'")
+        raise ValueError(f"{', '.join(missing)} not installed: pip install '.[ros,bench]'")
     # All on one thread: the arrays are too small for more, which would only make the times depend on the neighbours.
     limited = import_module("threadpoolctl").threadpool_limits(1) if find_spec("threadpoolctl") else nullcontext()
     with limited:
@@ -87,7 +99,7 @@ def _check(options: Options) -> None:
     for name in options.names:
         if name not in BENCHMARKS:
             raise ValueError(f"benchmark {name!r}: choose of {', '.join(BENCHMARKS)}")
-    for name in ("rounds", "journeys", "minutes"):
+    for name in ("rounds", "journeys", "minutes", "trains", "seconds"):
         value = getattr(options, name)
         if not value > 0 or value == float("inf"):
             raise ValueError(f"{name} = {value}: give a number above 0")

@@ -18,7 +18,7 @@ import pytest
 from oracles import Linear, make_window, rts
 
 from adhesion_node.bench import __main__ as bench
-from adhesion_node.bench import gaussian, particle, scene, step
+from adhesion_node.bench import gaussian, particle, scene, step, trains
 from adhesion_node.bench.timing import Contender, figures, interleave
 from adhesion_node.core.belief.gaussian import Gaussian
 
@@ -156,6 +156,17 @@ def test_resident_memory_grows_with_what_is_held() -> None:
     assert step.resident_mb() - before == pytest.approx(held.nbytes / 2**20, abs=8.0)
 
 
+@pytest.mark.parametrize("kind", trains.EXECUTORS)
+def test_trains_of_one_process_are_all_served(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trains, "WARM_S", 0.5)
+    row = trains.share(kind, count=3, rate_hz=10.0, seconds=1.0, seed=1)
+    assert (row["executor"], row["trains"]) == (kind, 3)
+    assert row["calls"] + row["unused"] == pytest.approx(30, abs=6)
+    assert row["unused"] <= 6, "what is on its way at the end"
+    assert 0.0 < row["median_ms"] <= row["p99_ms"]
+    assert row["cpu_ms_per_position"] > 0.0
+
+
 @pytest.mark.usefixtures("few_windows")
 def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str]) -> None:
     options = ["step", "memory", "--journeys", "1", "--minutes", "0.5"]
@@ -174,7 +185,7 @@ def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str]) -> 
 @pytest.mark.parametrize(
     ("args", "said"),
     [
-        (["speed"], "choose of particle, gaussian, step, memory"),
+        (["speed"], "choose of particle, gaussian, step, memory, trains"),
         (["--rounds", "0"], "rounds = 0"),
         (["memory", "--minutes", "inf"], "minutes = inf"),
         (["--seed", "-1"], "seed = -1"),
@@ -191,4 +202,4 @@ def test_a_missing_peer_is_said_with_the_remedy(capsys: pytest.CaptureFixture[st
     with mock.patch.dict(sys.modules, {"particles": None}), mock.patch.object(bench, "find_spec", return_value=None):
         assert bench.main(["particle"]) == 2
     assert "particles" in (said := capsys.readouterr().err)
-    assert "[bench]" in said
+    assert "bench]'" in said
