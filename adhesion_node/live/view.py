@@ -14,7 +14,7 @@ from ..core.atp.received import StampedCurve, TrainState
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
-from ..report.curves import IN_WORDS
+from ..report.run import IN_WORDS
 from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
 from .fit import number, numbers, rounded, text_of
 

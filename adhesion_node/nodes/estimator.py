@@ -96,6 +96,7 @@ def _estimate_values(last: Estimate | None) -> dict[str, str]:
         "mu_std": f"{last.mu_std:.5f}",
         "mu_lower": f"{last.mu_lower:.5f}",
         "window": str(last.window),
+        "changes": str(last.changes),
         "iterations": str(last.iterations),
         "converged": str(last.converged).lower(),
         "log_likelihood": f"{last.log_likelihood:.3f}",

@@ -6,14 +6,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core import Regime
 from ..core.physics.train import KMH, Train
+from .brakings import regimes_at
 from .findings import distances, true_way
 from .run import FIXED_MU, Run
-from .series import Series
+from .series import NONE, Series
 
 
 class Line(NamedTuple):
-    """A line of a chart; its kind says how it is drawn: "truth", "identified", "bound" or "fixed"."""
+    """A line of a chart; its kind says how it is drawn.
+
+    "identified" is what was found, "atleast" the lower end of an open interval, "prior" no finding; besides "truth",
+    "bound", "fixed", and "nominal" for what follows from μ̂ whatever that is.
+    """
 
     label: str
     kind: str
@@ -46,27 +52,31 @@ def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
         Line(worst, "fixed", Series(at, np.full(at.size, FIXED_MU))),
         Line("true", "truth", run.true_mu),
         Line(bound, "bound", run.mu_lower),
-        Line("identified", "identified", run.mu),
+        *_told(run, "prior, not identified", "at least, the brake limits", "identified"),
     )
     speed = (
         Line("true", "truth", run.true_speed.map(lambda mps: mps / KMH)),
-        Line("estimated", "identified", run.speed.map(lambda mps: mps / KMH)),
+        Line("estimated", "nominal", run.speed.map(lambda mps: mps / KMH)),
     )
     forces = (
         Line("brake B", "fixed", run.pressure.map(lambda pa: train.brake_force(pa) / 1e3)),
         Line("adhesion F, true", "truth", run.true_mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
-        Line("adhesion F, identified", "identified", run.mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
+        *(
+            line._replace(series=line.series.map(lambda mu: train.adhesion_force(mu) / 1e3))
+            for line in _told(run, "", "adhesion F, at least", "adhesion F, identified")
+            if line.label
+        ),
     )
     distance = (
         Line(worst, "fixed", Series(at, planned.fixed)),
         Line("true", "truth", true_way(run, target_kmh * KMH)),
         Line("safe curve, by the lower bound", "bound", Series(at, planned.longest)),
-        Line("nominal curve, by the identified μ", "identified", Series(at, planned.identified)),
+        Line("nominal curve, by μ̂", "nominal", Series(at, planned.identified)),
     )
     saved = (
         Line(worst, "fixed", Series(at, np.zeros(at.size))),
         Line("at least, by the lower bound", "bound", Series(at[seen], planned.saved_at_least[seen])),
-        Line("by the identified μ", "identified", Series(at[seen], planned.saved[seen])),
+        Line("by μ̂, where something is claimed", "nominal", Series(at[seen], planned.saved[seen])),
     )
     table = (
         ("Adhesion coefficient", 5, adhesion),
@@ -76,3 +86,14 @@ def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
         (f"{to_target} saved, m", 1, saved),
     )
     return [Chart(title, digits, [line for line in lines if line.series.t_ns.size]) for title, digits, lines in table]
+
+
+def _told(run: Run, prior: str, at_least: str, identified: str) -> list[Line]:
+    """μ̂ as three lines by what it is: each a gap where another one holds, none where it never does."""
+    regimes, lines = regimes_at(run, run.mu.t_ns), []
+    limits = (regimes == Regime.BRAKE_LIMITED.name, regimes == Regime.ADHESION_LIMITED.name)
+    kinds = ((prior, "prior", ~(limits[0] | limits[1])), (at_least, "atleast", limits[0]))
+    for label, kind, holds in (*kinds, (identified, "identified", limits[1])):
+        series = run.mu._replace(values=np.where(holds, run.mu.values, np.nan))
+        lines.append(Line(label, kind, series if holds.any() else NONE))
+    return lines

@@ -2,28 +2,31 @@
 
 """A run as plain numbers for the charts of a page: series over time and the braking curves of every moment."""
 
-import math
+from bisect import bisect_left
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..core import Config, Regime
+from ..core import Config
 from ..core.physics import braking
 from ..core.physics.train import KMH
+from .ahead import SHOWN, ahead
+from .brakings import Braking, brakings, exactly, regimes_at
 from .charts import Chart, charts
-from .findings import Distances, distances, first_identified
-from .run import FIXED_MU, Curve, Run, bands
+from .events import events
+from .findings import distances, first_identified
+from .run import FIXED_MU, IN_WORDS, Curve, Distances, Run, bands
 from .series import Times
+from .thinning import evenly, number, peaks, rounded, with_gaps
 
-MOST_POINTS = 1500
-"""Points of a series at most: more than a screen is wide."""
+MOST_POINTS, MOST_MOMENTS, CURVE_POINTS = 6000, 800, 32
+"""Points of a series, moments of a run and points of a curve at most: a page that is zoomed into shows them all."""
 
-IN_WORDS = {
-    Regime.COASTING.name: "nothing is claimed",
-    Regime.BRAKE_LIMITED.name: "the brake limits",
-    Regime.ADHESION_LIMITED.name: "the adhesion limits",
-}
+IDLE_MOMENTS = 100
+"""Of the moments, those without the brake."""
+
+SAID_NS = 1_500_000_000
+"""What the ATP monitor says so soon after an estimate is of its curve."""
 
 
 class Subject(NamedTuple):
@@ -39,81 +42,108 @@ class Subject(NamedTuple):
 
 
 def chart_data(subject: Subject, target_kmh: float) -> dict[str, Any]:
-    """Return what the script of the report draws; lengths in m, speeds in km/h, forces in kN, times in s."""
+    """Return what the script of the report draws; lengths in m, speeds in km/h, forces in kN, times in s.
+
+    Places count from the start of the run, in its direction.
+    """
     run, config = subject.run, subject.config
-    planned = distances(run, target_kmh * KMH, config.train)
-    moments = _moments(run, config, planned)
+    parts = brakings(run)
+    moments = _moments(run, config, distances(run, target_kmh * KMH, config.train), parts)
     first = first_identified(run)
     place, speed = run.way
-    kept = _thinned(place.t_ns.size, MOST_POINTS)
+    kept = evenly(place.t_ns.size, MOST_POINTS)
+    way = _way(run, Curve(0, place.values[kept], np.abs(speed.values[kept])))
+    forward = np.flatnonzero(np.diff(np.maximum.accumulate([-1.0, *(x if x is not None else -1.0 for x in way["x"])])))
+    seconds = run.seconds(run.speed.t_ns)
+    fixed = braking.curve(config.train, float(np.abs(run.speed.values).max()), FIXED_MU)
     return {
         "name": subject.name,
         "source": subject.source,
         "bands": [
-            {"from": _round(band.start_s, 2), "to": _round(band.end_s, 2), "kind": band.regime.lower(), "label": label}
+            {"from": number(band.start_s, 2), "to": number(band.end_s, 2), "kind": band.regime.lower(), "label": label}
             for band in bands(run)
             if (label := IN_WORDS.get(band.regime))
         ],
+        "events": [{"x": number(run.seconds(np.array([t_ns]))[0], 2), "kind": kind} for t_ns, kind, _ in events(run)],
+        "brakings": [[number(seconds[part.first], 2), number(seconds[part.last], 2)] for part in parts],
         "charts": [_chart(run, chart) for chart in charts(run, target_kmh, config.train)],
-        "path": _way(run, Curve(0, place.values[kept], speed.values[kept])),
+        "path": {name: [column[i] for i in forward] for name, column in way.items()},
+        "fixed": {"x": rounded(fixed.distance_m, 1), "y": rounded(fixed.speed_mps / KMH, 2)},
         "moments": moments,
-        "opens_at": moments[-1]["t"] if first is None else _round(run.seconds(run.speed.t_ns)[first], 2),
+        "opens_at": moments[-1]["t"] if first is None else number(seconds[first], 2),
     }
 
 
-def _moments(run: Run, config: Config, planned: Distances) -> list[dict[str, Any]]:
+def _kept(run: Run, parts: list[Braking]) -> Times:
+    """Indices of the estimates that have a place on the slider: most of them under the brake."""
+    size = run.speed.t_ns.size
+    if size <= MOST_MOMENTS or not parts:
+        return evenly(size, MOST_MOMENTS)
+    each = (MOST_MOMENTS - IDLE_MOMENTS) // len(parts)
+    braked = (part.first + evenly(part.last - part.first + 1, max(each, 2)) for part in parts)
+    return np.unique(np.concatenate([evenly(size, IDLE_MOMENTS), *braked]))
+
+
+def _moments(run: Run, config: Config, planned: Distances, parts: list[Braking]) -> list[dict[str, Any]]:
     """What is known at every estimate that has a place on the slider, with the braking curves from there."""
     safe, nominal = ({curve.t_ns: curve for curve in curves} for curves in (run.safe, run.nominal))
-    regimes = run.regime.by_time()
-    kept = _thinned(run.speed.t_ns.size, MOST_POINTS // 5)
+    kept = _kept(run, parts)
     times = run.speed.t_ns[kept]
-    columns = (run.speed.values[kept], run.position.values[kept], run.mu.at(times), run.mu_lower.at(times))
-    moments = []
-    for i, speed, place, mu, lower in zip(kept.tolist(), *(column.tolist() for column in columns), strict=True):
-        t_ns = int(run.speed.t_ns[i])
-        fixed = braking.curve(config.train, abs(speed), FIXED_MU)
-        moments.append(
-            {
-                "t": _round(run.seconds(run.speed.t_ns)[i], 2),
-                "speed": _round(speed / KMH, 2),
-                "mu": _round(mu, 5),
-                "mu_lower": _round(lower, 5),
-                "regime": IN_WORDS.get(regimes.get(t_ns, ""), "regime not recorded"),
-                "distance": _round(planned.identified[i], 1),
-                "saved": _round(planned.saved[i], 1),
-                "saved_at_least": _round(planned.saved_at_least[i], 1),
-                "fixed": _way(run, Curve(t_ns, place + fixed.distance_m, fixed.speed_mps)),
-                "safe": _way(run, safe[t_ns]) if t_ns in safe else None,
-                "nominal": _way(run, nominal[t_ns]) if t_ns in nominal else None,
-            }
-        )
-    return moments
+    found = (exactly(series, times).tolist() for series in (run.mu, run.mu_lower))
+    columns = (np.abs(run.speed.values[kept]).tolist(), run.position.values[kept].tolist(), *found)
+    seconds, regimes, start_m = run.seconds(times), regimes_at(run, times), float(run.way[0].values[0])
+    rows = zip(kept.tolist(), times.tolist(), *columns, strict=True)
+    return [
+        {
+            "t": number(seconds[k], 2),
+            "speed": number(speed / KMH, 2),
+            "place": number(run.sign * (place - start_m), 1),
+            "mu": number(mu, 5),
+            "mu_lower": number(lower, 5),
+            "regime": regimes[k].lower(),
+            "words": IN_WORDS.get(regimes[k], "regime not recorded"),
+            "distance": number(planned.identified[i], 1),
+            "longest": number(planned.longest[i], 1),
+            "saved_at_least": number(planned.saved_at_least[i], 1),
+            "safe": _way(run, _thin(safe[t_ns])) if t_ns in safe else None,
+            "nominal": _way(run, _thin(nominal[t_ns])) if t_ns in nominal else None,
+            "limits": _limits(run, safe[t_ns]) if t_ns in safe else None,
+        }
+        for k, (i, t_ns, speed, place, mu, lower) in enumerate(rows)
+    ]
+
+
+def _limits(run: Run, curve: Curve) -> dict[str, Any] | None:
+    """The supervision limits ahead, as the ATP monitor had them by this curve."""
+    at = bisect_left(run.said, curve.t_ns, key=lambda row: row[0])
+    if at == len(run.said) or run.said[at][0] - curve.t_ns > SAID_NS:
+        return None
+    numbers = dict(run.said[at][1])
+    if "target_position_m" in numbers:
+        numbers["target_position_m"] *= run.sign
+    found = ahead(curve.braking, numbers)
+    if found is None:
+        return None
+    start_m = run.sign * float(run.way[0].values[0])
+    speeds = {name: rounded(row / KMH, 1) for name, row in zip(SHOWN, found[1:5], strict=True)}
+    return {"x": rounded(found.position_m - start_m, 0), **speeds}
+
+
+def _thin(curve: Curve) -> Curve:
+    kept = evenly(curve.position_m.size, CURVE_POINTS)
+    return Curve(curve.t_ns, curve.position_m[kept], curve.speed_mps[kept])
 
 
 def _way(run: Run, curve: Curve) -> dict[str, list[float | None]]:
     start_m = float(run.way[0].values[0])
-    return {"x": _rounded(curve.position_m - start_m, 1), "y": _rounded(curve.speed_mps / KMH, 2)}
+    return {"x": rounded(run.sign * (curve.position_m - start_m), 1), "y": rounded(curve.speed_mps / KMH, 2)}
 
 
 def _chart(run: Run, chart: Chart) -> dict[str, Any]:
     lines = []
     for label, kind, series in chart.lines:
-        kept = _thinned(series.t_ns.size, MOST_POINTS)
-        x, y = _rounded(run.seconds(series.t_ns[kept]), 3), _rounded(series.values[kept], chart.digits)
-        lines.append({"label": label, "kind": kind, "dots": kind == "identified", "x": x, "y": y})
+        whole = with_gaps(series)
+        kept = peaks(np.asarray(whole.values, dtype=np.float64), MOST_POINTS)
+        x, y = rounded(run.seconds(whole.t_ns[kept]), 3), rounded(whole.values[kept], chart.digits)
+        lines.append({"label": label, "kind": kind, "x": x, "y": y})
     return {"title": chart.title, "range": chart.range, "lines": lines}
-
-
-def _thinned(size: int, most: int) -> Times:
-    """Indices of about `most` of `size` values, evenly spread, with the first and the last."""
-    return np.unique(np.linspace(0, size - 1, min(size, most)).round().astype(np.int64)) if size else np.arange(0)
-
-
-def _rounded(values: ArrayLike, digits: int) -> list[float | None]:
-    """Numbers for JSON; None, a gap in the chart, for what is not finite."""
-    rounded: list[float] = np.round(np.asarray(values, dtype=np.float64), digits).tolist()
-    return [number if math.isfinite(number) else None for number in rounded]
-
-
-def _round(value: float, digits: int) -> float:
-    return round(float(value), digits)

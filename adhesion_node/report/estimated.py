@@ -44,6 +44,7 @@ def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) 
         regime=column(lambda estimate: estimate.regime.name),
         safe=tuple(_curve(made.estimate, made.safe) for made in predictions if made.safe is not None),
         nominal=tuple(_curve(made.estimate, made.nominal) for made in predictions if made.nominal is not None),
+        changes=column(lambda estimate: str(estimate.changes)),
         counts={  # under the keys that they have in the diagnostics
             "measurements": str(pipeline.measurements),
             "accepted": str(pipeline.accepted),

@@ -3,43 +3,24 @@
 """What a run shows, in numbers: how the adhesion was identified and what braking distance that saves."""
 
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ..core import Config, Regime
-from ..core.physics.train import KMH, Array, Train
+from ..core.atp.supervision import Level
+from ..core.physics.train import KMH, Train
 from ..run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
 from ..run.seen import Seen
-from .run import FIXED_MU, Run, distance_to_target
+from .brakings import RELEASED_NS, bound_kept, brakings, rises, row_of
+from .run import FIXED_MU, Distances, Run, distance_to_target
 from .series import NONE, Series
 
-BRAKED_PA, RELEASED_NS = 20e3, 3_000_000_000
-"""From this pressure on the brake works; it is released once it does not for so long, longer than a dump lasts."""
+BRAKES = (Level.SERVICE_BRAKE.name, Level.EMERGENCY_BRAKE.name)
+"""Levels at which the ATP monitor brakes."""
 
 AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
 """Findings at the first estimate that counts as identified: speed, adhesion, braking distances."""
-
-
-class Distances(NamedTuple):
-    """Braking distances, m, at every estimate; arrays of the estimates' shape."""
-
-    fixed: Array
-    """By the fixed worst case, on a level track."""
-    identified: Array
-    """By the nominal curves."""
-    longest: Array
-    """By the safe curves: not exceeded, with the confidence of the bound."""
-
-    @property
-    def saved(self) -> Array:
-        """Saved by the identified adhesion against the fixed one; negative where it is lower."""
-        return self.fixed - self.identified
-
-    @property
-    def saved_at_least(self) -> Array:
-        """Saved at least, with the confidence of the bound."""
-        return self.fixed - self.longest
 
 
 def distances(run: Run, target_mps: float, train: Train) -> Distances:
@@ -53,20 +34,22 @@ def distances(run: Run, target_mps: float, train: Train) -> Distances:
 
 
 def true_way(run: Run, target_mps: float) -> Series:
-    """Way, m, that the train truly went from each moment of its last braking until it had the target speed.
+    """Way, m, that the train truly went from each moment of a braking until it had the target speed.
 
-    Empty where the recording holds no truth or the train did not get there.
+    Empty where the recording holds no truth or brake pressure, or the train never got there.
     """
-    slow = np.flatnonzero(run.true_speed.values <= target_mps)
-    if not slow.size:
-        return NONE
     t_ns, place = run.true_position
-    braked_ns = run.pressure.t_ns[(run.pressure.values >= BRAKED_PA) & (run.pressure.t_ns < t_ns[slow[0]])]
-    if not braked_ns.size:
+    slow = run.true_speed.values <= target_mps
+    if not (slow.any() and run.pressure.t_ns.size):
         return NONE
-    releases = np.flatnonzero(np.diff(braked_ns) > RELEASED_NS)
-    during = (t_ns >= braked_ns[releases[-1] + 1 if releases.size else 0]) & (np.arange(t_ns.size) <= slow[0])
-    return Series(t_ns[during], place[slow[0]] - place[during])
+    parts = []
+    for braking in brakings(run):
+        begun = np.flatnonzero(t_ns >= braking.start_ns)
+        reached = begun[slow[begun]]
+        if reached.size and t_ns[reached[0]] <= braking.end_ns + RELEASED_NS:
+            during = begun[begun <= reached[0]]
+            parts.append((t_ns[during], np.abs(place[reached[0]] - place[during])))
+    return Series(*(np.concatenate(column) for column in zip(*parts, strict=True))) if parts else NONE
 
 
 def first_identified(run: Run) -> int | None:
@@ -79,8 +62,15 @@ def first_identified(run: Run) -> int | None:
 
 
 def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
-    """Return the findings by name; None where the run cannot tell."""
+    """Return the findings by name; None where the run cannot tell.
+
+    Those at the first identified estimate are of one moment; `brakings` has a row for each braking.
+    """
     speeds = np.abs(run.speed.values) / KMH
+    planned, target_mps = distances(run, target_kmh * KMH, config.train), target_kmh * KMH
+    true_m, parts = true_way(run, target_mps), brakings(run)
+    kept = np.concatenate([np.array([], bool), *(bound_kept(run, part.first, part.last) for part in parts)])
+    start_ns, end_ns = int(run.speed.t_ns[0]), int(run.speed.t_ns[-1])
     found: dict[str, Any] = {
         "seconds": float(run.seconds(run.speed.t_ns)[-1]),
         "from_kmh": float(speeds.max()),
@@ -90,10 +80,18 @@ def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
         **dict.fromkeys(AT_FIRST),
         "dropped": dropped(run.counts),
         "why": why_not(run),
+        "brakings": [row_of(run, part, planned, true_m, target_mps) for part in parts],
+        "bound_kept_percent": 100.0 * float(kept.mean()) if kept.size else None,
+        "bound_compared": int(kept.size),
+        "changes_s": run.seconds(np.array(rises(run.changes, start_ns, end_ns), dtype=np.int64)).tolist(),
+        "interventions": [
+            {"s": float(run.seconds(np.array([t_ns]))[0]), "level": level}
+            for t_ns, level in text_changes(run.levels)
+            if level in BRAKES and t_ns >= start_ns
+        ],
     }
     at = first_identified(run)
     if at is not None:
-        planned = distances(run, target_kmh * KMH, config.train)
         time = run.speed.t_ns[at : at + 1]
         identified = (speeds[at], run.mu.at(time)[0], run.mu_lower.at(time)[0])
         lengths = (planned.fixed[at], planned.saved[at], planned.saved_at_least[at])
@@ -110,6 +108,12 @@ def why_not(run: Run) -> str | None:
         known_pa = None if np.isnan(pressure_pa) else pressure_pa
         seen.note(t_ns, regimes.get(t_ns, ""), mu, bound, speed, known_pa)
     return seen.why_not()
+
+
+def text_changes(series: Series) -> list[tuple[int, str]]:
+    """Times and texts at which a series of texts changes, the first included; "" is left out."""
+    rows = zip(series.t_ns.tolist(), map(str, series.values), ["", *map(str, series.values)], strict=False)
+    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]
 
 
 def dropped(counts: Mapping[str, str]) -> dict[str, int]:

@@ -3,7 +3,8 @@
 """The report as one HTML page: findings, charts with a slider, drops, diagnostics, parameters and versions."""
 
 import platform
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from datetime import UTC, datetime
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
@@ -11,14 +12,20 @@ from typing import Any
 from ..web import as_json, page
 from ..wire.settings import SETTINGS
 from .curves import Subject, chart_data
+from .events import events
 from .findings import findings, listed
 from .run import FIXED_MU, Run
-from .series import Series
 from .table import NO_ROWS, rows, shown
 
 LITTLE = "it limited for less than 30 km/h, or a weaker brake would look the same"
 
-MOST_CHANGES = 40
+MOST_TIMES = 6
+"""Times that are listed of one finding."""
+
+CALENDAR = 2000
+"""Stamps before this year are those of a simulation."""
+
+MOST_CHANGES = 200
 """Lines of a list of changes; the rest is counted."""
 
 _Write = Callable[[Mapping[str, Any], Subject], str]
@@ -26,14 +33,14 @@ _Write = Callable[[Mapping[str, Any], Subject], str]
 FINDINGS: tuple[tuple[str, _Write], ...] = (
     ("Train", lambda f, s: escape(s.train)),
     ("Estimates", lambda f, s: escape(s.source)),
+    ("Recorded", lambda f, s: _recorded(s.run)),
     ("Duration", lambda f, s: f"{f['seconds']:.0f} s"),
+    ("Brakings", lambda f, s: str(len(f["brakings"]))),
     ("Speed", lambda f, s: f"{f['from_kmh']:.0f} → {f['to_kmh']:.0f} km/h"),
-    ("Adhesion identified at", lambda f, s: escape(_identified(f))),
-    ("μ̂ there", lambda f, s: _value(f["mu"], "{:.4f}")),
-    ("at least", lambda f, s: _value(f["mu_lower"], "{:.4f}") + _confidence(s)),
-    ("Braking distance by the fixed worst case", lambda f, s: _value(f["fixed_m"], "{:.0f} m")),
-    ("saved by the identified μ̂", lambda f, s: _saved(f, "saved_m")),
-    ("saved at least", lambda f, s: _saved(f, "saved_at_least_m") + _confidence(s)),
+    ("Adhesion identified", lambda f, s: escape(_identified(f))),
+    ("Lower bound of μ kept", lambda f, s: _kept(f) + _confidence(s)),
+    ("Changes of the rail found", lambda f, s: _times(f["changes_s"])),
+    ("Interventions of the ATP monitor", lambda f, s: _interventions(f, s.run)),
     ("Mean relative error while adhesion limits", lambda f, s: _value(f["mean_relative_error_percent"], "{:.2f} %")),
     ("Messages not used", lambda f, s: escape(listed(f["dropped"]) or "none")),
 )
@@ -49,11 +56,14 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
     subtitle = (
         f"Wheel–rail adhesion and emergency braking to {target_kmh:g} km/h, beside the fixed worst case "
         f"μ\u00a0=\u00a0{FIXED_MU}. Distances are those of the braking curves; without a curve μ keeps its value. "
-        "Bands: nothing is claimed (grey), the brake limits (blue), the adhesion limits (orange)."
+        "Bands: nothing is claimed (grey), the brake limits (blue), the adhesion limits (orange). Drag or turn the "
+        "wheel over a chart to zoom, Shift and drag or the arrows to move, a double click or 0 to see all; a click "
+        "moves the present."
     )
     details = (
+        _section("Events", subjects, _events),
         _section("Distances", subjects, lambda subject: _distances(subject, target_kmh)),
-        _section("Drops and diagnostics", subjects, _diagnostics),
+        _section("Diagnostics", subjects, _diagnostics),
         _parameters(parameters),
         _versions(),
     )
@@ -68,9 +78,11 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
 
 
 def _findings(subjects: Sequence[Subject], target_kmh: float) -> str:
-    found = [findings(subject.run, subject.config, target_kmh) for subject in subjects]
-    body = ([escape(name), *map(write, found, subjects)] for name, write in FINDINGS)
-    return _table(["", *(escape(subject.name) for subject in subjects)], body)
+    found = {subject.name: findings(subject.run, subject.config, target_kmh) for subject in subjects}
+    body = ([escape(name), *map(write, found.values(), subjects)] for name, write in FINDINGS)
+    brakings = "".join(f"<section><h3>{escape(name)}</h3>{_brakings(each)}</section>" for name, each in found.items())
+    note = f"<p class='soft'>Distances are those to {target_kmh:g} km/h. A button shows the braking in the charts.</p>"
+    return _table(["finding", *map(escape, found)], body) + f"<h2>Brakings</h2>{note}{brakings}"
 
 
 def _value(value: float | None, form: str, absent: str = "–") -> str:
@@ -78,13 +90,60 @@ def _value(value: float | None, form: str, absent: str = "–") -> str:
 
 
 def _identified(found: Mapping[str, Any]) -> str:
-    return _value(found["identified_at_kmh"], "{:.0f} km/h", f"not identified: {found['why'] or LITTLE}")
+    shown = sum(row["mu_low"] is not None for row in found["brakings"])
+    return f"in {shown} of {len(found['brakings'])} brakings" if shown else f"not identified: {found['why'] or LITTLE}"
 
 
-def _saved(found: Mapping[str, Any], name: str) -> str:
-    if found[name] is None or not found["fixed_m"]:
-        return "–"
-    return f"{found[name]:.0f} m ({100 * found[name] / found['fixed_m']:.1f} %)"
+def _kept(found: Mapping[str, Any]) -> str:
+    if found["bound_kept_percent"] is None:
+        return "not known: no truth recorded"
+    return f"{found['bound_kept_percent']:.1f} % of {found['bound_compared']} estimates under the brake"
+
+
+def _times(seconds: Sequence[float]) -> str:
+    return f"{len(seconds)}: at {', '.join(f'{at:.1f}' for at in seconds[:MOST_TIMES])} s" if seconds else "none"
+
+
+def _interventions(found: Mapping[str, Any], run: Run) -> str:
+    if not run.levels.t_ns.size:
+        return "not recorded"
+    told = [f"{each['level'].replace('_', ' ').lower()} at {each['s']:.1f} s" for each in found["interventions"]]
+    return escape(f"{len(told)}: {', '.join(told[:MOST_TIMES])}" if told else "none")
+
+
+def _recorded(run: Run) -> str:
+    begun = datetime.fromtimestamp(run.origin_ns * 1e-9, UTC)
+    return "at a simulated time" if begun.year < CALENDAR else f"{begun:%Y-%m-%d %H:%M:%S} UTC"
+
+
+def _brakings(found: Mapping[str, Any]) -> str:
+    """A row for each braking, whose button shows its first identified or first moment."""
+    header = ("from", "km/h", "limited by", "μ̂ identified", "else μ ≥", "at least, at the end", "bound kept")
+    claims = ("rail changed", "fixed worst case", "saved at least, by every later bound")
+    body = ([_jump(row), *(escape(cell) for cell in _told(row))] for row in found["brakings"])
+    return _table([*header, *claims], body) if found["brakings"] else "<p>The train did not brake.</p>"
+
+
+def _jump(row: Mapping[str, Any]) -> str:
+    span = f'data-from="{row["start_s"]:.2f}" data-to="{row["end_s"]:.2f}"'
+    return f'<button type="button" {span}>{row["start_s"]:.1f} s</button>'
+
+
+def _told(row: Mapping[str, Any]) -> Iterator[str]:
+    yield f"{row['from_kmh']:.0f} → {row['to_kmh']:.0f}"
+    shares = (("adhesion", row["adhesion_share"]), ("the brake", row["brake_share"]))
+    yield ", ".join(f"{name} {share:.0%}" for name, share in shares if share) or "nothing is claimed"
+    yield "–" if row["mu_low"] is None else f"{row['mu_low']:.4f} to {row['mu_high']:.4f}"
+    yield _value(row["mu_at_least"], "{:.4f}")
+    yield _value(row["mu_lower"], "{:.4f}")
+    yield _value(row["bound_kept_percent"], "{:.1f} %")
+    yield _times(row["changes_s"])
+    yield "–" if row["fixed_m"] is None else f"{row['fixed_m']:.0f} m from {row['identified_at_kmh']:.0f} km/h"
+    saved, fixed = row["saved_at_least_m"], row["fixed_m"]
+    if saved is None:
+        yield "–"
+    else:
+        yield f"{saved:.0f} m ({saved / fixed:.0%})" if saved > 0.0 else f"nothing: {-saved:.0f} m more are needed"
 
 
 def _confidence(subject: Subject) -> str:
@@ -104,22 +163,15 @@ def _distances(subject: Subject, target_kmh: float) -> str:
 
 
 def _diagnostics(subject: Subject) -> str:
-    run = subject.run
-    counts = _table(["", ""], ([escape(key), f"<code>{escape(value)}</code>"] for key, value in run.counts.items()))
-    return counts + _changes(run, "The estimator said", run.remarks) + _changes(run, "The ATP monitor said", run.levels)
+    counts = subject.run.counts.items()
+    return _table(["value", "last"], ([escape(key), f"<code>{escape(value)}</code>"] for key, value in counts))
 
 
-def changes(series: Series) -> list[tuple[int, str]]:
-    """Times and texts at which a series of texts changes, the first included; "" is left out."""
-    rows = zip(series.t_ns.tolist(), map(str, series.values), ["", *map(str, series.values)], strict=False)
-    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]
-
-
-def _changes(run: Run, title: str, series: Series) -> str:
-    found = changes(series)
-    body = [[f"{(t_ns - run.origin_ns) * 1e-9:.1f} s", escape(text)] for t_ns, text in found[:MOST_CHANGES]]
-    more = f"<p>and {len(found) - MOST_CHANGES} more changes</p>" if len(found) > MOST_CHANGES else ""
-    return (_table([title, ""], body) + more) if body else ""
+def _events(subject: Subject) -> str:
+    run, found = subject.run, events(subject.run)
+    body = [[f"{(t_ns - run.origin_ns) * 1e-9:.1f} s", kind, escape(text)] for t_ns, kind, text in found[:MOST_CHANGES]]
+    more = f"<p>and {len(found) - MOST_CHANGES} more</p>" if len(found) > MOST_CHANGES else ""
+    return (_table(["time", "kind", "what"], body) + more) if body else "<p>None recorded.</p>"
 
 
 def _parameters(given: Mapping[str, Any]) -> str:
@@ -154,4 +206,4 @@ def _table(header: Sequence[str], body: Iterable[Sequence[str]], kind: str = "")
     of_kind = f' class="{kind}"' if kind else ""
     head = "".join(f"<th{of_kind}>{cell}</th>" for cell in header)
     lines = "".join("<tr>" + "".join(f"<td{of_kind}>{cell}</td>" for cell in row) + "</tr>" for row in body)
-    return f'<div class="scroll"><table><tr>{head}</tr>{lines}</table></div>'
+    return f'<div class="scroll" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table></div>'

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..bag import BagReader
 from ..core import Regime
 from ..core.physics import braking
+from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import GRAVITY, Array, Train
 from ..wire import topics
 from ..wire.codecs import NOMINAL, Line
@@ -23,6 +24,7 @@ from .series import (
     Series,
     Times,
     read_last_status,
+    read_numbers,
     read_remarks,
     read_series,
     read_status,
@@ -37,6 +39,14 @@ RESULTS = (topics.MU, topics.MU_LOWER, topics.STATE)
 """Without these a recording holds no results."""
 
 
+IN_WORDS = {
+    Regime.COASTING.name: "nothing is claimed",
+    Regime.BRAKE_LIMITED.name: "the brake limits",
+    Regime.ADHESION_LIMITED.name: "the adhesion limits",
+}
+"""What limits the motion, by the names of the regimes."""
+
+
 class Curve(NamedTuple):
     """A predicted braking: at which places, m along the track, the train has which speeds, m/s; arrays of (n,)."""
 
@@ -47,6 +57,14 @@ class Curve(NamedTuple):
     def distance_to(self, target_mps: float) -> float:
         """Distance, m, from the start of the curve to where the train has the target speed; 0 where it is slower."""
         return abs(float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0]))
+
+    @property
+    def braking(self) -> BrakingCurve:
+        """The curve from its first place, constant in its deceleration from point to point."""
+        way, speed = np.abs(self.position_m - self.position_m[0]), self.speed_mps
+        slowing = (speed[:-1] ** 2 - speed[1:] ** 2) / (2.0 * np.maximum(np.diff(way), 1e-6))
+        times = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way) / np.maximum(speed[:-1] + speed[1:], 1e-6))))
+        return BrakingCurve(way, speed, np.append(slowing, slowing[-1]), times)
 
 
 class Band(NamedTuple):
@@ -78,6 +96,10 @@ class Run(NamedTuple):
     """What the estimator said while all was not well."""
     levels: Series = NONE
     """Of the ATP monitor."""
+    changes: Series = NONE
+    """Changes of the rail found so far, counted."""
+    said: tuple[tuple[int, Mapping[str, float]], ...] = ()
+    """Numbers of the ATP monitor by key, at their times."""
     counts: Mapping[str, str] = MappingProxyType({})
     """Last diagnostics by key."""
 
@@ -103,6 +125,12 @@ class Run(NamedTuple):
         known = self.true_position.t_ns.size > 0
         return (self.true_position, self.true_speed) if known else (self.position, self.speed)
 
+    @property
+    def sign(self) -> int:
+        """-1 where the chainage falls along the run."""
+        place = self.way[0].values
+        return -1 if place[-1] < place[0] else 1
+
     def seconds(self, t_ns: Times) -> Array:
         """Times as seconds from the start of the run."""
         return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
@@ -122,6 +150,8 @@ def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
         nominal=_read_curves(reader, topics.BRAKING_CURVE_NOMINAL, line),
         remarks=read_remarks(reader, topics.DIAGNOSTICS, "regime"),
         levels=read_status(reader, topics.ATP_STATUS, "level"),
+        changes=read_status(reader, topics.DIAGNOSTICS, "changes"),
+        said=read_numbers(reader, topics.ATP_STATUS, "level"),
         counts=read_last_status(reader, topics.DIAGNOSTICS, "regime"),
     )
     for topic, series in zip(RESULTS, (run.mu, run.mu_lower, run.speed), strict=True):
@@ -155,6 +185,27 @@ def bands(run: Run) -> list[Band]:
     rows = [row for row in zip(starts, ends, run.regime.values, strict=True) if row[2]]
     grouped = (list(group) for _, group in groupby(rows, key=lambda row: str(row[2])))
     return [Band(float(group[0][0]), float(group[-1][1]), str(group[0][2])) for group in grouped]
+
+
+class Distances(NamedTuple):
+    """Braking distances, m, at every estimate; arrays of the estimates' shape."""
+
+    fixed: Array
+    """By the fixed worst case, on a level track."""
+    identified: Array
+    """By the nominal curves."""
+    longest: Array
+    """By the safe curves: not exceeded, with the confidence of the bound."""
+
+    @property
+    def saved(self) -> Array:
+        """Saved by the identified adhesion against the fixed one; negative where it is lower."""
+        return self.fixed - self.identified
+
+    @property
+    def saved_at_least(self) -> Array:
+        """Saved at least, with the confidence of the bound."""
+        return self.fixed - self.longest
 
 
 def distance_to_target(

@@ -5,7 +5,8 @@
 from __future__ import annotations
 
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -99,6 +100,20 @@ def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
 def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read what the statuses that have `key` say while they are not OK; "" while they are."""
     return _texts((t_ns, status.message if status.level else "") for t_ns, status in _told(reader, topic, key))
+
+
+def read_numbers(reader: BagReader, topic: Topic, key: str) -> tuple[tuple[int, dict[str, float]], ...]:
+    """Read the numbers of the statuses that have `key`, at their times."""
+    rows = ((t_ns, _numbers(status.values)) for t_ns, status in _told(reader, topic, key))
+    return tuple(sorted(rows, key=lambda row: row[0]))
+
+
+def _numbers(values: Mapping[str, str]) -> dict[str, float]:
+    found = {}
+    for key, text in values.items():
+        with suppress(ValueError):
+            found[key] = float(text)
+    return {key: value for key, value in found.items() if np.isfinite(value)}
 
 
 def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str]:

@@ -44,8 +44,11 @@ for (const kind of ["before", "after"]) {
   });
 }
 
-// A stretch of x that several charts show together; null: each its own.
-const shared = () => ({ zoom: null, members: new Set() });
+// A stretch of x that several charts show together; `zoom` is null while they show all, `onChange` hears of it.
+function shared(onChange = () => {}) {
+  const view = { zoom: null, members: new Set(), show(from, to) { view.zoom = from === null ? null : [from, to]; view.members.forEach((member) => member.rescale()); onChange(); } };
+  return view;
+}
 
 // A chart below `host`; it is drawn by draw(spec) with {title, unit, x: {label, range}, y: {range}, lines: [{label, kind, x, y}],
 // bands: [{from, to, kind, label}], marks: [{x, y, kind, label}], events: [{x, kind, label}]}; null in a line is a gap.
@@ -56,13 +59,11 @@ function chart(host, { view = shared(), onPick = null } = {}) {
   const area = figure.appendChild(element("div", { class: "area" }));
   let spec = null, plot = null, key = "", at = null, pointer = null;
   const range = () => view.zoom ?? spec.x.range;
-  const refresh = () => view.members.forEach((member) => member.rescale());
 
   function zoomTo(from, to) {
     const [low, high] = spec.x.range, wide = Math.min(Math.max(to - from, (high - low) / 1e4), high - low);
     const start = Math.min(Math.max(from, low), high - wide);
-    view.zoom = wide >= 0.999 * (high - low) ? null : [start, start + wide];
-    refresh();
+    view.show(wide >= 0.999 * (high - low) ? null : start, start + wide);
   }
   function scale(factor, around) {
     const [from, to] = range();
@@ -151,7 +152,7 @@ function chart(host, { view = shared(), onPick = null } = {}) {
       })],
       legend: { markers: { width: 3, dash: (u, i) => (LOOKS[spec.lines[i - 1]?.kind]?.dash ? "dashed" : "solid") } },
       cursor: { sync: { key: spec.x.label, scales: ["x", null] }, drag: { x: true, y: false, setScale: false }, points: { size: 6 },
-                bind: { dblclick: () => () => { view.zoom = null; refresh(); },
+                bind: { dblclick: () => () => view.show(null),
                         mousedown: (u, _, handler) => (event) => (event.shiftKey ? drag(event) : handler(event)) } },
       hooks: { drawClear: [under], draw: [over], setSelect: [select] },
     }, table(), area);
@@ -183,7 +184,7 @@ function chart(host, { view = shared(), onPick = null } = {}) {
   function press(event) {
     const [from, to] = range(), middle = at !== null && at >= from && at <= to ? at : (from + to) / 2;
     const action = { ArrowLeft: () => pan(-0.1), ArrowRight: () => pan(0.1), "+": () => scale(1 / ZOOM_STEP, middle), "=": () => scale(1 / ZOOM_STEP, middle),
-                     "-": () => scale(ZOOM_STEP, middle), 0: () => { view.zoom = null; refresh(); } }[event.key];
+                     "-": () => scale(ZOOM_STEP, middle), 0: () => view.show(null) }[event.key];
     if (!action) return;
     event.preventDefault();
     action();

@@ -1,64 +1,100 @@
 // Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
 "use strict";
-// The report: a column of charts for every run, and one slider that moves the present through all of them.
+// The report: a column of charts for every run, and one present that slider, charts, rows of brakings and the address move.
 
 const { runs, target_kmh: target, fixed_mu: fixedMu } = JSON.parse(document.getElementById("data").textContent);
 const slider = document.getElementById("slider"), shownTime = document.getElementById("time");
-const all = (pick) => runs.flatMap(pick);
-const longest = Math.max(...all((run) => run.moments.at(-1).t), ...all((run) => run.charts.flatMap((spec) => spec.lines.map((line) => line.x.at(-1)))));
+const LIMITS = { permitted: "permitted", warning: "warning", sbi: "service brake", ebi: "emergency brake" };
+const all = (pick) => runs.flatMap(pick), highest = (values) => values.reduce((high, value) => Math.max(high, value), 1);
+const longest = highest([...all((run) => run.moments.at(-1).t), ...all((run) => run.charts.flatMap((spec) => spec.lines.map((line) => line.x.at(-1))))]);
 
 // Equal axes in all columns: runs side by side are to be compared by eye.
 const common = (i) => ({ range: [Math.min(...all((run) => run.charts[i].range[0])), Math.max(...all((run) => run.charts[i].range[1]))] });
 const time = { label: "time, s", range: [0, longest] };
-// A bound near 0 needs any distance: as far as the fixed worst case tells all there is to compare.
-const way = { label: "position from the start, m", range: [0, 1.08 * Math.max(1, ...all((run) => run.path.x), ...all((run) => run.moments.map((m) => m.fixed.x.at(-1))))] };
-
-function curveChart(run, moment) {
-  const lines = [{ label: `by the fixed ${fixedMu}`, kind: "fixed", ...moment.fixed }, { label: "what the train did", kind: "truth", ...run.path }];
-  if (moment.safe) lines.push({ label: "safe: by the lower bound", kind: "bound", ...moment.safe });
-  if (moment.nominal) lines.push({ label: "by the identified μ̂", kind: "nominal", ...moment.nominal });
-  return { title: "Braking curve at this time, km/h", x: way, y: common(1), lines,
-           marks: [{ x: moment.fixed.x[0], y: moment.fixed.y[0], kind: "run", label: "" }] };
-}
-
 const number = (value, digits, unit = "") => (value === null ? "–" : value.toFixed(digits) + unit);
 
-function readout(moment) {
-  return `${number(moment.speed, 1)} km/h, μ̂ ${number(moment.mu, 4)}, at least ${number(moment.mu_lower, 4)}, ${moment.regime}; ` +
-    `to ${target} km/h ${number(moment.distance, 0)} m, saved ${number(moment.saved, 0)} m, at least ${number(moment.saved_at_least, 0)} m`;
+// The newest moment at a time; the first one before it.
+function momentAt(run, t) {
+  let low = 0, high = run.moments.length;
+  while (high - low > 1) {
+    const middle = (low + high) >> 1;
+    if (run.moments[middle].t <= t) low = middle; else high = middle;
+  }
+  return run.moments[low];
 }
 
-// The newest moment at a time; the first one before it.
-const momentAt = (run, t) => run.moments.findLast((moment) => moment.t <= t) ?? run.moments[0];
+// The fixed worst case from a speed on: a part of its one curve from the highest.
+function fixedFrom(run, { place, speed }) {
+  const { x, y } = run.fixed, first = Math.max(y.findIndex((each) => each < speed), 1), from = (speed - y[first]) / (y[first - 1] - y[first] || 1);
+  const start = x[first] - from * (x[first] - x[first - 1]);
+  return { x: [place, ...x.slice(first).map((each) => each - start + place)], y: [speed, ...y.slice(first)] };
+}
 
-const view = shared();
+// Where the braking of a time, or the way after it, is: as far as the fixed worst case tells all there is to compare.
+function extentAt(run, t) {
+  const [from] = run.brakings.findLast(([start]) => start <= t) ?? run.brakings[0] ?? [0], first = momentAt(run, Math.max(from, t < from ? t : from));
+  return [first.place, fixedFrom(run, first).x.at(-1)];
+}
+
+function curveChart(run, moment, wide) {
+  const lines = Object.entries(moment.limits === null ? {} : LIMITS).map(([kind, label]) => ({ label, kind, x: moment.limits.x, y: moment.limits[kind] }));
+  lines.push({ label: `by the fixed ${fixedMu}`, kind: "fixed", ...fixedFrom(run, moment) }, { label: "what the train did", kind: "truth", ...run.path });
+  if (moment.safe) lines.push({ label: "safe: by the lower bound", kind: "bound", ...moment.safe });
+  if (moment.nominal) lines.push({ label: "by μ̂", kind: "nominal", ...moment.nominal });
+  const from = extentAt(run, moment.t)[0] - 0.05 * wide;
+  return { title: "Braking curves and limits at this time, km/h", x: { label: "position from the start, m", range: [from, from + 1.15 * wide] }, y: common(1), lines,
+           marks: [{ x: moment.place, y: moment.speed, kind: "run", label: "" }] };
+}
+
+function told({ regime, mu }) {
+  if (mu === null) return "nothing is known of μ";
+  return { adhesion_limited: `identified μ̂ ${mu.toFixed(4)}`, brake_limited: `μ ≥ ${mu.toFixed(4)}` }[regime] ?? `not identified; prior ${mu.toFixed(4)}`;
+}
+
+function readout(moment) {
+  const claim = moment.regime === "coasting" ? "" : `, saved at least ${number(moment.saved_at_least, 0)} m`;
+  return `${number(moment.speed, 1)} km/h, ${told(moment)}, at least ${number(moment.mu_lower, 4)}, ${moment.words}; ` +
+    `to ${target} km/h by μ̂ ${number(moment.distance, 0)} m, by the bound ${number(moment.longest, 0)} m${claim}`;
+}
+
+const view = shared(() => { [slider.min, slider.max] = view.zoom ?? [0, longest]; }), sections = document.getElementById("runs");
 const columns = runs.map((run) => {
-  const host = document.getElementById("runs").appendChild(element("section", { class: "run" }));
+  const host = sections.appendChild(element("section", { class: "run", "aria-label": run.name }));
   host.append(element("h2", {}, run.name), element("p", { class: "soft" }, run.source));
-  const text = host.appendChild(element("p", { class: "readout" })), grid = host.appendChild(element("div", { class: "columns" }));
+  const text = document.getElementById("readouts").appendChild(element("p", { class: "readout" })), grid = host.appendChild(element("div", { class: "columns" }));
   const curve = chart(grid), charts = run.charts.map((spec, i) => {
     const made = chart(grid, { view, onPick: show });
-    made.draw({ ...spec, x: time, y: common(i), bands: run.bands });
+    made.draw({ ...spec, x: time, y: common(i), bands: run.bands, events: i ? [] : run.events });
     return made;
   });
-  return (t) => {
+  return (t, wide) => {
     const moment = momentAt(run, t);
-    text.textContent = readout(moment);
-    charts.forEach((made) => made.cursor(Math.min(t, longest)));
-    curve.draw(curveChart(run, moment));
+    text.textContent = (runs.length > 1 ? `${run.name}: ` : "") + readout(moment);
+    charts.forEach((made) => made.cursor(t));
+    curve.draw(curveChart(run, moment, wide));
   };
 });
 
 function show(t) {
-  const shown = Math.min(Math.max(t, 0), longest);
+  const shown = Math.min(Math.max(t, 0), longest), wide = highest(runs.map((run) => extentAt(run, shown)).map(([from, to]) => to - from));
   slider.value = String(shown);
-  shownTime.textContent = `${shown.toFixed(0)} s`;
-  columns.forEach((update) => update(shown));
+  shownTime.textContent = `${shown.toFixed(1)} s`;
+  columns.forEach((update) => update(shown, wide));
+  history.replaceState(null, "", `#t=${Number(shown.toFixed(1))}`);
 }
 
-slider.max = String(Math.ceil(longest));
+const asked = () => /t=([\d.]+)/.exec(location.hash)?.[1];
+slider.max = String(longest);
 slider.addEventListener("input", () => show(Number(slider.value)));
+addEventListener("hashchange", () => asked() && show(Number(asked())));
+for (const button of document.querySelectorAll("button[data-from]")) {
+  button.addEventListener("click", () => {
+    const [from, to] = [Number(button.dataset.from), Number(button.dataset.to)];
+    view.show(Math.max(from - 5, 0), Math.min(to + 5, longest));
+    show(from);
+    document.getElementById("run").scrollIntoView();
+  });
+}
 // The report opens where adhesion is first identified; #t=42 in the address opens another time.
-const asked = /t=([\d.]+)/.exec(location.hash);
-show(asked ? Number(asked[1]) : Math.min(...runs.map((run) => run.opens_at)));
+show(asked() ? Number(asked()) : Math.min(...runs.map((run) => run.opens_at)));

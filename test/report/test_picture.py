@@ -117,7 +117,8 @@ def test_a_picture_is_drawn_of_what_there_is(left_out: tuple[Topic, ...], tmp_pa
     path = tmp_path / "run.png"
     picture.draw(read(record(tmp_path / "bag", *left_out)), path, "a run", 100.0)
     assert png_size(path) == (1210, 1320)
-    assert pixels_of(path, picture.ORANGE) > 1000, "the identified curves are missing"
+    told = DIAGNOSTICS not in left_out  # without regimes nothing is known to be identified
+    assert pixels_of(path, picture.ORANGE) > (1000 if told else 500), "the curves by mu are missing"
     assert pixels_of(path, picture.BLUE) > 300, "the lower bounds are missing"
     shaded = pixels_of(path, picture.SHADES["ADHESION_LIMITED"])
     assert (shaded > 50_000) is (DIAGNOSTICS not in left_out)

@@ -21,8 +21,7 @@ from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core import Config
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
-from adhesion_node.report.findings import distances, findings, first_identified
-from adhesion_node.report.page import changes
+from adhesion_node.report.findings import distances, findings, first_identified, text_changes
 from adhesion_node.report.run import Band, bands
 from adhesion_node.report.series import Series
 from adhesion_node.wire.topics import DIAGNOSTICS, TRUTH_MU
@@ -77,10 +76,12 @@ def test_a_recording_with_results_is_shown_as_recorded(tmp_path: Path) -> None:
     assert (run["name"], run["source"], result["runs"][0]["source"]) == ("mine", "as recorded", "as recorded")
     adhesion, speed, forces = (lines(run, title) for title in ("Adhesion", "Speed", "Forces"))
     assert adhesion["identified"]["x"] == list(range(20))
-    assert [set(adhesion[name]["y"]) for name in ("identified", "lower bound", "true")] == [{0.09}, {0.08}, {0.1}]
+    assert adhesion["identified"]["y"] == [None] * 5 + [0.09] * 15
+    assert adhesion["prior, not identified"]["y"] == [0.09] * 5 + [None] * 15
+    assert [set(adhesion[name]["y"]) for name in ("lower bound", "true")] == [{0.08}, {0.1}]
     assert speed["estimated"]["y"] == pytest.approx([3.6 * (80.0 - 2.0 * second) for second in range(20)], abs=0.006)
     assert forces["brake B"]["y"] == pytest.approx([500.2] * 20, abs=0.05)  # 0.9332 m/s^2 x 536 t
-    assert forces["adhesion F, identified"]["y"] == pytest.approx([0.09 * 536 * 9.8] * 20, abs=0.05)
+    assert forces["adhesion F, identified"]["y"][5:] == pytest.approx([0.09 * 536 * 9.8] * 15, abs=0.05)
     assert len(run["moments"]) == 20
     for name in ("mine.png", "mine.pdf"):
         assert (tmp_path / "report" / name).stat().st_size > 10_000
@@ -96,13 +97,15 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     assert run["source"] == "estimated from the recorded sensors"
     assert replayed["digest"] in page.texts
     adhesion = lines(run, "Adhesion")
-    assert adhesion["identified"]["y"][-1] == pytest.approx(replayed["mu_final"], abs=1e-5)
+    kinds = {"ADHESION_LIMITED": "identified", "BRAKE_LIMITED": "at least, the brake limits"}
+    said = adhesion[kinds.get(replayed["regime_final"], "prior, not identified")]
+    assert said["y"][-1] == pytest.approx(replayed["mu_final"], abs=1e-5)
     (bound,) = (line["y"][-1] for label, line in adhesion.items() if label.startswith("lower bound, "))
     assert bound == pytest.approx(replayed["mu_lower_final"], abs=1e-5)
     assert run["bands"][-1]["kind"] == replayed["regime_final"].lower()
     assert "iterations = 3" in page.texts
     last = run["moments"][-1]
-    assert last["safe"]["x"][0] == last["nominal"]["x"][0] == pytest.approx(last["fixed"]["x"][0], abs=0.1)
+    assert last["safe"]["x"][0] == last["nominal"]["x"][0] == pytest.approx(last["place"], abs=0.1)
     assert last["safe"]["y"][-1] == 0.0
 
 
@@ -203,7 +206,7 @@ def test_a_regime_holds_since_the_estimate_before(tmp_path: Path) -> None:
 
 def test_changes_of_a_text() -> None:
     series = Series(np.arange(6), np.array(["", "A", "A", "B", "", "B"]))
-    assert changes(series) == [(1, "A"), (3, "B"), (5, "B")]
+    assert text_changes(series) == [(1, "A"), (3, "B"), (5, "B")]
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from test_picture import TRUTH, record
+from test_report_brakings import journey
 
 from adhesion_node.report.__main__ import main
 
@@ -42,13 +44,15 @@ def test_the_slider_moves_the_present_of_all_runs(report: str) -> None:
     with browser.open_page() as (page, troubles):
         page.goto(f"{report}#t=12")
         for readout in page.locator(".readout").all():
-            assert readout.inner_text().startswith("201.6 km/h")  # 80 - 2 * 12 m/s
+            assert (
+                ": 201.6 km/h, identified μ̂ 0.0900, at least 0.0800, the adhesion limits;" in readout.inner_text()
+            )  # 80 - 2 * 12 m/s
         present = page.locator(".present").nth(1)
         before = present.get_attribute("style")
         page.locator("#slider").fill("5")
         assert page.locator("#time").inner_text().startswith("5")
         for readout in page.locator(".readout").all():
-            assert readout.inner_text().startswith("252.0 km/h")
+            assert ": 252.0 km/h, " in readout.inner_text()
         assert present.get_attribute("style") != before
         assert troubles == []
 
@@ -62,3 +66,135 @@ def test_the_report_needs_nothing_but_itself(report: str) -> None:
         assert page.locator("details table tr").count() > 30
         assert troubles == []
     assert asked == [report]
+
+
+@pytest.fixture
+def hour(tmp_path: Path) -> str:
+    """Return the address of a report of seven brakings in an hour; in the second one the rail gets worse."""
+    bag = str(journey(tmp_path / "hour", 7))
+    assert main([bag, "--output", str(tmp_path / "report"), "--target", "60"]) == 0
+    return (tmp_path / "report" / "report.html").as_uri()
+
+
+def shown_range(page: Any, chart: int) -> list[float]:
+    found: list[float] = page.evaluate(
+        "(i) => { const s = [...drawn][i].plot.scales.x; return [s.min, s.max]; }", chart
+    )
+    return found
+
+
+def test_the_headline_is_of_all_brakings_and_each_has_a_row(hour: str) -> None:
+    """Before: one moment, "saved at least 39 m (95 %)", while the bound was above the truth and the brake came."""
+    with browser.open_page() as (page, troubles):
+        page.goto(hour)
+        findings, brakings = page.locator("table").nth(0), page.locator("table").nth(1)
+        told = dict(row.split("\t") for row in findings.locator("tr").all_inner_texts()[1:])
+        assert told["Brakings"] == "7"
+        assert told["Recorded"] == "2023-11-14 22:13:20 UTC"
+        assert told["Lower bound of μ kept"].startswith("99.5 % of 210 estimates under the brake")
+        assert told["Changes of the rail found"] == "1: at 620.0 s"
+        assert told["Interventions of the ATP monitor"] == "1: emergency brake at 620.0 s"
+        assert not any("saved" in name.lower() for name in told)
+        assert brakings.locator("tbody tr").count() == 7
+        second = brakings.locator("tbody tr").nth(1).locator("td").all_inner_texts()
+        assert second[1:3] == ["288 → 79", "adhesion 80%, the brake 7%"]
+        assert second[7] == "1: at 620.0 s"
+        saved = [int(row.split()[0]) for row in brakings.locator("td:last-child").all_inner_texts()[:2]]
+        assert saved[1] < saved[0] - 100, "a promise that the change of the rail has taken back"
+        assert troubles == []
+
+
+def test_a_row_shows_its_braking_in_all_charts(hour: str) -> None:
+    with browser.open_page() as (page, troubles):
+        page.goto(hour)
+        assert shown_range(page, 1) == pytest.approx([0.0, 3629.0], abs=5.0)
+        page.get_by_role("button", name="1200.0 s").click()
+        assert shown_range(page, 1) == shown_range(page, 2) == pytest.approx([1195.0, 1234.0], abs=0.1)
+        assert page.url.endswith("#t=1200")
+        assert "288.0 km/h, not identified; prior 0.0900" in page.locator(".readout").inner_text()
+        low, high = shown_range(page, 0)
+        assert high - low < 10_000.0, "a curve of some km on the axis of the whole way"
+        assert page.locator("#slider").get_attribute("min") == "1195"
+        page.locator(".u-over").nth(1).dblclick()
+        assert shown_range(page, 1) == pytest.approx([0.0, 3629.0], abs=5.0)
+        assert troubles == []
+
+
+def test_values_under_the_pointer_zoom_and_keyboard(hour: str) -> None:
+    with browser.open_page() as (page, troubles):
+        page.goto(f"{hour}#t=610")
+        page.get_by_role("button", name="600.0 s", exact=True).click()
+        over = page.locator(".u-over").nth(1)
+        over.scroll_into_view_if_needed()
+        box = over.bounding_box()
+        page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
+        rows = page.locator("figure.chart").nth(1).locator(".u-series").all_inner_texts()
+        assert [text for text in rows if text.startswith("identified")] == ["identified0.09"]
+        assert any(
+            text.startswith("estimated") and "–" not in text for text in page.locator(".u-series").all_inner_texts()
+        )
+        low, high = shown_range(page, 1)
+        page.mouse.wheel(0, -300)
+        page.wait_for_function(
+            "(was) => { const s = [...drawn][1].plot.scales.x; return s.max - s.min < was }", arg=high - low
+        )
+        page.locator(".u-wrap").nth(1).focus()
+        before = shown_range(page, 1)
+        page.keyboard.press("ArrowRight")
+        page.wait_for_function("(was) => [...drawn][1].plot.scales.x.min > was", arg=before[0])
+        page.keyboard.press("0")
+        page.wait_for_function("[...drawn][1].plot.scales.x.min === 0")
+        page.mouse.move(box["x"] + 100, box["y"] + 50)
+        page.mouse.down()
+        page.mouse.move(box["x"] + 300, box["y"] + 50)
+        page.mouse.up()
+        page.wait_for_function("(was) => [...drawn][1].plot.scales.x.min > was", arg=100.0)
+        assert troubles == []
+
+
+def test_the_slider_stays_in_sight_and_the_address_is_the_moment(hour: str) -> None:
+    with browser.open_page() as (page, _):
+        page.goto(hour)
+        page.locator("figure.chart").nth(5).scroll_into_view_if_needed()
+        assert page.locator("#slider").bounding_box()["y"] < 100.0
+        page.locator("#slider").fill("605.5")
+        assert page.url.endswith("#t=605.5")
+        page.evaluate("location.hash = '#t=1210'")
+        page.wait_for_function("document.getElementById('time').textContent === '1210.0 s'")
+
+
+def test_gaps_are_gaps(hour: str) -> None:
+    with browser.open_page() as (page, _):
+        page.goto(hour)
+        between = page.evaluate(
+            "(() => { const u = [...drawn][2].plot, k = u.series.findIndex((s) => s.label === 'estimated');"
+            " return u.data[0].map((x, i) => [x, u.data[k][i]]).filter(([x, y]) => y === null).length; })()"
+        )
+        assert between == 6
+
+
+@pytest.mark.parametrize("context", [{}, {"color_scheme": "dark"}, {"viewport": {"width": 360, "height": 740}}])
+def test_the_report_can_be_used_by_everybody(hour: str, context: dict[str, Any]) -> None:
+    with browser.open_page(**context) as (page, troubles):
+        page.goto(hour)
+        browser.assert_accessible(page)
+        assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "columns are cut off"
+        assert troubles == []
+
+
+def test_paper_has_both_runs_one_below_the_other_in_readable_letters(report: str) -> None:
+    """Before: the second run was cut off, and the letters of the axes were 3 to 5 points high."""
+    with browser.open_page() as (page, troubles):
+        page.goto(f"{report}#t=12")
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        page.emulate_media(media="print")
+        boxes = [run.bounding_box() for run in page.locator("section.run").all()]
+        assert boxes[1]["y"] >= boxes[0]["y"] + boxes[0]["height"]
+        for canvas in page.locator("figure.chart canvas").all():
+            box = canvas.bounding_box()
+            assert box["x"] + box["width"] <= 690.0
+            assert box["width"] > 300.0
+        assert page.locator("#time").inner_text() == "12.0 s"
+        assert page.locator("h1").inner_text() == "with, without"
+        page.evaluate("dispatchEvent(new Event('afterprint'))")
+        assert troubles == []

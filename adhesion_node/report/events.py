@@ -1,0 +1,23 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What happened in a run, in its order: regimes, changes of the rail, levels of the ATP monitor, what was not well."""
+
+from .brakings import rises
+from .findings import BRAKES, text_changes
+from .run import IN_WORDS, Run
+
+Event = tuple[int, str, str]
+"""Time, ns; kind, as the live page has them; what is said."""
+
+
+def events(run: Run) -> list[Event]:
+    """Return the events from the first estimate on."""
+    start_ns, end_ns = int(run.speed.t_ns[0]), int(run.speed.t_ns[-1])
+    found: list[Event] = [(t_ns, "regime", IN_WORDS.get(name, name)) for t_ns, name in text_changes(run.regime)]
+    found += [(t_ns, "change", "the rail has changed") for t_ns in rises(run.changes, start_ns, end_ns)]
+    found += [
+        (t_ns, "intervention" if level in BRAKES else "level", level.replace("_", " "))
+        for t_ns, level in text_changes(run.levels)
+    ]
+    found += [(t_ns, "fault", said) for t_ns, said in text_changes(run.remarks)]
+    return sorted(event for event in found if event[0] >= start_ns)
