@@ -13,6 +13,7 @@ message: one on the ROS clock, and one on the machine's own for the case that th
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from rclpy.clock import Clock, ClockType
@@ -32,7 +33,8 @@ from adhesion_node.wire.topics import Topic
 
 from .ros import qos, runtime
 from .ros.diagnostics import Diagnostics, Finding, Told
-from .ros.params import SettingsNode, declare
+from .ros.managed import ManagedNode
+from .ros.params import current, declare
 from .ros.types import new
 
 PARAMETERS = ATP_SETTINGS
@@ -45,7 +47,7 @@ EXAMPLES = (
 _SILENCE = "none received yet; is the estimator running, are topic names and QoS right?"
 
 
-class AtpMonitor(SettingsNode):
+class AtpMonitor(ManagedNode):
     """Supervises a target by the braking curve in the manner of ETCS, from NORMAL to EMERGENCY_BRAKE.
 
     Whatever is missing, old or not understood is an EMERGENCY_BRAKE. `heard` counts the messages received by topic,
@@ -53,31 +55,44 @@ class AtpMonitor(SettingsNode):
     """
 
     def __init__(self, **kwargs: Any) -> None:
-        super().__init__("atp_monitor", automatically_declare_parameters_from_overrides=True, **kwargs)
+        super().__init__("atp_monitor", **kwargs)
         values = declare(self, PARAMETERS, change=self._change)
-        watchdogs = make(Watchdogs, values)
-        self._clock_timeout_s = watchdogs.clock_timeout_s
-        self._line = make(Line, values)
-        self._config = make(SupervisionConfig, values)
-        self._state: TrainState | Unavailable = Unavailable(_SILENCE)
-        self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
-        self._course = Course()
-        self._judged = self._apart = False
-        self._refused_target = ""
         self.heard: Counter[Topic] = Counter()
         self.published: Counter[Topic] = Counter()
         self._now_ns = self._stamp_ns = self._seen_ns = 0
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._moved_ns = self._steady.now().nanoseconds
-        self._decision: Decision | None = None
+        told = partial(self.standing, self._told)
+        self._diagnostics = Diagnostics(self, "supervision", make(Telling, values), told, self.published)
+        self.bring_up(values)
+
+    def open(self) -> None:
+        """Subscribe and advertise."""
+        values = current(self, PARAMETERS)
+        watchdogs = make(Watchdogs, values)
+        self._clock_timeout_s = watchdogs.clock_timeout_s
+        self._line = make(Line, values)
+        self._config = make(SupervisionConfig, values)
+        self._refused_target = ""
+        self._forget()
         self._status = qos.advertise(self, topics.ATP_STATUS)
-        self._diagnostics = Diagnostics(self, "supervision", make(Telling, values), self._told, self.published)
         qos.subscribe(self, topics.BRAKING_CURVE, self._on_curve)
         qos.subscribe(self, topics.STATE, self._on_state)
         qos.subscribe(self, topics.ATP_TARGET, self._on_target)
         period_s = 1.0 / watchdogs.check_rate_hz
         self.create_timer(period_s, self._on_watchdog)
         self.create_timer(period_s, self._on_steady_watchdog, clock=self._steady)
+
+    def resume(self) -> None:
+        """Begin with nothing: what was heard before it was deactivated tells of no train of now."""
+        self._forget()
+
+    def _forget(self) -> None:
+        self._state: TrainState | Unavailable = Unavailable(_SILENCE)
+        self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
+        self._course = Course()
+        self._judged = self._apart = False
+        self._moved_ns = self._steady.now().nanoseconds
+        self._decision: Decision | None = None
 
     def _on_curve(self, message: Any) -> None:
         self.heard[topics.BRAKING_CURVE] += 1
@@ -120,8 +135,9 @@ class AtpMonitor(SettingsNode):
         config = make(SupervisionConfig, values)
 
         def put_in_force() -> None:
-            self._config, self._refused_target = config, ""
-            self._judge()
+            if self.configured:
+                self._config, self._refused_target = config, ""
+                self._judge()
 
         return put_in_force
 
@@ -155,6 +171,8 @@ class AtpMonitor(SettingsNode):
         return (steady_ns - self._moved_ns) / NS_PER_S
 
     def _judge(self) -> None:
+        if not self.active:
+            return
         stands_s = self._clock_stands_s()
         now_ns = self.get_clock().now().nanoseconds
         # Two judgements may see the same simulated clock; their stamps still increase.

@@ -36,7 +36,7 @@ class CreepEstimator(EstimatingNode[CreepPipeline]):
 
 def _set_up(values: Mapping[str, Any]) -> SetUp[CreepPipeline]:
     setup = creep_setup_of(values)
-    return SetUp(CreepPipeline(setup.config), setup.line, setup.sensor_timeout_s, setup.telling)
+    return SetUp(CreepPipeline(setup.config), setup.line, setup.sensor_timeout_s)
 
 
 def _findings(pipeline: CreepPipeline) -> list[Finding]:

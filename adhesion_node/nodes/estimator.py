@@ -50,7 +50,7 @@ class Estimator(EstimatingNode[Pipeline]):
 def _set_up(values: Mapping[str, Any]) -> SetUp[Pipeline]:
     setup = setup_of(values)
     warm_up(setup.config)
-    return SetUp(Pipeline(setup.config, setup.seed), setup.line, setup.sensor_timeout_s, setup.telling)
+    return SetUp(Pipeline(setup.config, setup.seed), setup.line, setup.sensor_timeout_s)
 
 
 def _findings(pipeline: Pipeline) -> list[Finding]:

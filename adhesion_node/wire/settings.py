@@ -62,6 +62,10 @@ SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group
 OF_LINE = settings_of(Line)
 FRAME_ID, AMBIENT, DIRECTION = (one for one in OF_LINE if one.name in ("frame", "ambient_pressure_pa", "direction"))
 
+AUTOSTART = Setting(
+    "autostart", True, "Configure and activate at start; if not, a manager of life cycles does", group="start"
+)
+
 _TOLD = "diagnostics"
 _SILENCE = "Silence of the sensor after which /diagnostics says STALE"
 SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
@@ -108,16 +112,18 @@ def _marked(*settings: Setting) -> tuple[Setting, ...]:
 
 
 _OF_TRAIN = settings_of(Train, "train.", "train")
-_OF_TELLING = settings_of(Telling)
+OF_NODES_ALONE = (AUTOSTART, *settings_of(Telling))
+"""What every node has and no offline run asks for."""
+
 SETTINGS = _marked(
-    *(SEED, *OF_LINE, SENSOR_TIMEOUT, *_OF_TELLING),
+    *(SEED, *OF_LINE, SENSOR_TIMEOUT, *OF_NODES_ALONE),
     *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
 )
 """All settings of the estimator."""
 
 CREEP_SETTINGS = _marked(
     SENSOR_TIMEOUT,
-    *_OF_TELLING,
+    *OF_NODES_ALONE,
     *settings_of(Vehicle, group="vehicle"),
     *settings_of(CreepConfig, group="identification"),
 )
@@ -126,7 +132,7 @@ CREEP_SETTINGS = _marked(
 ATP_SETTINGS = (
     *(one._replace(changes=True) for one in settings_of(SupervisionConfig, group="supervision")),
     *settings_of(Watchdogs),
-    *(FRAME_ID, DIRECTION, *_OF_TELLING),
+    *(FRAME_ID, DIRECTION, *OF_NODES_ALONE),
 )
 """All settings of the ATP monitor."""
 
@@ -144,7 +150,6 @@ class Setup(NamedTuple):
     line: Line
     sensor_timeout_s: float
     """Silence of the position after which /diagnostics says STALE; no result depends on it."""
-    telling: Telling = Telling()
     train: str = ""
     """The train in words, for the top of what is reported."""
 
@@ -156,15 +161,16 @@ class CreepSetup(NamedTuple):
     line: Line
     sensor_timeout_s: float
     """Silence of the wheel speeds after which /diagnostics says STALE; no result depends on it."""
-    telling: Telling = Telling()
 
 
 def check_names(values: Mapping[str, Any], settings: Sequence[Setting]) -> None:
-    """Raise ValueError naming the first value that is of no setting."""
+    """Raise ValueError naming the first value that is of no setting, or not one of those that nodes alone use."""
     names = {setting.name for setting in settings}
     for name, value in values.items():
         if name not in names:
             raise ValueError(f"setting {name} = {value!r}: there is none; choose of {', '.join(sorted(names))}")
+    for one in OF_NODES_ALONE:
+        one.check(values.get(one.name, one.default))
 
 
 def setup_of(values: Mapping[str, Any]) -> Setup:
@@ -185,7 +191,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     of_line = make(Line, values, track=line)
     config = make(Config, values, train=train, track=profile.turned() if of_line.sign < 0 else profile)
     words = _in_words(named or (DEFAULT_TRAIN if train == CRH3 else OWN_TRAIN), train)
-    return Setup(config, int(seed), of_line, float(timeout_s), make(Telling, values), words)
+    return Setup(config, int(seed), of_line, float(timeout_s), words)
 
 
 def preset(settings: Sequence[Setting], given: Mapping[str, Any]) -> tuple[Setting, ...]:
@@ -223,7 +229,7 @@ def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:
     check_names(values, CREEP_SETTINGS)
     timeout_s = SENSOR_TIMEOUT.check(values.get(SENSOR_TIMEOUT.name, SENSOR_TIMEOUT.default))
     config = make(CreepConfig, values, vehicle=make(Vehicle, values))
-    return CreepSetup(config, make(Line, values), float(timeout_s), make(Telling, values))
+    return CreepSetup(config, make(Line, values), float(timeout_s))
 
 
 def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:

@@ -141,6 +141,8 @@ def test_the_estimator_really_reads_the_file(tmp_path: Path, context: Context) -
     assert not set(changed.items()) & set(sections()["estimator"].items())
     node = start("estimator", tmp_path / "changed.yaml", context)
     assert isinstance(node, estimator.Estimator)
+    assert not node.configured, "autostart is changed, too"
+    node.trigger_configure()
     assert {name: node.get_parameter(name).value for name in changed} == pytest.approx(changed)
     config = node.config
     assert (config.window, config.low_adhesion, config.train.pads) == (49, "wet", 95)

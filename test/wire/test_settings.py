@@ -13,15 +13,18 @@ import pytest
 from adhesion_node.core import Config
 from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
-from adhesion_node.core.setting import Setting, settings_of
+from adhesion_node.core.setting import Setting
 from adhesion_node.wire.codecs import Line
-from adhesion_node.wire.settings import OF_LINE, SETTINGS, Setup, Telling, parse_setting, setup_of
+from adhesion_node.wire.settings import OF_LINE, OF_NODES_ALONE, SETTINGS, Setup, parse_setting, setup_of
 
 OF_FILES = ("track", "train_file")
 """Settings, or beginnings of their names, that are no field of the configuration."""
 
 FREE_TEXTS = {"train_file", "track", "frame", "track_line", "hardware_id", "child_frame"}
 """The settings that are neither a number nor one of a few words."""
+
+USED = [setting for setting in SETTINGS if setting not in OF_NODES_ALONE and not setting.name.startswith(OF_FILES)]
+"""By an offline run, too."""
 
 NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]
 
@@ -49,8 +52,6 @@ def in_use(setup: Setup, name: str) -> Any:
         return getattr(setup, name)
     if name in {one.name for one in OF_LINE}:
         return getattr(setup.line, name)
-    if name in {one.name for one in settings_of(Telling)}:
-        return getattr(setup.telling, name)
     group, _, field = name.rpartition(".")
     return getattr(setup.config.train if group else setup.config, field)
 
@@ -78,13 +79,13 @@ def test_nothing_named_is_the_nominal_set_up() -> None:
     assert setup_of({setting.name: setting.default for setting in SETTINGS}) == setup
 
 
-@pytest.mark.parametrize("setting", [s for s in SETTINGS if not s.name.startswith(OF_FILES)], ids=named)
+@pytest.mark.parametrize("setting", USED, ids=named)
 def test_every_setting_is_used(setting: Setting) -> None:
     value = another(setting)
     assert value != setting.default
     changed = setup_of({setting.name: value})
     assert in_use(changed, setting.name) == value
-    others = [other.name for other in SETTINGS if other != setting and not other.name.startswith(OF_FILES)]
+    others = [other.name for other in USED if other != setting]
     assert [in_use(changed, name) for name in others] == [in_use(setup_of({}), name) for name in others]
 
 

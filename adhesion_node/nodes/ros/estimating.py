@@ -7,13 +7,14 @@ Stamps drive the work. The one timer watches for silence: it ends waits and spea
 
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from std_srvs.srv import SetBool, Trigger
 
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
-from adhesion_node.core.setting import Setting
+from adhesion_node.core.setting import Setting, make
 from adhesion_node.run.engine import EstimatorPipeline
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
@@ -25,7 +26,8 @@ from adhesion_node.wire.topics import Topic
 from . import qos
 from .diagnostics import Diagnostics, Finding, Told
 from .intake import Intake
-from .params import SettingsNode, declare
+from .managed import ManagedNode
+from .params import current, declare
 from .types import new
 
 P = TypeVar("P", bound=EstimatorPipeline[Any, Any, Any])
@@ -40,7 +42,6 @@ class SetUp(NamedTuple, Generic[P]):
     pipeline: P
     line: Line
     sensor_timeout_s: float
-    telling: Telling
 
 
 class Kind(NamedTuple, Generic[P]):
@@ -59,25 +60,34 @@ class Kind(NamedTuple, Generic[P]):
     values: Callable[[P], dict[str, str]]
 
 
-class EstimatingNode(SettingsNode, Generic[P]):
+class EstimatingNode(ManagedNode, Generic[P]):
     """`heard` counts the messages received by topic, refused ones included; `published` those sent."""
 
     def __init__(self, kind: Kind[P], **kwargs: Any) -> None:
-        super().__init__(kind.name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        super().__init__(kind.name, **kwargs)
         self._kind = kind
         values = declare(self, kind.parameters, preset, self._change)
-        self.pipeline, line, timeout_s, telling = kind.set_up(values)
+        self.published: Counter[Topic] = Counter()
+        told = partial(self.standing, self._told)
+        self._diagnostics = Diagnostics(self, kind.entry, make(Telling, values), told, self.published)
+        self.bring_up(values)
+
+    def open(self) -> None:
+        """Subscribe and advertise, with nothing known of train and rail."""
+        self.pipeline, line, timeout_s = self._kind.set_up(current(self, self._kind.parameters))
         self._resets: deque[int] = deque(maxlen=OFTEN)
         """When the latest ones were seen."""
         self._seen_resets = 0
-        self.published: Counter[Topic] = Counter()
-        self._reader = Reader(kind.inputs, line)
+        self._reader = Reader(self._kind.inputs, line)
         self._intake = Intake(self, self, self._reader, timeout_s)
         hear = self._intake.tell
-        self._outputs = {topic: qos.advertise(self, topic, tell=hear) for topic in kind.results}
-        self._diagnostics = Diagnostics(self, kind.entry, telling, self._told, self.published, hear)
+        self._outputs = {topic: qos.advertise(self, topic, tell=hear) for topic in self._kind.results}
         self.create_service(Trigger, "~/reset", self._on_reset)
         self.create_service(SetBool, "~/set_enabled", self._on_set_enabled)
+
+    def resume(self) -> None:
+        """Go on where it was deactivated: a time without messages."""
+        self._intake.resume()
 
     @property
     def heard(self) -> Counter[Topic]:
@@ -101,16 +111,19 @@ class EstimatingNode(SettingsNode, Generic[P]):
 
     def _change(self, values: Mapping[str, Any]) -> Callable[[], None]:
         """What is known of train and rail stays; an offline replay gives other numbers from here on."""
-        pipeline, line, timeout_s, _ = self._kind.set_up(values)
+        pipeline, line, timeout_s = self._kind.set_up(values)
 
         def put_in_force() -> None:
-            self.pipeline.adopt(pipeline)
-            self._intake.change(line, timeout_s)
+            if self.configured:
+                self.pipeline.adopt(pipeline)
+                self._intake.change(line, timeout_s)
 
         return put_in_force
 
     def close(self) -> None:
         """Use what still waits and publish what it gives."""
+        if not self.active:
+            return
         self._publish(self.pipeline.finish())
         tally, dropped = self.pipeline.tally, self.pipeline.dropped or "none"
         self.get_logger().info(f"{tally}, dropped {dropped}, digest {self.digest}")
@@ -174,7 +187,7 @@ class EstimatingNode(SettingsNode, Generic[P]):
         return response
 
     def _publish(self, outputs: Sequence[Any]) -> None:
-        for output in outputs:
+        for output in outputs if self.active else ():
             for topic in self._kind.results:
                 message = topic.build(new, output)
                 if message is not None:

@@ -24,7 +24,9 @@ BY_SPEED = "no position: the train is followed by its speed alone, wherever it i
 
 
 class Listener(Protocol):
-    """What a node does with what comes in."""
+    """What a node does with what comes in; while it is not active nothing of that."""
+
+    active: bool
 
     def take(self, sample: Any) -> Iterable[Event]:
         """Use a sample; return what it brought about other than that it was used."""
@@ -56,6 +58,10 @@ class Intake:
         for topic in reader.inputs:
             qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
         node.get_logger().info(f"ready: waiting for {' or '.join(self._watched)}")
+
+    def resume(self) -> None:
+        """Begin to wait anew."""
+        self._silence.wait()
 
     def change(self, line: Line, timeout_s: float) -> None:
         """Read and wait from now on with what has changed."""
@@ -120,12 +126,15 @@ class Intake:
         return f"{name}: nothing received yet, publishers: {publishers}: is the sensor running, its topic remapped?"
 
     def _on_silence(self) -> None:
-        self._listener.settle(self._silence.for_s or 0.0)
-        self._listener.report()
+        if self._listener.active:
+            self._listener.settle(self._silence.for_s or 0.0)
+            self._listener.report()
 
     def _receiver(self, topic: Topic) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             self.heard[topic] += 1
+            if not self._listener.active:
+                return
             if topic in self._reader.anchors and self._reader.source in (None, topic):
                 self._silence.heard()
                 self._events.pop(self._node.resolve_topic_name(topic.name), None)

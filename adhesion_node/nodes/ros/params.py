@@ -113,6 +113,11 @@ def declare(
     return values
 
 
+def current(node: Node, settings: Sequence[Setting]) -> dict[str, Any]:
+    """Return the values that the settings have now."""
+    return {setting.name: node.get_parameter(setting.name).value for setting in settings}
+
+
 def _let_change(node: Node, settings: Sequence[Setting], change: Change) -> None:
     """Check new values together, before any of them is set, and put them in force once all are."""
     by_name = {setting.name: setting for setting in settings}
@@ -121,7 +126,7 @@ def _let_change(node: Node, settings: Sequence[Setting], change: Change) -> None
     def check(changes: Sequence[Parameter]) -> SetParametersResult:
         try:
             new = {one.name: by_name[one.name].check(one.value) for one in changes if one.name in by_name}
-            ready[:] = [change({name: node.get_parameter(name).value for name in by_name} | new)] if new else []
+            ready[:] = [change(current(node, settings) | new)] if new else []
         except (ValueError, OSError) as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)

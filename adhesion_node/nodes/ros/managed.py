@@ -1,0 +1,109 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The life cycle of a node as ROS 2 manages it: configured, activated, deactivated, cleaned up."""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from itertools import chain
+from typing import Any
+
+from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
+from rclpy.lifecycle.node import LifecycleNodeMixin
+
+from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.wire.settings import AUTOSTART
+
+from .diagnostics import Finding, Told
+from .params import SettingsNode
+
+UNCONFIGURED = "unconfigured: nothing is subscribed or published; configure and activate this node"
+INACTIVE = "inactive: nothing is taken in or published; activate this node"
+
+
+class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
+    """Works while it is `active`; /diagnostics, which `told` says in whatever state, is not part of the life cycle.
+
+    What `open` makes, topics, services and timers, is destroyed when the node is cleaned up.
+    """
+
+    def __init__(self, name: str, **kwargs: Any) -> None:
+        SettingsNode.__init__(self, name, automatically_declare_parameters_from_overrides=True, **kwargs)
+        LifecycleNodeMixin.__init__(self)
+        self.configured = self.active = False
+        self._failure: Exception | None = None
+        self._kept = self._entities()
+
+    def bring_up(self, values: Mapping[str, Any]) -> None:
+        """Configure and activate, unless a manager does; raises what `open` does. Call at the end of `__init__`."""
+        self._kept = self._entities()
+        if values[AUTOSTART.name]:
+            self.trigger_configure()
+            if self._failure is not None:
+                raise self._failure
+            self.trigger_activate()
+
+    @abstractmethod
+    def open(self) -> None:
+        """Make what the node works with, from its parameters; what was known before is forgotten."""
+
+    @abstractmethod
+    def resume(self) -> None:
+        """Begin to work."""
+
+    def standing(self, told: Callable[[], Told]) -> Told:
+        """What there is to tell: while the node does not work, that it does not."""
+        if self.active:
+            return told()
+        return [Finding(Severity.WARN, INACTIVE if self.configured else UNCONFIGURED)], {}
+
+    def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Open; where something stands against that the node stays as it was and says what."""
+        del state
+        self._failure = None
+        try:
+            self.open()
+        except Exception as error:  # rclpy would swallow it
+            self._failure = error
+            self.get_logger().error(f"not configured: {error}")
+            self._destroy()
+            return TransitionCallbackReturn.FAILURE
+        self.configured = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Begin to work."""
+        del state
+        self.resume()
+        self.active = True
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Cease to work."""
+        del state
+        self.active = False
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give up what `open` made."""
+        del state
+        self.configured = self.active = False
+        self._destroy()
+        return TransitionCallbackReturn.SUCCESS
+
+    def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
+        """Give up what `open` made, if it was."""
+        return self.on_cleanup(state)
+
+    def _entities(self) -> set[Any]:
+        return set(chain(self.publishers, self.subscriptions, self.services, self.timers))
+
+    def _destroy(self) -> None:
+        made = self._entities() - self._kept
+        for present, destroy in (
+            (list(self.timers), self.destroy_timer),
+            (list(self.subscriptions), self.destroy_subscription),
+            (list(self.services), self.destroy_service),
+            (list(self.publishers), self.destroy_publisher),
+        ):
+            for one in made.intersection(present):
+                destroy(one)
