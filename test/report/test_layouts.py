@@ -20,6 +20,9 @@ from rclpy.context import Context
 from rosbags.interfaces import Nodetype
 
 from adhesion_node.bag import typestore
+from adhesion_node.core.atp.supervision import Reading
+from adhesion_node.layouts import ENTRIES, HARDWARE, NAMES
+from adhesion_node.layouts.__main__ import main
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.wire.topics import BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RECORDED, RESULTS, SPEED
 
@@ -161,6 +164,10 @@ def test_a_foxglove_path_leads_to_a_number_or_a_text(path: str) -> None:
 @pytest.mark.parametrize("path", PLOTJUGGLER_PATHS)
 def test_a_plotjuggler_path_leads_to_a_number(path: str) -> None:
     topic = max((name for name in TYPES if path.startswith(f"{name}/")), key=len, default=path)
+    if TYPES[topic] == DIAGNOSTICS.type:  # PlotJuggler's parser makes /topic/hardware/name/key of it
+        assert path.startswith(f"{topic}/{HARDWARE}/{ENTRIES[0]}/")
+        assert path.rpartition("/")[2] in Reading._fields
+        return
     assert resolve(topic, path.removeprefix(f"{topic}/").split("/")) == "float64"
 
 
@@ -174,6 +181,32 @@ def test_foxglove_shows_every_sensor_and_result() -> None:
     shown = {path.split(".")[0] for path in FOXGLOVE_PATHS}
     nominal = "/adhesion/braking_curve_nominal"  # a plot has one x axis; the safe curve is the one to see
     assert {f"/{topic.name}" for topic in (POSITION, BRAKE_PRESSURE, SPEED, *RESULTS)} - {nominal} <= shown
+
+
+@pytest.mark.parametrize("paths", [FOXGLOVE_PATHS, PLOTJUGGLER_PATHS], ids=["foxglove", "plotjuggler"])
+def test_the_limits_are_shown_over_the_distance_to_the_target(paths: list[str]) -> None:
+    for key in ("distance_to_target_m", "permitted_mps", "warning_mps", "sbi_mps", "ebi_mps"):
+        assert any(path.startswith("/atp/status") and key in path for path in paths), key
+
+
+def test_regimes_and_the_fit_are_shown() -> None:
+    assert any("regime" in path for path in FOXGLOVE_PATHS)
+    assert any("log_likelihood" in path for path in FOXGLOVE_PATHS)
+
+
+def test_a_namespace_stands_in_every_path(tmp_path: Path, context: Context) -> None:
+    assert main(["--namespace", "/line/train1", "--output", str(tmp_path)]) == 0
+    written = {name: (tmp_path / name).read_text(encoding="utf-8") for name in NAMES}
+    paths = list(values(json.loads(written["foxglove.json"])["configById"], ("value", "topicToRender")))
+    root = ElementTree.fromstring(written["plotjuggler.xml"])
+    paths += [value for curve in root.iter("curve") for value in curve.attrib.values() if value.startswith("/")]
+    for path in paths:
+        assert path.startswith(("/line/train1/", "/diagnostics")), path
+    monitor = AtpMonitor(context=context, namespace="/line/train1")._diagnostics
+    config = json.loads(written["foxglove.json"])["configById"]["DiagnosticStatusPanel!atp"]
+    assert (config["selectedHardwareId"], config["selectedName"]) == (monitor.hardware_id, monitor.name)
+    assert f"/line/train1/atp/status/{monitor.hardware_id}/{monitor.name}/ebi_mps" in written["plotjuggler.xml"]
+    assert 'name==\\"line/train1/estimator/adhesion\\"' in written["foxglove.json"]
 
 
 def splits(layout: Any) -> list[dict[str, Any]]:

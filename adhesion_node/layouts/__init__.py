@@ -1,0 +1,32 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Layouts of Foxglove and PlotJuggler for our topics, of any namespace."""
+
+import re
+from importlib.resources import files
+
+from ..wire.topics import TOPICS
+
+NAMES = ("foxglove.json", "plotjuggler.xml")
+
+HARDWARE, ENTRIES = "train", ("atp_monitor/supervision", "estimator/adhesion")
+"""In /diagnostics, without a namespace: the train, and the entries that the layouts show."""
+
+_OURS = "|".join(sorted((re.escape(topic.name) for topic in TOPICS if not topic.name.startswith("/")), reverse=True))
+_TOPIC = re.compile(rf'(?<=")/({_OURS})(?=["./\[])')
+
+
+def layout(name: str, namespace: str = "") -> str:
+    """Return one of `NAMES` for the nodes of a namespace.
+
+    >>> '"/line/train1/adhesion/mu.data"' in layout("foxglove.json", "/line/train1")
+    True
+    """
+    text, inner = files(__package__).joinpath(name).read_text(encoding="utf-8"), namespace.strip("/")
+    if not inner:
+        return text
+    text = _TOPIC.sub(rf"/{inner}/\1", text)
+    text = text.replace(f"/{HARDWARE}/{ENTRIES[0]}/", f"/{inner}/{inner}/{ENTRIES[0]}/")
+    for entry in ENTRIES:
+        text = text.replace(f'"{entry}', f'"{inner}/{entry}')
+    return text.replace(f'"selectedHardwareId": "{HARDWARE}"', f'"selectedHardwareId": "{inner}"')
