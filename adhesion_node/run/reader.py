@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..core import Sample
-from ..wire.codecs import Line, Reason, Rejected
+from ..wire.codecs import NS, Line, Reason, Rejected
+from ..wire.sensing import USE
 from ..wire.topics import FIX, POSITIONS, Topic
 
 
@@ -27,7 +28,14 @@ class Reader:
         """The anchor that counts; None before one was heard."""
 
     def read(self, topic: Topic, message: Any) -> Sample:
-        """Read a message of one of the inputs; raises Rejected."""
+        """Read a message of one of the inputs, at the time of what it measured; raises Rejected."""
+        if topic.name in self.line.unused:
+            self.source = None if self.source is topic else self.source
+            raise Rejected(Reason.SWITCHED_OFF, f"{USE}{topic.name} = false")
+        sample, late_s = self._read(topic, message), self.line.latency_s.get(topic.name)
+        return sample._replace(t_ns=sample.t_ns - round(late_s * NS)) if late_s else sample
+
+    def _read(self, topic: Topic, message: Any) -> Sample:
         if topic not in self.anchors:
             sample: Sample = topic.read(message, self.line)
             return sample

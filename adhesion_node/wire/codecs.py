@@ -8,7 +8,7 @@ a `New`: of rclpy's classes (nodes/ros/types.py), of those of rosbags (bag/types
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -91,6 +91,10 @@ class Line:
     )
     track: "TrackLine | None" = None
     """The track's centre line, on which a `fix` is projected."""
+    unused: frozenset[str] = frozenset()
+    """Names of the topics that are switched off."""
+    latency_s: dict[str, float] = field(default_factory=dict, hash=False)
+    """By how much stamps are late, by the name of the topic; what is not named is not."""
 
     def __post_init__(self) -> None:
         check_settings(self, "")
@@ -151,6 +155,7 @@ class Reason(Enum):
         "exchanged? Raise max_cross_track_m only if the line or the receiver is that poor"
     )
     AMBIGUOUS = "the line comes by twice: nothing is used here; give each way or direction a track_line of its own"
+    SWITCHED_OFF = "set it to true to use this sensor"
     OTHER_SOURCE = "another topic gives the positions: name the one that shall in position_source"
     IMPLAUSIBLE_PRESSURE = (
         f"fluid_pressure is absolute, in Pa, {MIN_ABSOLUTE_PA:g} to {MAX_ABSOLUTE_PA:g}: "

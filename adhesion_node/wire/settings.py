@@ -16,8 +16,9 @@ from ..core.intake.samples import MAX_POSITION_M
 from ..core.physics.track import Grade, Track, parse_track
 from ..core.physics.train import CRH3, Train
 from ..core.setting import Setting, check_settings, make, setting, settings_of
-from . import parameter_file
+from . import parameter_file, sensing
 from .codecs import Line
+from .topics import ADHESION_INPUTS, CREEP_INPUTS
 from .train_file import read_train
 
 if TYPE_CHECKING:
@@ -108,7 +109,7 @@ CHANGING = frozenset(
 
 
 def _marked(*settings: Setting) -> tuple[Setting, ...]:
-    return tuple(one._replace(changes=one.name in CHANGING) for one in settings)
+    return tuple(one._replace(changes=one.changes or one.name in CHANGING) for one in settings)
 
 
 _OF_TRAIN = settings_of(Train, "train.", "train")
@@ -116,13 +117,14 @@ OF_NODES_ALONE = (AUTOSTART, *settings_of(Telling))
 """What every node has and no offline run asks for."""
 
 SETTINGS = _marked(
-    *(SEED, *OF_LINE, SENSOR_TIMEOUT, *OF_NODES_ALONE),
+    *(SEED, *OF_LINE, SENSOR_TIMEOUT, *sensing.settings(ADHESION_INPUTS), *OF_NODES_ALONE),
     *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
 )
 """All settings of the estimator."""
 
 CREEP_SETTINGS = _marked(
     SENSOR_TIMEOUT,
+    *sensing.settings(CREEP_INPUTS),
     *OF_NODES_ALONE,
     *settings_of(Vehicle, group="vehicle"),
     *settings_of(CreepConfig, group="identification"),
@@ -188,7 +190,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     profile, line = parse_track(str(track), train.length_m), _track_line(values)
     if line is not None:
         profile = _with_grades(profile, line.grades(train.length_m))
-    of_line = make(Line, values, track=line)
+    of_line = make(Line, values, track=line, **sensing.of_line(ADHESION_INPUTS, values))
     config = make(Config, values, train=train, track=profile.turned() if of_line.sign < 0 else profile)
     words = _in_words(named or (DEFAULT_TRAIN if train == CRH3 else OWN_TRAIN), train)
     return Setup(config, int(seed), of_line, float(timeout_s), words)
@@ -229,7 +231,7 @@ def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:
     check_names(values, CREEP_SETTINGS)
     timeout_s = SENSOR_TIMEOUT.check(values.get(SENSOR_TIMEOUT.name, SENSOR_TIMEOUT.default))
     config = make(CreepConfig, values, vehicle=make(Vehicle, values))
-    return CreepSetup(config, make(Line, values), float(timeout_s))
+    return CreepSetup(config, make(Line, values, **sensing.of_line(CREEP_INPUTS, values)), float(timeout_s))
 
 
 def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:

@@ -94,6 +94,28 @@ def test_the_air_of_a_mountain_line_may_be_told_on_the_way(line: Line) -> None:
     assert line.estimator._reader.line.ambient_pressure_pa == 54e3
 
 
+def test_a_sensor_is_switched_off_and_on_while_the_train_brakes(line: Line) -> None:
+    def speeds(from_s: int) -> None:
+        for step in range(5):
+            line.send(topics.SPEED, messages.speed(from_s * 10**9 + step * 10**8, 80.0, 0.1))
+
+    speeds(1)
+    assert ask(line, "/estimator", use_speed=False).successful
+    speeds(2)
+    line.estimator.report()
+    line.hear_all()
+    values = line.values()
+    assert (values["dropped.SWITCHED_OFF"], values["switched_off"]) == ("5", "speed")
+    assert "switched" not in line.heard[topics.DIAGNOSTICS][-1].status[0].message, "it is as it was asked for"
+    assert ask(line, "/estimator", **{"use_speed": True, "latency_s.speed": 0.2}).successful
+    speeds(3)
+    line.estimator.report()
+    line.hear_all()
+    assert line.values()["dropped.SWITCHED_OFF"] == "5"
+    assert "switched_off" not in line.values()
+    assert line.estimator.pipeline.state.inbox.now_ns == 3_200_000_000, "0.2 s before its newest stamp"
+
+
 def test_its_own_dump_is_loaded_without_a_complaint(line: Line) -> None:
     """As `ros2 param load` does, parameter by parameter."""
     names = line.estimator.list_parameters([], 0).names

@@ -133,6 +133,34 @@ def test_a_source_that_gives_nothing_usable_does_not_count() -> None:
     assert reader.read(ODOMETRY, ODOMETRY.build(plain, 10, (5.0,), 1.0)) == (10, 5.0, 1.0)
 
 
+def test_a_sensor_that_is_switched_off_makes_room_for_the_next_one() -> None:
+    position, odometry = (topic.build(plain, 10, (5.0,), 1.0) for topic in (POSITION, ODOMETRY))
+    reader = Reader(ADHESION_INPUTS, Line())
+    reader.read(POSITION, position)
+    reader.line = setup_of({"use_position": False}).line
+    with pytest.raises(Rejected, match="use_position = false: set it to true to use this sensor") as refused:
+        reader.read(POSITION, position)
+    assert refused.value.reason == "SWITCHED_OFF"
+    assert reader.read(ODOMETRY, odometry) == (10, 5.0, 1.0)
+    reader.line = Line()
+    reader.read(POSITION, position)
+    assert reader.source is POSITION
+
+
+def test_stamps_that_are_late_are_put_right(way: list[tuple[float, float]]) -> None:
+    """Every position of 0.3 s ago under a stamp of now, the pressures exact: the same numbers."""
+
+    def late() -> Iterator[Recorded]:
+        for name, message, t_ns in messages(way, POSITION):
+            if name == POSITION.name:
+                message.header = POSITION.build(plain, t_ns + 300_000_000, (0.0,), 1.0).header
+            yield name, message, t_ns
+
+    exact = run(messages(way, POSITION))
+    assert run(late(), **{"latency_s.position": 0.3}).digest == exact.digest
+    assert run(late()).digest != exact.digest
+
+
 def test_the_creep_estimator_needs_its_wheels() -> None:
     assert Reader(CREEP_INPUTS, Line()).anchors == CREEP_INPUTS[-1:]
 

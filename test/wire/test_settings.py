@@ -14,6 +14,7 @@ from adhesion_node.core import Config
 from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.setting import Setting
+from adhesion_node.wire import sensing
 from adhesion_node.wire.codecs import Line
 from adhesion_node.wire.settings import OF_LINE, OF_NODES_ALONE, SETTINGS, Setup, parse_setting, setup_of
 
@@ -50,6 +51,10 @@ def in_use(setup: Setup, name: str) -> Any:
     """Return what a set-up makes of a setting."""
     if name in ("seed", "sensor_timeout_s"):
         return getattr(setup, name)
+    if name.startswith(sensing.USE):
+        return name.removeprefix(sensing.USE) not in setup.line.unused
+    if name.startswith(sensing.LATENCY):
+        return setup.line.latency_s.get(name.removeprefix(sensing.LATENCY), 0.0)
     if name in {one.name for one in OF_LINE}:
         return getattr(setup.line, name)
     group, _, field = name.rpartition(".")

@@ -157,7 +157,9 @@ class EstimatingNode(ManagedNode, Generic[P]):
         source = self._reader.source
         chosen = {"position_source": source.name} if source in topics.POSITIONS else {}
         stamp = {"stamp_ns": str(self.latest.t_ns) if self.latest is not None else "none"}
-        return found, stamp | self._kind.values(self.pipeline) | chosen
+        unused = sorted(self._reader.line.unused)
+        off = {"switched_off": ", ".join(unused)} if unused else {}
+        return found, stamp | self._kind.values(self.pipeline) | chosen | off
 
     def _often_reset(self) -> list[Finding]:
         """Say when it starts anew again and again."""

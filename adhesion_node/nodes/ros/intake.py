@@ -23,6 +23,9 @@ from .silence import Silence
 BY_SPEED = "no position: the train is followed by its speed alone, wherever it is on the track"
 
 
+AS_WANTED = (Reason.OTHER_SOURCE.name, Reason.SWITCHED_OFF.name)
+
+
 class Listener(Protocol):
     """What a node does with what comes in; while it is not active nothing of that."""
 
@@ -142,7 +145,7 @@ class Intake:
                 sample = self._sample(topic, message)
             except Rejected as refusal:
                 self._listener.refuse(topic, refusal)
-                if refusal.reason != Reason.OTHER_SOURCE.name:  # nothing is wrong: it is counted
+                if refusal.reason not in AS_WANTED:  # nothing is wrong: it is counted
                     self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
             else:
                 for event in self._listener.take(sample):
