@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The programs. A node first takes the signals over, then its module, with numpy and ROS, is imported.
+"""The programs. Each first takes the signals over, then its module, with numpy and ROS, is imported.
 
 So a Ctrl-C ends a program that is still importing as cleanly as one that spins. A program that needs a package which
 is not installed says how to get it: the nodes of a train run with rclpy, numpy, scipy and numba.
@@ -42,7 +42,12 @@ def _replay() -> int:
 
 def _tool(module: str) -> Program:
     def main() -> int:
-        return _main_of(module)()
+        with stop_on_signals() as stop:
+            program = _main_of(module)
+        if not stop.requested:
+            return program()
+        print(f"{module.removesuffix('.__main__').rpartition('.')[2]}: interrupted", file=sys.stderr)
+        return 1
 
     return _saying_what_is_missing(main)
 

@@ -45,6 +45,25 @@ def json_option() -> argparse.ArgumentParser:
     return parent
 
 
+def version_option(parser: argparse.ArgumentParser) -> None:
+    """Add --version, which ends the program."""
+    parser.add_argument("--version", action=_Version, nargs=0, help="say which version this is, and end")
+
+
+class _Version(argparse.Action):
+    """Looks the version up only when it is asked for."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
+        from importlib.metadata import PackageNotFoundError, version
+
+        try:
+            number = version("adhesion_node")
+        except PackageNotFoundError:
+            number = "of a source tree that is not installed"
+        print(f"{parser.prog}, adhesion_node {number}")
+        parser.exit(DONE)
+
+
 def remap_option(add: Callable[..., Any]) -> None:
     """Add --remap by a parser's `add_argument`."""
     shown = "which recorded topic is which of ours, for instance /odometry/position:=position"
@@ -71,6 +90,7 @@ def run_tool(
     A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback.
     Bad usage ends the program with 2 (SystemExit). Asked by a shell, it says how the command line may go on and ends.
     """
+    version_option(parser)
     complete(parser)
     options = parser.parse_args(args)
     try:

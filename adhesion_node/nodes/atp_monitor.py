@@ -44,6 +44,9 @@ EXAMPLES = (
     "atp_monitor --ros-args -p target_position_m:=8200.0 -p target_speed_kmh:=0.0 -p use_sim_time:=true",
 )
 
+GRACE_S = 10.0
+"""So long after the start silence is logged as waiting; the level is EMERGENCY_BRAKE from the first judgement on."""
+
 _SILENCE = "none received yet; is the estimator running, are topic names and QoS right?"
 
 
@@ -91,7 +94,9 @@ class AtpMonitor(ManagedNode):
         self._curve: StampedCurve | Unavailable = Unavailable(_SILENCE)
         self._course = Course()
         self._judged = self._apart = False
-        self._moved_ns = self._steady.now().nanoseconds
+        self._moved_ns = self._begun_ns = self._steady.now().nanoseconds
+        self._awaited = True
+        """Whether the first state and curve may still be on their way."""
         self._decision: Decision | None = None
 
     def _on_curve(self, message: Any) -> None:
@@ -185,13 +190,21 @@ class AtpMonitor(ManagedNode):
         else:
             decision = decide(self._along_run(), now_ns, self._state, self._curve, self._level or Level.NORMAL)
         changed = decision.level is not self._level
+        awaited = self._awaited and self._may_be_awaited()
+        overdue = self._awaited and not awaited and decision.severity is Severity.ERROR
+        self._awaited = awaited
         self._decision, self._judged = decision, True
         status = self._diagnostics.status(*self._told())
         self._status.publish(topics.ATP_STATUS.build(new, self._stamp_ns, status))
         self.published[topics.ATP_STATUS] += 1
-        if changed:
-            _log(self, decision)
+        if changed or overdue:
+            _log(self, decision, awaited)
             self._diagnostics.tell()
+
+    def _may_be_awaited(self) -> bool:
+        """Whether state and curve have not both come yet, and it is early days by the machine's own clock."""
+        runs_s = (self._steady.now().nanoseconds - self._begun_ns) / NS_PER_S
+        return runs_s < GRACE_S and Unavailable(_SILENCE) in (self._state, self._curve) and not self._refused_target
 
     def _along_run(self) -> SupervisionConfig:
         return replace(self._config, target_position_m=self._line.sign * self._config.target_position_m)
@@ -220,11 +233,13 @@ def numbers(config: SupervisionConfig, decision: Decision) -> dict[str, str]:
     return {"level": decision.level.name, **known}
 
 
-def _log(node: Node, decision: Decision) -> None:
+def _log(node: Node, decision: Decision, awaited: bool) -> None:
     known = decision.reading
     margin = "" if known is None else f" ({known.margin_m:.0f} m before the emergency brake)"
     text = f"{decision.level.name}: {decision.message}{margin}"
-    if decision.severity is Severity.OK:
+    if awaited:
+        node.get_logger().info(f"waiting for the first estimate; until then {text}")
+    elif decision.severity is Severity.OK:
         node.get_logger().info(text)
     elif decision.severity is Severity.WARN:
         node.get_logger().warning(text)

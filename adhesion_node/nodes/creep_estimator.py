@@ -14,6 +14,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.core.creep.config import Peak
 from adhesion_node.run.creep_pipeline import CreepPipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import CREEP_SETTINGS, creep_setup_of
@@ -57,8 +58,14 @@ def _values(pipeline: CreepPipeline) -> dict[str, str]:
     return {**numbers, **counts, **drops, "digest": pipeline.digest}
 
 
+def _news(pipeline: CreepPipeline) -> tuple[Peak | None, str]:
+    """Whether the peak is known."""
+    last = pipeline.last
+    return (None, "no estimate yet") if last is None else (last.status, f"{last.status.name}: {last.status.value}")
+
+
 KIND = Kind(
-    "creep_estimator", "peak", PARAMETERS, _set_up, topics.CREEP_INPUTS, topics.CREEP_RESULTS, _findings, _values
+    "creep_estimator", "peak", PARAMETERS, _set_up, topics.CREEP_INPUTS, topics.CREEP_RESULTS, _findings, _values, _news
 )
 
 

@@ -15,6 +15,7 @@ from adhesion_node.core import Config, Estimate, Outcome, Regime
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.bank.learnt import learnt
 from adhesion_node.core.estimator import warm_up
+from adhesion_node.core.physics.train import KMH
 from adhesion_node.run.pipeline import BACKWARDS, Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import SETTINGS, setup_of
@@ -104,7 +105,18 @@ def _estimate_values(last: Estimate | None) -> dict[str, str]:
     }
 
 
-KIND = Kind("estimator", "adhesion", PARAMETERS, _set_up, topics.ADHESION_INPUTS, topics.RESULTS, _findings, _values)
+def _news(pipeline: Pipeline) -> tuple[Regime | None, str]:
+    """What limits, and with which adhesion."""
+    last = pipeline.last
+    if last is None:
+        return None, "no estimate yet"
+    mu = "mu withheld" if last.withheld else f"mu {last.mu:.4f}, at least {last.mu_lower:.4f}"
+    return last.regime, f"{last.regime.name} at {abs(last.speed_mps) / KMH:.0f} km/h, {mu}: {last.regime.value}"
+
+
+KIND = Kind(
+    "estimator", "adhesion", PARAMETERS, _set_up, topics.ADHESION_INPUTS, topics.RESULTS, _findings, _values, _news
+)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -8,9 +8,11 @@ recordings.
 """
 
 import math
+import os
+import socket
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
@@ -38,6 +40,12 @@ NEVER_S = 3600.0
 
 NODES = ("recorder", "estimator", "atp_monitor", "simulator", "live")
 """Their errors are shown, the rest of their log is not: who runs the line says himself how far it is."""
+
+QUIET = {"atp_monitor": LoggingSeverity.FATAL}
+"""It brakes until the first estimates are sure enough; its levels are part of the result."""
+
+DOMAINS = range(1, 102)
+"""Domains whose ports are free on every system."""
 
 Pace = Callable[[float, Estimate | None], bool]
 """Called before every sample with its time of the run, s, and the newest estimate; False ends the run."""
@@ -91,12 +99,20 @@ def play(executor: SingleThreadedExecutor, task: Task, bag: Path, pace: Pace) ->
 
 @contextmanager
 def executor_of_line() -> Iterator[SingleThreadedExecutor]:
-    """An executor in a context of its own; its nodes are destroyed at the end."""
-    context = rclpy.Context()
-    rclpy.init(context=context, signal_handler_options=SignalHandlerOptions.NO)
+    """An executor in a context of its own; its nodes are destroyed at the end.
+
+    It is alone on the machine's network, unless ROS_DOMAIN_ID says where it is to be.
+    """
+    with own_domain() as domain:
+        context = rclpy.Context()
+        rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        yield from _executing(context)
+
+
+def _executing(context: rclpy.Context) -> Iterator[SingleThreadedExecutor]:
     executor = SingleThreadedExecutor(context=context)
     for name in NODES:
-        set_logger_level(name, LoggingSeverity.ERROR)
+        set_logger_level(name, QUIET.get(name, LoggingSeverity.ERROR))
     try:
         yield executor
     finally:
@@ -107,6 +123,30 @@ def executor_of_line() -> Iterator[SingleThreadedExecutor]:
         for node in nodes:
             node.destroy_node()
         context.try_shutdown()
+
+
+@contextmanager
+def own_domain() -> Iterator[int | None]:
+    """A domain that no other line on this machine has, and discovery on this machine alone.
+
+    None, which is that of ROS_DOMAIN_ID, where that is set, or where all are taken.
+    """
+    if "ROS_DOMAIN_ID" in os.environ:
+        yield None
+        return
+    os.environ.setdefault("ROS_AUTOMATIC_DISCOVERY_RANGE", "LOCALHOST")
+    with ExitStack() as locks:
+        yield next((domain for domain in DOMAINS if _claimed(domain, locks)), None)
+
+
+def _claimed(domain: int, locks: ExitStack) -> bool:
+    """Whether this process has the domain now; the system frees it with the end of the process at the latest."""
+    claim = locks.enter_context(socket.socket(socket.AF_UNIX))
+    try:
+        claim.bind(f"\0adhesion_node.domain.{domain}")
+    except OSError:
+        return False
+    return True
 
 
 def spin_until(executor: SingleThreadedExecutor, done: Callable[[], bool]) -> None:

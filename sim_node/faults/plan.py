@@ -7,6 +7,7 @@
 The true run keeps its seed: with and without a fault of the sensors the train does the same.
 """
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -140,6 +141,19 @@ def faulty_run(plan: Plan, scenario: Scenario, period_s: float, seed: int, setti
     # `run` has the first three children of the seed.
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(4)[3])
     return fault.stream(ticks, dose, rng)
+
+
+def told(plan: Plan) -> list[tuple[float, str]]:
+    """When the fault begins and, where it does, ends, s of the run, in words; one of the whole run has neither.
+
+    >>> told(Plan(fault="dropout", fault_start_s=4.0))
+    [(4.0, 'dropout begins: no positions'), (9.0, 'dropout ends')]
+    """
+    fault, dose = FAULTS[plan.fault], plan.dose
+    if plan.fault == NONE or fault.stream is _same:
+        return []
+    ends = [(dose.start_s + dose.duration_s, f"{plan.fault} ends")] if math.isfinite(dose.duration_s) else []
+    return [(dose.start_s, f"{plan.fault} begins: {fault.description}"), *ends]
 
 
 def period_of(plan: Plan, period_s: float) -> float:

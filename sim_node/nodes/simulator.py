@@ -18,8 +18,9 @@ from adhesion_node.core.physics.train import KMH
 from adhesion_node.core.setting import make
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.wire import topics
+from adhesion_node.wire.codecs import NS
 
-from ..faults.plan import NONE, Plan, faulty_run, period_of
+from ..faults.plan import NONE, Plan, faulty_run, period_of, told
 from ..real.drive import drive
 from ..real.plant.scenarios import SCENARIOS as REAL
 from ..real.run import ticks
@@ -50,12 +51,15 @@ class Simulator(RunNode):
         """Read the parameters; ValueError when one is out of range. `paced` as in `RunNode.begin`."""
         super().__init__("simulator", PARAMETERS, **kwargs)
         self._real = self.values["scenario"] in REAL
+        self._fault: list[tuple[float, str]] = []
+        """When, s of the run, it begins and ends, in words."""
         run, there, period_s = self._real_run() if self._real else self._run_of_paper()
         self.begin(run, (*topics.TRUTH, *there), period_s, paced=paced)
 
     def _run_of_paper(self) -> tuple[Iterator[Tick], tuple[topics.Topic, ...], float]:
         """The run, its topics and its period."""
         settings, plan = make(SensorSettings, self.values), make(Plan, self.values)
+        self._fault = told(plan)
         period_s = period_of(plan, 1.0 / self.values["rate_hz"])
         happening = scenario.find(self.values["scenario"])
         run = faulty_run(plan, happening, period_s, self.values["seed"], settings)
@@ -78,7 +82,9 @@ class Simulator(RunNode):
         return truth.regime, f"{truth.regime} at {truth.speed_mps / KMH:.0f} km/h, mu {truth.mu:.4f}"
 
     def publish(self, truth: Truth, measured: Sequence[SensorMessage]) -> None:
-        """Publish the truth, and the messages at the stamps that they bear."""
+        """Publish the truth, and the messages at the stamps that they bear; tell of the fault."""
+        while self._fault and truth.t_ns / NS >= self._fault[0][0]:
+            self.log("{:.1f} s: fault {}".format(*self._fault.pop(0)))
         if not (self._real and measured):
             self.send(topics.TRUTH_STATE, self.now_ns, truth.position_m, truth.speed_mps)
             self.send(topics.TRUTH_MU, truth.mu)

@@ -32,6 +32,9 @@ from .types import new
 
 P = TypeVar("P", bound=EstimatorPipeline[Any, Any, Any])
 
+NEWS_NS = 1_000_000_000
+"""Time between two lines of the log about what has changed: a regime may waver."""
+
 OFTEN, OFTEN_NS = 2, 60_000_000_000
 """So many resets within this time, by the node's clock, are a fault."""
 
@@ -58,6 +61,8 @@ class Kind(NamedTuple, Generic[P]):
     findings: Callable[[P], list[Finding]]
     """How the estimation stands, in words, and the numbers behind it."""
     values: Callable[[P], dict[str, str]]
+    news: Callable[[P], tuple[Any, str]]
+    """Of the newest estimate: what is logged when it changes, and the words for it."""
 
 
 class EstimatingNode(ManagedNode, Generic[P]):
@@ -79,6 +84,8 @@ class EstimatingNode(ManagedNode, Generic[P]):
         """When the latest ones were seen."""
         self._seen_resets = 0
         self._reader = Reader(self._kind.inputs, line)
+        self._told_state: Any = None
+        self._told_ns = -NEWS_NS
         self._intake = Intake(self, self, self._reader, timeout_s)
         hear = self._intake.tell
         self._outputs = {topic: qos.advertise(self, topic, tell=hear) for topic in self._kind.results}
@@ -196,3 +203,12 @@ class EstimatingNode(ManagedNode, Generic[P]):
                     self._outputs[topic].publish(placed(message, self._reader.line))
                     self.published[topic] += 1
             self.report()
+        if outputs:
+            self._tell_news(self.pipeline.stamp_ns(outputs[-1]))
+
+    def _tell_news(self, t_ns: int) -> None:
+        """Log what has changed, but no more often than every `NEWS_NS`."""
+        state, text = self._kind.news(self.pipeline)
+        if state != self._told_state and abs(t_ns - self._told_ns) >= NEWS_NS:
+            self._told_state, self._told_ns = state, t_ns
+            self.get_logger().info(f"{t_ns * 1e-9:.1f} s: {text}")

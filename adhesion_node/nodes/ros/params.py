@@ -91,12 +91,13 @@ def declare(
 
     `preset` changes defaults by what the node was given, a train's file for one. All values are checked before the
     first is accepted; a bad one raises ValueError with name, value and what is allowed. Afterwards those that may
-    change do so through `change`; the others are read-only. The effective configuration is logged once. Construct the
+    change do so through `change`; the others are read-only. What is not at its default is logged once. Construct the
     node with `automatically_declare_parameters_from_overrides=True`: then parameters that it was given but does not
     have are logged as well.
     """
     if node.has_parameter(_USE_SIM_TIME.name):
         _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
+    defaults = {one.name: one.default for one in settings}
     given = {one.name: node.get_parameter(one.name).value for one in settings if node.has_parameter(one.name)}
     settings = settings if preset is None else preset(settings, given)
     values = {setting.name: setting.check(_given(node, setting)) for setting in settings}
@@ -109,7 +110,10 @@ def declare(
         _let_change(node, settings, change)
     for message in unknown(node, settings):
         node.get_logger().warning(message)
-    node.get_logger().info("parameters: " + ", ".join(f"{name} = {value}" for name, value in values.items()))
+    told = [f"{name} = {value}" for name, value in values.items() if value != defaults[name]]
+    node.get_logger().info(
+        "parameters: " + ", ".join([*told, "all others at their defaults" if told else "all defaults"])
+    )
     return values
 
 

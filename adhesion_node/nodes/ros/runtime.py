@@ -11,7 +11,7 @@ import inspect
 import os
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import rclpy
 from rclpy.duration import Duration
@@ -23,7 +23,7 @@ from rclpy.utilities import ok, try_shutdown
 
 from adhesion_node.command.signals import StopRequest, stop_on_signals
 
-from ...command.options import BAD_INPUT, DONE, FAILED, complete, help_texts
+from ...command.options import BAD_INPUT, DONE, FAILED, complete, help_texts, version_option
 from ...core.setting import Setting, by_group
 from ...wire.parameter_file import unheeded
 
@@ -57,7 +57,10 @@ def run(
     """
     with stop_on_signals() as stop:
         own, ros = split_ros_arguments(sys.argv[1:] if args is None else args)
-        _parser(make_node, parameters, examples).parse_args(own)
+        parser = _parser(make_node, parameters, examples)
+        for hint in _misplaced(own, parameters):
+            parser.error(hint)
+        parser.parse_args(own)
         try:
             return _start_and_spin(make_node, ros, stop)
         finally:
@@ -80,6 +83,16 @@ def split_ros_arguments(args: Sequence[str]) -> tuple[list[str], list[str]]:
     return own, ros
 
 
+def _misplaced(own: Sequence[str], parameters: Sequence[Setting]) -> Iterator[str]:
+    """Say where a parameter goes that was given as an option."""
+    names = {one.name for one in parameters}
+    for option, following in zip(own, [*own, ""][1:], strict=True):
+        name, _, value = option.removeprefix("--").partition("=")
+        if option.startswith("--") and name.replace("-", "_") in names:
+            given = f"-p {name.replace('-', '_')}:={value or following}"
+            yield f"{option}: a node takes its parameters from ROS: --ros-args {given}"
+
+
 def _parser(
     make_node: Callable[[], Node], parameters: Sequence[Setting], examples: Sequence[str]
 ) -> argparse.ArgumentParser:
@@ -97,6 +110,7 @@ def _parser(
         usage="%(prog)s [--help] [--ros-args -p NAME:=VALUE ... --params-file FILE -r FROM:=TO ...]",
         **help_texts(purpose, *examples, more=listed),
     )
+    version_option(parser)
     if "_ARGCOMPLETE" in os.environ:
         parser.add_argument("--ros-args", action="store_true")
         parser.add_argument("-p", "--param", action="append", choices=[f"{one.name}:=" for one in parameters])

@@ -1,0 +1,86 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""What every program has: a version, an end by Ctrl-C without a traceback, and a hint to where parameters go."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+from test_package import console_scripts
+
+from adhesion_node.tools import line
+
+TOOLS = {"import_csv", "recover", "demo", "report", "study", "bench", "train"}
+
+
+@pytest.mark.parametrize("program", sorted(console_scripts()))
+def test_the_version_is_told(program: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(sys, "argv", [f"/usr/bin/{program}", "--version"])
+    module, function = console_scripts()[program]
+    with pytest.raises(SystemExit) as ended:
+        getattr(importlib.import_module(module), function)()
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.startswith(f"{program}, adhesion_node ")
+
+
+@pytest.mark.parametrize("program", sorted(TOOLS & console_scripts().keys()))
+def test_a_ctrl_c_while_it_still_imports_leaves_one_line(program: str) -> None:
+    """The signal comes at the moment at which the import of the tool begins."""
+    code = (
+        "import os, signal, sys, adhesion_node.main as main\n"
+        "real = main.import_module\n"
+        "def interrupted(name):\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "    return real(name)\n"
+        "main.import_module = interrupted\n"
+        f"sys.argv = [{program!r}]\n"
+        f"sys.exit(main.{program}())"
+    )
+    ended = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, timeout=60.0, cwd=ROOT, check=False
+    )
+    assert (ended.returncode, ended.stdout, ended.stderr) == (1, "", f"{program}: interrupted\n")
+
+
+@pytest.mark.parametrize(
+    ("program", "given", "hint"),
+    [
+        ("simulator", ["--scenario", "leaves"], "--ros-args -p scenario:=leaves"),
+        ("estimator", ["--start-mu=0.1"], "--ros-args -p start_mu:=0.1"),
+        ("atp_monitor", ["--target_speed_kmh", "100"], "--ros-args -p target_speed_kmh:=100"),
+    ],
+)
+def test_a_parameter_given_as_an_option_is_told_where_it_goes(
+    program: str, given: list[str], hint: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", [f"/usr/bin/{program}", *given])
+    module, function = console_scripts()[program]
+    with pytest.raises(SystemExit) as ended:
+        getattr(importlib.import_module(module), function)()
+    assert ended.value.code == 2
+    assert capsys.readouterr().err.rstrip().endswith(f"a node takes its parameters from ROS: {hint}")
+
+
+def test_lines_on_one_machine_have_domains_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert os.environ["ROS_DOMAIN_ID"], "that of the tests"
+    with line.own_domain() as told:
+        assert told is None
+    monkeypatch.delenv("ROS_DOMAIN_ID")
+    monkeypatch.delenv("ROS_AUTOMATIC_DISCOVERY_RANGE")
+    with line.own_domain() as one, line.own_domain() as other:
+        assert one is not None
+        assert other is not None
+        assert one != other
+        assert os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] == "LOCALHOST"
+    with line.own_domain() as again:
+        assert again == one, "free again"
+
+
+def test_signals_are_those_of_python_after_an_import() -> None:
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
