@@ -21,6 +21,7 @@ from ...core.physics.adhesion import WET
 from ...core.physics.motion import Motion
 from ...core.physics.train import KMH
 from ...run.score import CONVERGED_AFTER_MPS
+from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cramer_rao import MEAN_OF_STD, Bound, Path, Start, bound, speed_lost, std_that_stays_within
 
@@ -85,8 +86,8 @@ def nominal(case: Case) -> Nominal:
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    """`study bound` has none of its own."""
-    del parser
+    """Options of `study bound`."""
+    add_figure_options(parser, "the bound over the speed lost")
 
 
 def row(case: Case) -> dict[str, Any]:
@@ -111,6 +112,10 @@ def row(case: Case) -> dict[str, Any]:
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Return the table."""
     table = [row(case) for case in CASES]
+    if (figures := figures_of(options)) is not None:
+        from .figures import draw
+
+        draw({case: nominal(case) for case in CASES if case.speed_std_kmh is None}, figures)
     return table, "\n".join([HEAD, *lines(COLUMNS, table)])
 
 

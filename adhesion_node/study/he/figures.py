@@ -8,7 +8,6 @@ least squares. Figs. 5-11: p1, p2 and the peak, on one surface and over a switch
 """
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +17,7 @@ from ...core.creep.curve import adhesion
 from ...core.physics.train import Array
 from ...report.picture import BLACK, BLUE, GREY, ORANGE
 from ..trial.drawing import draw_lines, picture
+from ..trial.figures import Figures
 from . import runs as he
 
 CREEPS = np.linspace(0.0, 0.3, 301)
@@ -83,13 +83,13 @@ PANELS = (
 )
 
 
-def draw(thetas: Mapping[str, Array], folder: Path) -> None:
-    """Draw figNN.png into `folder`, made when missing; thetas (samples, runs, 2) by experiment."""
-    folder.mkdir(parents=True, exist_ok=True)
-    _draw_models(folder)
+def draw(thetas: Mapping[str, Array], figures: Figures) -> None:
+    """Draw figNN; thetas (samples, runs, 2) by experiment."""
+    _draw_models(figures)
     for panel in PANELS:
-        title = f"Fig. {panel.number}: {panel.quantity}, {panel.title}"
-        with picture(folder / f"fig{panel.number:02d}.png", title) as axis:
+        count = thetas[panel.experiment].shape[1]
+        title = f"Fig. {panel.number}: {panel.quantity}, {panel.title}; N = {count} runs"
+        with picture(figures.path(f"fig{panel.number:02d}"), title) as axis:
             _draw_panel(axis, panel, _values(thetas[panel.experiment], panel.quantity))
 
 
@@ -110,7 +110,7 @@ def _draw_panel(axis: Any, panel: Panel, values: Array) -> None:
         axis.plot(ends, [truth, truth], color=BLACK, ls="--", lw=1.8, label="true" if index == 0 else None)
         if panel.quantity == PEAK:
             band = [truth * (1 - he.BAND), truth * (1 + he.BAND)]
-            axis.hlines(band, *ends, color=BLUE, ls=":", lw=1.2, label="true +- 5 %" if index == 0 else None)
+            axis.hlines(band, *ends, color=BLUE, ls=":", lw=1.2, label="true ± 5 %" if index == 0 else None)
     mark = he.ENOUGH if len(panel.truths) == 1 else edges[1]
     axis.axvline(mark, color=GREY, lw=1.0)
     named = f" creep {he.ENOUGH}" if len(panel.truths) == 1 else " the surface changes"
@@ -128,8 +128,8 @@ def _places(panel: Panel) -> Array:
     return np.arange(1, 2 * samples + 1) / samples
 
 
-def _draw_models(folder: Path) -> None:
-    with picture(folder / "fig01.png", "Fig. 1: adhesion as measured, simulated") as axis:
+def _draw_models(figures: Figures) -> None:
+    with picture(figures.path("fig01"), "Fig. 1: adhesion as measured, simulated") as axis:
         truth = adhesion(CREEPS, he.SLOPE, he.DRY)
         measured = he.measure(CREEPS, he.on_one(CREEPS), 1, 1, in_mu=True).adhesion[:, 0]
         axis.plot(CREEPS, measured, color="0.0", marker="+", ls="", label="measured")
@@ -137,11 +137,11 @@ def _draw_models(folder: Path) -> None:
             axis.plot(CREEPS, truth + sign * 2.0 * he.NOISE_STD, color=BLUE, ls="--", label=label)
         axis.set(xlabel="creep", ylabel="adhesion coefficient")
         axis.legend(loc="lower right")
-    with picture(folder / "fig02.png", "Fig. 2: Burckhardt's model, roads") as axis:
+    with picture(figures.path("fig02"), "Fig. 2: Burckhardt's model, roads") as axis:
         draw_lines(axis, CREEPS, {name: model(CREEPS) for name, model in ROADS.items()})
         axis.set(xlabel="creep", ylabel="adhesion coefficient")
         axis.legend(loc="center right")
-    with picture(folder / "fig03.png", "Fig. 3: Kiencke's curve beside Burckhardt's model, dry road") as axis:
+    with picture(figures.path("fig03"), "Fig. 3: Kiencke's curve beside Burckhardt's model, dry road") as axis:
         curves = {"Burckhardt": DRY_ROAD(CREEPS), "Kiencke": adhesion(CREEPS, DRY_ROAD.slope, like(DRY_ROAD))}
         peaked = (f"{name}: peak {mu.max():.3f} at {CREEPS[mu.argmax()]:.3f}" for name, mu in curves.items())
         draw_lines(axis, CREEPS, dict(zip(peaked, curves.values(), strict=True)))

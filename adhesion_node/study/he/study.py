@@ -9,13 +9,13 @@ surface's samples after which the estimated peak stays within 5 % of the truth t
 
 import argparse
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...command.running import add_running_options, run_all, running
 from ...core.physics.train import Array
+from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from . import runs as he
 from .beyond import BEYOND, Beyond, value_of
@@ -54,7 +54,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Give the study its options."""
     parser.add_argument("--runs", type=int, default=RUNS, metavar="N", help=f"seeds per experiment (default {RUNS})")
     parser.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"first seed (default {SEED})")
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 1-3 and 5-11 into DIR")
+    add_figure_options(parser, "Figs. 1-3 and 5-11")
     parser.add_argument("--sensitivity", action="store_true", help="also other numbers of samples and other gains")
     add_running_options(parser)
 
@@ -73,10 +73,10 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     *noises, covered, withheld, difference = map(value_of, found[len(wanted) :])
     rows[0] |= {"dfp_difference": difference, "coverage95": covered, "withholding": withheld}
     rows += [row for rows_of_std in noises for row in rows_of_std]
-    if options.figures:
+    if (figures := figures_of(options)) is not None:
         from .figures import draw
 
-        draw(thetas, options.figures)
+        draw(thetas, figures)
     return rows, text(rows)
 
 

@@ -12,7 +12,7 @@ from ...core.atp.config import SupervisionConfig
 from ...core.physics.braking import BrakingCurve
 from ...core.physics.train import KMH
 from ...report.picture import BLACK, BLUE, GREY, ORANGE
-from ..trial.drawing import picture
+from ..trial.drawing import PAGE_IN, picture
 
 NAMES = {
     "ebi": ("emergency brake intervention (EBI)", "#b00020", "-"),
@@ -32,7 +32,7 @@ def draw(config: SupervisionConfig, safe: BrakingCurve, fixed: BrakingCurve, tit
     config = replace(config, line_speed_kmh=float(safe.speed_mps[0]) / KMH)
     reach = float(etcs.distances(config, safe, safe.speed_mps[:1]).indication[0])
     ahead = np.linspace(1.1 * reach, -0.1 * reach, 600)
-    with picture(path, title, (9.0, 4.3)) as axis:
+    with picture(path, title, (PAGE_IN, 3.6)) as axis:
         for name, limit in etcs.speeds(config, safe, ahead)._asdict().items():
             label, color, style = NAMES[name]
             axis.plot(ahead, limit / KMH, color=color, ls=style, label=label)

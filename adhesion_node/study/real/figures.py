@@ -2,7 +2,7 @@
 
 """One picture of the first run of a case: what was so, and what the train knew of it when."""
 
-from pathlib import Path
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ from matplotlib.patches import Patch
 
 from ...core.physics.train import KMH
 from ...report.picture import BLACK, BLUE, GREY, ORANGE, SHADES
-from ..trial.drawing import panels
+from ..trial.drawing import draw_cases, panels
+from ..trial.figures import Figures
 from ..trial.score import TWO_SIDED_95
 from ..trial.trials import Rows
 from .cases import Case
@@ -20,14 +21,33 @@ BEFORE_S = 5.0
 """Time before the full brake with which a picture begins."""
 
 
-def draw(case: Case, found: Found, folder: Path) -> None:
-    """Draw the first run into a folder, made when missing: SCENARIO-SENSORS.png."""
-    folder.mkdir(parents=True, exist_ok=True)
+def draw_all(table: Sequence[Mapping[str, Any]], figures: Figures) -> None:
+    """Draw error and bound of every case, with their goals: all_error, all_bound."""
+    names, runs = [row["case"] for row in table], table[0]["runs"] if table else 0
+    for figure, unit, end, factor in (
+        ("error_percent", "mean relative error of μ̂, %", 1, 1.0),
+        ("bound_kept", "lower bound kept, % of the estimates", 0, 100.0),
+    ):
+        columns = {
+            "mean of the runs": [_times(row[figure], factor) for row in table],
+            "worst run": [_times(row[f"{figure}_worst"], factor) for row in table],
+            "goal": [_times(row["goals"].get(figure, [None, None])[end], factor) for row in table],
+        }
+        title = f"On trains with wheels: {unit}; N = {runs} runs of each case"
+        draw_cases(figures.path(f"all_{figure.split('_')[0]}"), title, unit, names, columns)
+
+
+def _times(value: float | None, factor: float) -> float | None:
+    return None if value is None else factor * value
+
+
+def draw(case: Case, found: Found, figures: Figures) -> None:
+    """Draw the first run: SCENARIO-SENSORS."""
     of_run = found.of_seed(int(found.runs["seed"][0]))
     (run,) = of_run.runs
     rows = of_run.rows[(of_run.rows["out_s"] >= run["full_s"] - BEFORE_S) & (of_run.rows["t_s"] <= run["slow_s"])]
     title = f"{case.name}: the train knew at each time what came out by then (seed {run['seed']})"
-    with panels(folder / f"{case.name.replace(' ', '-')}.png", title, 3, (9.0, 3.2)) as axes:
+    with panels(figures.path(case.name.replace(" ", "-")), title, 3, (9.0, 3.2)) as axes:
         for axis, what in zip(axes, (_adhesion, _way, _speed), strict=True):
             what(axis, rows)
             for since_s, until_s, regime in _bands(rows):

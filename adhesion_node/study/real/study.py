@@ -11,12 +11,12 @@ all runs. A figure that misses its goal is marked with !, and the distances stan
 import argparse
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...command.running import add_running_options, running
+from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cases import Case, chosen
 from .goals import goals, missed, soonest
@@ -75,7 +75,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         const=TUNED_SEEDS,
         help=f"the seeds that settings are tuned by, from {TUNED_SEEDS} on",
     )
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw the first run of every case into DIR")
+    add_figure_options(parser, "errors and bounds of all cases, and the first run of each,")
     add_running_options(parser)
 
 
@@ -85,11 +85,12 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     table = [row(case, score(of_case)) for case, of_case in cases.items()]
     for entry in table:
         entry["first_seed"] = options.first_seed
-    if options.figures:
-        from .figures import draw
+    if (figures := figures_of(options)) is not None:
+        from .figures import draw, draw_all
 
+        draw_all(table, figures)
         for case, of_case in cases.items():
-            draw(case, of_case, options.figures)
+            draw(case, of_case, figures)
     return table, "\n".join([*lines(COLUMNS, table), "", *_missed_lines(table)])
 
 

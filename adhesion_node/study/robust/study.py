@@ -12,9 +12,11 @@ longest time from the end of the fault to a full window.
 """
 
 import argparse
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...command.running import add_running_options, running
+from ..trial.figures import Figures, add_figure_options, figures_of
 from ..trial.text import lines
 from . import faults, rails
 
@@ -27,11 +29,31 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--runs", type=int, default=40, help="runs of each case (default %(default)s)")
     parser.add_argument("--only", choices=TABLES, help="one of the tables")
     add_running_options(parser)
+    add_figure_options(parser, "errors and bounds of all cases")
 
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing and return a line per case."""
     names = [options.only] if options.only else list(TABLES)
     tables = {name: TABLES[name].rows(options.runs, running(options)) for name in names}
+    if (figures := figures_of(options)) is not None:
+        for name, table in tables.items():
+            _draw(name, table, figures)
     texts = ["\n".join(lines(TABLES[name].COLUMNS, table)) for name, table in tables.items()]
     return [row for table in tables.values() for row in table], "\n\n".join(texts)
+
+
+def _draw(name: str, table: Sequence[Mapping[str, Any]], figures: Figures) -> None:
+    """Draw a table: error with its spread, and how often the bound was kept."""
+    from ..trial.drawing import draw_cases
+
+    names, runs = [row["case"] for row in table], max(row["runs"] for row in table)
+    title = f"Rail condition, where something is not as believed; N = {runs} runs of each case, fewer of the paper's"
+    error = {
+        "mean": [row["mean_relative_error_percent"] for row in table],
+        "5 %": [row["p5_relative_error_percent"] for row in table],
+        "95 % of the runs": [row["p95_relative_error_percent"] for row in table],
+    }
+    draw_cases(figures.path(f"{name}_error"), title, "relative error of μ̂, %", names, error)
+    kept = [None if row["lower_bound_holds"] is None else 100.0 * row["lower_bound_holds"] for row in table]
+    draw_cases(figures.path(f"{name}_bound"), title, "lower bound kept, %", names, {"bound": kept})

@@ -1,12 +1,14 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The style of all figures of the studies: told apart without colour."""
+"""The style of all figures of the studies, in the columns of a journal: told apart without colour."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ...core.physics.train import Array
@@ -15,28 +17,63 @@ from ...report.picture import BLACK, BLUE, GREY, ORANGE
 STYLES = ((BLACK, "-"), (BLUE, "--"), (ORANGE, "-."), (GREY, ":"), ("#5b8c2a", (0, (5, 1, 1, 1, 1, 1))))
 """Colour and dashes of the lines of a picture."""
 
+COLUMN_IN, PAGE_IN = 3.5, 7.2
+"""Width of a column and of both columns, inches."""
+
+LETTERS: Any = {"font.size": 8.0, "svg.fonttype": "none", "pdf.fonttype": 42}
+"""Height of the letters, points; texts stay texts."""
+
+DOTS_PER_INCH = 200
+
+NAMES = {
+    "bank": "bank, the default",
+    "rail_condition": "rail condition",
+    "particle_em": "the paper's method",
+    "ekf_tuned": "extended Kalman filter, tuned",
+    "ekf_naive": "extended Kalman filter, naive",
+}
+"""Methods as a reader knows them."""
+
 
 @contextmanager
-def panels(path: Path, title: str, count: int, size: tuple[float, float] = (8.0, 4.0)) -> Iterator[list[Any]]:
+def panels(path: Path, title: str, count: int, size: tuple[float, float] = (PAGE_IN, 3.2)) -> Iterator[list[Any]]:
     """Give the axes of a picture of `count` panels of a size, inches; it is written when the block is done."""
     width, height = size
-    figure = Figure(figsize=(width, height * count + 0.5), layout="constrained")
-    figure.suptitle(title)
-    axes = list(figure.subplots(count, squeeze=False)[:, 0])
-    for axis in axes:
-        axis.grid(alpha=0.3)
-    yield axes
-    figure.savefig(path, dpi=110)
+    with rc_context(LETTERS):
+        figure = Figure(figsize=(width, height * count + 0.4), layout="constrained")
+        figure.suptitle(title)
+        axes = list(figure.subplots(count, squeeze=False)[:, 0])
+        for axis in axes:
+            axis.grid(alpha=0.3)
+        yield axes
+        figure.savefig(path, dpi=DOTS_PER_INCH)
 
 
 @contextmanager
-def picture(path: Path, title: str, size: tuple[float, float] = (8.0, 4.0)) -> Iterator[Any]:
+def picture(path: Path, title: str, size: tuple[float, float] = (PAGE_IN, 3.2)) -> Iterator[Any]:
     """Give the axis of a picture of one panel."""
     with panels(path, title, 1, size) as (axis,):
         yield axis
 
 
 def draw_lines(axis: Any, x: Array, lines: Mapping[str, Array]) -> None:
-    """Draw lines, by label, over the same `x`."""
-    for (color, dashes), (label, values) in zip(STYLES, lines.items(), strict=False):
-        axis.plot(x, values, color=color, ls=dashes, lw=1.8, label=label)
+    """Draw lines, by label, over the same `x`; those that are the same are drawn once."""
+    drawn: dict[bytes, list[str]] = {}
+    for label, values in lines.items():
+        drawn.setdefault(np.asarray(values).tobytes(), []).append(label)
+    for (color, dashes), labels in zip(STYLES, drawn.values(), strict=False):
+        axis.plot(x, lines[labels[0]], color=color, ls=dashes, lw=1.4, label=", ".join(labels))
+
+
+def draw_cases(
+    path: Path, title: str, unit: str, names: Sequence[str], columns: Mapping[str, Sequence[float | None]]
+) -> None:
+    """Draw a row of marks for each case, one mark for each column; None is left out."""
+    height, rows = 0.17 * len(names) + 0.9, np.arange(len(names))
+    with picture(path, title, (PAGE_IN, height)) as axis:
+        for (color, _), marker, (label, values) in zip(STYLES, "osx^v", columns.items(), strict=False):
+            known = np.array([np.nan if value is None else value for value in values], dtype=float)
+            axis.plot(known, rows, color=color, marker=marker, ms=4, ls="", label=label)
+        axis.set_yticks(rows, names)
+        axis.set(xlabel=unit, ylim=(len(names) - 0.5, -0.5))
+        axis.legend(loc="best")

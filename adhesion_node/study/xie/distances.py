@@ -8,7 +8,6 @@ With `--runs` also those by the adhesion that the paper's method and `rail_condi
 
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from ...core.physics import braking
 from ...core.physics.adhesion import WET, AdhesionLaw
 from ...core.physics.train import CRH3, KMH, Array
 from ...run.score import CONVERGED_AFTER_MPS
+from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from ..trial.trials import Results, Rows, each_trial, grouped
 from .methods import METHODS, trials
@@ -143,7 +143,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--runs", type=int, default=0, help="also by the adhesion identified in so many Monte-Carlo runs (default: 0)"
     )
     add_running_options(parser)
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 2, 3, 10-13, 20 and 21 into DIR")
+    add_figure_options(parser, "Figs. 2, 3, 10-13, 20 and 21")
 
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
@@ -158,10 +158,10 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
         text += ["", f"by the mu identified in {options.runs} runs from each start; saved against the fixed {WORST}"]
         text += lines(IDENTIFIED, found)
         table += found
-    if options.figures:
+    if (figures := figures_of(options)) is not None:
         from .figures import draw_brakings
 
-        draw_brakings(options.figures)
+        draw_brakings(figures)
     return table, "\n".join(text)
 
 

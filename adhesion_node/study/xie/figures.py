@@ -15,7 +15,8 @@ import numpy as np
 from ...core.physics import braking
 from ...core.physics.adhesion import DRY, WET
 from ...core.physics.train import CRH3, KMH, Array
-from ..trial.drawing import STYLES, draw_lines, panels, picture
+from ..trial.drawing import NAMES, STYLES, draw_lines, panels, picture
+from ..trial.figures import Figures
 from ..trial.score import relative_percent
 from ..trial.trials import Results, Rows, each_trial
 from .published import BRAKING_CASES
@@ -40,14 +41,13 @@ SCENES = (
 )
 
 
-def draw_brakings(folder: Path) -> None:
-    """Draw eight pictures into a folder, made when missing: figNN_scenario_what.png."""
-    folder.mkdir(parents=True, exist_ok=True)
+def draw_brakings(figures: Figures) -> None:
+    """Draw eight pictures: figNN_scenario_what."""
     for scene in SCENES:
-        _draw_rail(scene, folder)
-        _draw_forces(scene, folder)
-        _draw_ends(scene, "distance", "m", scene.braking_figure, folder)
-        _draw_ends(scene, "time", "s", scene.braking_figure + 1, folder)
+        _draw_rail(scene, figures)
+        _draw_forces(scene, figures)
+        _draw_ends(scene, "distance", "m", scene.braking_figure, figures)
+        _draw_ends(scene, "time", "s", scene.braking_figure + 1, figures)
 
 
 def rail(scene: Scene) -> tuple[Array, Array]:
@@ -56,9 +56,9 @@ def rail(scene: Scene) -> tuple[Array, Array]:
     return np.append(speeds[0], speeds), np.append(DRY(speeds[:1] * KMH), WET(speeds * KMH))
 
 
-def _draw_rail(scene: Scene, folder: Path) -> None:
+def _draw_rail(scene: Scene, figures: Figures) -> None:
     speeds, adhesion = rail(scene)
-    with picture(*_named(scene, scene.rail_figure, "adhesion", folder)) as axis:
+    with picture(*_named(scene, scene.rail_figure, "adhesion", figures)) as axis:
         axis.plot(speeds, adhesion, color="0.0", lw=1.8)
         for index, side, offset in ((0, "left", (6, -4)), (1, "left", (6, -14)), (-1, "right", (0, 6))):
             place = speeds[index], adhesion[index]
@@ -67,22 +67,22 @@ def _draw_rail(scene: Scene, folder: Path) -> None:
         axis.invert_xaxis()
 
 
-def _draw_forces(scene: Scene, folder: Path) -> None:
+def _draw_forces(scene: Scene, figures: Figures) -> None:
     speeds, adhesion = rail(scene)
     brake = np.full_like(speeds, CRH3.brake_force(CRH3.full_pressure_pa))
     forces = {"air brake": 1e-3 * brake, "adhesion": 1e-3 * CRH3.adhesion_force(adhesion)}
-    with picture(*_named(scene, scene.rail_figure + 1, "forces", folder)) as axis:
+    with picture(*_named(scene, scene.rail_figure + 1, "forces", figures)) as axis:
         draw_lines(axis, speeds, forces)
         axis.set(xlabel="speed, km/h", ylabel="force, kN", ylim=(0.0, 1000.0))
         axis.invert_xaxis()
         axis.legend(loc="upper right")
 
 
-def _draw_ends(scene: Scene, along: str, unit: str, number: int, folder: Path) -> None:
+def _draw_ends(scene: Scene, along: str, unit: str, number: int, figures: Figures) -> None:
     """Speed over distance or time for each adhesion; a cross where the paper's braking ended."""
     cases = [case for case in BRAKING_CASES if case[:2] == (scene.from_kmh, scene.to_kmh)]
     quantity = f"{along}_{unit}"
-    with picture(*_named(scene, number, along, folder)) as axis:
+    with picture(*_named(scene, number, along, figures)) as axis:
         for (color, dashes), case in zip(STYLES, cases, strict=False):
             curve = braking.curve(CRH3, case.from_kmh * KMH, case.mu, case.to_kmh * KMH)
             values, paper = getattr(curve, quantity), getattr(case, quantity)
@@ -95,14 +95,19 @@ def _draw_ends(scene: Scene, along: str, unit: str, number: int, folder: Path) -
         axis.legend(loc="lower left", title="adhesion")
 
 
-def _named(scene: Scene, number: int, what: str, folder: Path) -> tuple[Path, str]:
+def _named(scene: Scene, number: int, what: str, figures: Figures) -> tuple[Path, str]:
     """Path and title of a picture."""
     title = f"Fig. {number}: {scene.way}, {scene.from_kmh:g} to {scene.to_kmh:g} km/h, {what}"
-    return folder / f"fig{number:02}_{scene.scenario}_{what}.png", title
+    return figures.path(f"fig{number:02}_{scene.scenario}_{what}"), title
 
 
 FIRST_FIGURES = {"tunnel_entry": {"particle_em": 4, "ekf": 7}, "tunnel_exit": {"particle_em": 14, "ekf": 17}}
 """Number of the first of three figures in the paper."""
+
+BESIDE = ("bank", "rail_condition")
+"""Methods that every one of them shows, too."""
+
+SCENE_OF = {scene.scenario: scene for scene in SCENES}
 
 
 class Quantity(NamedTuple):
@@ -120,40 +125,48 @@ QUANTITIES = (
 )
 
 
-def draw_estimates(cells: Mapping[tuple[str, str], Results], folder: Path) -> None:
-    """Draw twelve pictures of scenarios and methods into a folder: figNN_scenario_method_quantity.png."""
-    folder.mkdir(parents=True, exist_ok=True)
+def draw_estimates(cells: Mapping[tuple[str, str], Results], figures: Figures) -> None:
+    """Draw twelve pictures of scenarios and methods: figNN_scenario_method_quantity."""
     for scenario, methods in FIRST_FIGURES.items():
         for family, first in methods.items():
             shown = {
-                method: found for (of, method), found in cells.items() if of == scenario and method.startswith(family)
+                method: found
+                for (of, method), found in cells.items()
+                if of == scenario and (method in BESIDE or method.startswith(family))
             }
+            way, some = SCENE_OF[scenario].way, next(iter(shown.values()))
+            seeds, starts = (np.unique(some.rows[name]).size for name in ("seed", "start"))
+            count = f"N = {seeds} runs from each of {starts} starts"
             for number, quantity in enumerate(QUANTITIES, first):
-                file = f"fig{number:02}_{scenario}_{family}_{quantity.name}.png"
-                _draw(shown, quantity, folder / file, f"Fig. {number}: {scenario}, {quantity.label}")
+                path = figures.path(f"fig{number:02}_{scenario}_{family}_{quantity.name}")
+                _draw(shown, quantity, path, f"Fig. {number}: {way}, {quantity.label}; {count}")
 
 
 def _draw(shown: Mapping[str, Results], quantity: Quantity, path: Path, title: str) -> None:
     with panels(path, title, len(shown)) as axes:
         for axis, (method, found) in zip(axes, shown.items(), strict=True):
             _draw_method(axis, found, quantity)
-            axis.set(title=method, xlabel="speed, km/h", ylabel=quantity.label)
+            axis.set(title=NAMES[method], xlabel="speed, km/h", ylabel=quantity.label)
             axis.invert_xaxis()
             axis.legend(loc="best", fontsize="small", ncols=2)
 
 
 def _draw_method(axis: Any, found: Results, quantity: Quantity) -> None:
     """The first run from every start, the band that holds 90 % of the runs, and where the brake begins to limit."""
-    axis.fill_between(*_band(found, quantity), color="0.88", label="5-95 % of all runs")
+    axis.fill_between(*_band(found, quantity), color="0.88", label="5 to 95 % of all runs")
     of_first_seed = [rows for rows in each_trial(found.rows) if rows["seed"][0] == found.rows["seed"][0]]
     first = of_first_seed[0]
     brake_limits = first["true_speed_mps"][first["limited"]].min() / KMH
     axis.axvline(brake_limits, color="0.6", lw=1.0, label="below this speed the brake limits")
     if quantity.name == "estimate":
         axis.plot(first["true_speed_mps"] / KMH, first["true_mu"], color="0.0", lw=3, alpha=0.35, label="true")
-    for rows, (color, dashes) in zip(of_first_seed, STYLES, strict=True):
-        label = f"start {rows['start'][0]:g}"
-        axis.plot(rows["true_speed_mps"] / KMH, quantity.of(rows), color=color, ls=dashes, lw=1.3, label=label)
+    alike: dict[bytes, list[Rows]] = {}  # a method that needs no start gives the same from all of them
+    for rows in of_first_seed:
+        alike.setdefault(np.asarray(quantity.of(rows)).tobytes(), []).append(rows)
+    for same, (color, dashes) in zip(alike.values(), STYLES, strict=False):
+        starts = ", ".join(f"{rows['start'][0]:g}" for rows in same)
+        label = "one run, any start" if len(alike) == 1 else f"start {starts}"
+        axis.plot(same[0]["true_speed_mps"] / KMH, quantity.of(same[0]), color=color, ls=dashes, lw=1.1, label=label)
 
 
 def _band(found: Results, quantity: Quantity) -> tuple[Any, Any, Any]:

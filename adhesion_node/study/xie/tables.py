@@ -13,7 +13,6 @@ in one process, `ms_per_window` that of a window among the others of its batch.
 import argparse
 import hashlib
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from numpy.lib.recfunctions import repack_fields
 
 from ...command.running import add_running_options, running
 from ..bound.study import Case, nominal
+from ..trial.figures import add_figure_options, figures_of
 from ..trial.score import over_speed, score
 from ..trial.text import Column, lines
 from ..trial.trials import Results, grouped
@@ -57,7 +57,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study tables`."""
     parser.add_argument("--runs", type=int, default=200, help="Monte-Carlo runs from each start (default %(default)s)")
     add_running_options(parser)
-    parser.add_argument("--figures", type=Path, metavar="DIR", help="draw Figs. 4-9 and 14-19 into DIR")
+    add_figure_options(parser, "Figs. 4-9 and 14-19")
 
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
@@ -69,10 +69,10 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     ]
     cells = grouped(wanted, running(options))
     table = [row for cell, found in cells.items() for row in rows(cell, found)]
-    if options.figures:
+    if (figures := figures_of(options)) is not None:
         from .figures import draw_estimates
 
-        draw_estimates(cells, options.figures)
+        draw_estimates(cells, figures)
     text = ["mean relative error of mu, %, beside the paper's (its EKF beside ours); spread over the runs"]
     text += [*lines(COLUMNS, table), "", *_speed_lines(cells), "", *_digest_lines(table)]
     return table, "\n".join(text)

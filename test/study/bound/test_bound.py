@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import json
 import math
+import pathlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -191,3 +192,11 @@ def test_noise_of_the_runs_hardly_moves_the_bound() -> None:
     runs = [still + np.cumsum(np.sqrt([*Q, 0.0]) * rng.standard_normal(still.shape), axis=0) for _ in range(30)]
     alone, together = (bound(NOMINAL, WET, path_of(paths, brakes), 0.25, START) for paths in ([still], runs))
     np.testing.assert_allclose(together.condition_std, alone.condition_std, rtol=3e-3)
+
+
+def test_the_bound_is_drawn(tmp_path: pathlib.Path) -> None:
+    assert main(["bound", "--figures", str(tmp_path), "--format", "svg"]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bound_tunnel_entry.svg", "bound_tunnel_exit.svg"]
+    drawn = (tmp_path / "bound_tunnel_entry.svg").read_text(encoding="utf-8")
+    for sigma in ("0.1", "0.5", "2"):
+        assert f"positions with σ = {sigma} m" in drawn

@@ -84,7 +84,7 @@ def test_the_command_prints_the_table_and_writes_json(
     for row in table:
         if row["ebi_m"] is not None:
             assert row["ebi_m"] < row["sbi_m"] < row["warning_m"] < row["permitted_m"] < row["indication_m"]
-    assert imread(tmp_path / "limits.png").shape[:2] == (528, 990)
+    assert imread(tmp_path / "limits.png").shape[:2] == (800, 1440)
     printed = capsys.readouterr().out.splitlines()
     assert len(printed) == 2 * (2 + 4)
     assert printed[2].split()[3] == "no"  # curve

@@ -72,7 +72,11 @@ def test_rows_and_pictures_of_a_case(tmp_path: Path, capsys: pytest.CaptureFixtu
     )
     assert row["limited"] > 0.9
     assert set(row["missed"]) <= set(row)
-    assert [path.name for path in figures.iterdir()] == ["tram_leaves-gnss_wheels.png"]
+    assert sorted(path.name for path in figures.iterdir()) == [
+        "all_bound.png",
+        "all_error.png",
+        "tram_leaves-gnss_wheels.png",
+    ]
     text = capsys.readouterr().out
     assert "every goal is met in" in text
     assert ("!" in text) == bool(row["missed"])

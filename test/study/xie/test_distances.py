@@ -84,10 +84,12 @@ def test_the_savings_are_those_of_the_rows(capsys: pytest.CaptureFixture[str]) -
 
 
 def test_the_figures_of_the_brakings(tmp_path: Path) -> None:
-    assert main(["distances", "--figures", str(tmp_path / "new" / "figures")]) == 0
-    files = sorted(tmp_path.glob("new/figures/*.png"))
-    assert [int(file.name[3:5]) for file in files] == [2, 3, 10, 11, 12, 13, 20, 21]
-    assert all(file.stat().st_size > 10_000 for file in files)
+    begin = {"png": b"\x89PNG", "pdf": b"%PDF", "svg": b"<?xml"}
+    for form, magic in begin.items():
+        assert main(["distances", "--figures", str(tmp_path / "new" / form), "--format", form]) == 0
+        files = sorted(tmp_path.glob(f"new/{form}/*.{form}"))
+        assert [int(file.name[3:5]) for file in files] == [2, 3, 10, 11, 12, 13, 20, 21]
+        assert all(file.stat().st_size > 5_000 and file.read_bytes().startswith(magic) for file in files)
 
 
 def test_savings_beside_the_papers() -> None:
