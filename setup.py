@@ -22,6 +22,7 @@ PROGRAMS = (
 TOOLS = [
     "mcap>=1.5,<2",
     "zstandard>=0.22,<1",
+    "lz4>=4,<5",
     "rosbags>=0.11.6,<0.12",
     "matplotlib>=3.6,<4",
     "pyproj>=3.4,<4",

@@ -11,25 +11,22 @@ from collections import Counter
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
-from struct import Struct, error
+from struct import error
 from typing import BinaryIO, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, Chunk, McapRecord, Message, Schema
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Channel, McapRecord, Message, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import Qos
 from zstandard import ZstdError
 
-from .metadata import LATEST_NS
+from .chunk import HEAD, unpack
 from .qos import parse
 from .types import Definition
 
-_HEAD = Struct("<BQ")
-
-_UNREADABLE = (error, ValueError, OverflowError, MemoryError, McapError, ZstdError, RuntimeError)
+_UNREADABLE = (error, ValueError, OverflowError, MemoryError, EOFError, McapError, ZstdError, RuntimeError)
 """What the decoders raise on bytes that are not what they seem."""
 
 
@@ -74,7 +71,7 @@ class McapFile:
         with self.path.open("rb") as stream:
             stream.seek(block.offset)
             body = stream.read(block.length)
-        for record in _unpack(block.opcode, body):
+        for record in unpack(block.opcode, body):
             if isinstance(record, Message) and record.channel_id in self.topics:
                 yield record
 
@@ -82,17 +79,22 @@ class McapFile:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
             empty = self.path.stat().st_size == 0
             raise ValueError(f"{self.path}: {'is empty' if empty else 'is not an MCAP file'}: name another recording")
-        finished = False
+        finished, counted = False, 0
         end = len(MCAP0_MAGIC)
         for opcode, offset, length in _records(stream):
             end = offset + length
             if opcode == Opcode.FOOTER:
                 stream.seek(end)
                 finished = stream.read() == MCAP0_MAGIC
+            if opcode == Opcode.STATISTICS:
+                counted = _messages(stream.read(length))
             if opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
                 self._take_block(opcode, offset, stream.read(length))
         if nameless := sum(count for channel, count in self.counts.items() if channel not in self.topics):
             self.damage.append(f"{self.path}: {nameless} messages are left out, the names of their topics are lost")
+        missing = counted - sum(self.counts.values())
+        if missing > 0 and not self.damage:  # a chunk whose kind one wrong bit has changed looks like nothing at all
+            self.damage.append(f"{self.path}: {missing} messages are lost, its end counts {counted}")
         if not finished:
             stream.seek(end)
             rest = f", the {extent} bytes there are left out" if (extent := _extent(stream)) else ""
@@ -104,7 +106,7 @@ class McapFile:
         try:
             if opcode == Opcode.MESSAGE and self.blocks and self.blocks[-1].opcode == Opcode.CHUNK:
                 raise ValueError("behind a chunk comes its index, which one wrong bit makes a message")
-            records = _unpack(opcode, body)
+            records = unpack(opcode, body)
             self._declare(records)
             messages = [record for record in records if isinstance(record, Message)]
         except _UNREADABLE:
@@ -134,16 +136,24 @@ def _records(stream: BinaryIO) -> Iterator[tuple[int, int, int]]:
     """Yield opcode, offset and length of the body of every record that lies in the stream as a whole."""
     offset = stream.tell()
     size = stream.seek(0, 2)
-    while offset + _HEAD.size <= size:
+    while offset + HEAD.size <= size:
         stream.seek(offset)
-        opcode, length = _HEAD.unpack(stream.read(_HEAD.size))
-        offset += _HEAD.size
+        opcode, length = HEAD.unpack(stream.read(HEAD.size))
+        offset += HEAD.size
         if opcode == 0 or offset + length > size:
             return
         yield opcode, offset, length
         if opcode == Opcode.FOOTER:
             return
         offset += length
+
+
+def _messages(body: bytes) -> int:
+    """Return the number of messages that the statistics at the end count; 0 where they are unreadable."""
+    try:
+        return int(Statistics.read(ReadDataStream(BytesIO(body))).message_count)
+    except _UNREADABLE:
+        return 0
 
 
 def _extent(stream: BinaryIO) -> int:
@@ -154,18 +164,3 @@ def _extent(stream: BinaryIO) -> int:
             extent = position + used
         position += len(block)
     return extent
-
-
-def _unpack(opcode: int, body: bytes) -> list[McapRecord]:
-    """Return the messages, schemas and channels of a chunk; another record stands for itself."""
-    if opcode == Opcode.CHUNK:
-        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
-    else:
-        chunk = Chunk("", _HEAD.pack(opcode, len(body)) + body, 0, 0, 0, 0)
-    if chunk.compression not in ("", "lz4", "zstd"):
-        raise ValueError(f"chunk compression = {chunk.compression!r}: only zstd, lz4 and none are known")
-    records = breakup_chunk(chunk, validate_crc=True)
-    for record in records:
-        if isinstance(record, Message) and record.log_time > LATEST_NS:
-            raise ValueError(f"log time = {record.log_time} ns: beyond what a recording may hold")
-    return records

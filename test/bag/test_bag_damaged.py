@@ -8,7 +8,9 @@ import os
 import signal
 import subprocess
 import sys
+import tracemalloc
 from pathlib import Path
+from typing import Any
 
 import cdrs
 import numpy as np
@@ -16,6 +18,8 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.summary import Summary
+from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from recorded import S, write_steps
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
@@ -105,6 +109,66 @@ def test_a_damaged_chunk_is_left_out_and_reported(tmp_path: Path) -> None:
     kept = iter(written)
     assert all(record in kept for record in read), "what is left is in order and unchanged"
     assert read[-1] == written[-1]
+
+
+def test_a_chunk_that_no_longer_looks_like_one_is_missed(tmp_path: Path) -> None:
+    """One wrong bit makes it a record of an unknown kind; the statistics at the end know better."""
+    written = write_steps(tmp_path / "bag", 1500)
+    file = tmp_path / "bag" / file_name(0)
+    data = bytearray(file.read_bytes())
+    chunk = index_of(file).chunk_indexes[2]
+    data[chunk.chunk_start_offset] ^= 0x80
+    single = tmp_path / "single.mcap"
+    single.write_bytes(data)
+    with BagReader(single) as reader:
+        read = list(reader.messages())
+        lost = len(written) - len(read)
+        assert lost > 0
+        assert not reader.complete
+        assert reader.damage == (f"{single}: {lost} messages are lost, its end counts {len(written)}",)
+
+
+@pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
+@pytest.mark.parametrize("claimed", [None, 1000])
+def test_a_chunk_that_is_too_long_is_left_out_before_it_is_made(
+    compression: CompressionType, claimed: int | None, tmp_path: Path
+) -> None:
+    """Some hundred kB of zeros compressed stand for 200 MB, whatever the chunk says that they do."""
+    path = tmp_path / "bomb.mcap"
+    with path.open("wb") as stream:
+        writer: Any = McapWriter(stream, compression=compression, chunk_size=2**31)
+        writer.start()
+        schema = writer.register_schema("std_msgs/msg/String", "ros2msg", b"string data")
+        channel = writer.register_channel("/bomb", "cdr", schema)
+        writer.add_message(channel, 1, bytes(200 * 2**20), 1)
+        writer.finish()
+    data = bytearray(path.read_bytes())
+    if claimed is not None:
+        start = index_of(path).chunk_indexes[0].chunk_start_offset
+        data[start + 9 + 16 : start + 9 + 24] = claimed.to_bytes(8, "little")
+        path.write_bytes(data)
+    del data
+    tracemalloc.start()
+    try:
+        with pytest.raises(ValueError, match=r"holds no readable message .*is damaged at byte"):
+            BagReader(path)
+        assert tracemalloc.get_traced_memory()[1] < 20 * 2**20
+    finally:
+        tracemalloc.stop()
+
+
+INFINITE = (
+    "rosbag2_bagfile_information: {topics_with_message_count: [{topic_metadata: {name: a}, message_count: .inf}]}"
+)
+
+
+@pytest.mark.parametrize("text", ["[" * 20_000, INFINITE])
+def test_metadata_that_makes_no_sense_is_as_good_as_none(text: str, tmp_path: Path) -> None:
+    written = write_steps(tmp_path / "bag", 3)
+    (tmp_path / "bag" / "metadata.yaml").write_text(text)
+    with BagReader(tmp_path / "bag") as reader:
+        assert list(reader.messages()) == written
+        assert "has no readable metadata.yaml" in reader.damage[0]
 
 
 def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
