@@ -40,6 +40,10 @@ HELD = 10_000
 """Messages that wait for the first /clock at most."""
 
 MIN_FREE_MB = 100.0
+
+MAX_DURATION_S = 1800.0
+"""Of a file: its index, which stays in memory until its end, grows by 7 kB a second."""
+
 LIMITS = Limits(span_ns=SPAN_NS, min_free_bytes=MIN_FREE_MB * MB)
 
 LATCHED_SUBSCRIPTION = QoSProfile(
@@ -216,7 +220,8 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--output", metavar="DIR", required=True, help="the recording, a new directory")
     add("--max-size-mb", metavar="MB", type=float, default=math.inf, help="go on in a new file before this size")
-    add("--max-duration-s", metavar="S", type=float, default=math.inf, help="go on in a new file after this log time")
+    longest = f"go on in a new file after this log time; inf: never (default: {MAX_DURATION_S:g})"
+    add("--max-duration-s", metavar="S", type=float, default=MAX_DURATION_S, help=longest)
     room = f"end before less is free on the disk (default: {MIN_FREE_MB:g})"
     add("--min-free-mb", metavar="MB", type=float, default=MIN_FREE_MB, help=room)
     return parser

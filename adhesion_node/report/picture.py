@@ -44,7 +44,7 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
     """
     figure = Figure(figsize=(11, 12), layout="constrained")
     FigureCanvasAgg(figure)
-    figure.suptitle(title)
+    figure.suptitle(title, parse_math=False)  # a file's name may hold any $
     parts: Any = figure.subfigures(2, 1, height_ratios=(20.0, 1.0))
     upper, foot = parts
     *axes, last = upper.subplots(3, 2).flat

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import hashlib
 import resource
+import tracemalloc
 from collections import Counter
 from functools import partial
 from pathlib import Path
@@ -161,3 +162,19 @@ def test_bad_limits_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[st
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"recorder: {option[2:]} = {float(value)}: give a number")
     assert not (tmp_path / "bag").exists()
+
+
+def test_memory_is_that_of_one_file_however_many_there_are(tmp_path: Path) -> None:
+    limits, held = Limits(span_ns=S // 5, max_duration_ns=20 * S), []
+    tracemalloc.start()
+    try:
+        with BagWriter(tmp_path / "bag", limits) as writer:
+            for step in range(5 * 20 * 6):
+                for number in range(10):
+                    writer.write(f"/topic{number}", POSITION.type, bytes(300), step * S // 5)
+                if step % 100 == 99:
+                    held.append(tracemalloc.get_traced_memory()[0])
+    finally:
+        tracemalloc.stop()
+    assert len(list((tmp_path / "bag").glob("*.mcap"))) == 6
+    assert held[5] < 1.1 * held[1]

@@ -199,6 +199,12 @@ def test_an_existing_directory_is_refused(tmp_path: Path, capfd: pytest.CaptureF
     assert "it exists already, give the name of a new directory" in line
 
 
+def test_a_recording_of_days_goes_on_in_new_files(tmp_path: Path) -> None:
+    """Unasked: the index of a file stays in memory until it ends."""
+    options = recorder._parser().parse_args(["--output", str(tmp_path / "bag")])
+    assert options.max_duration_s == recorder.MAX_DURATION_S <= 3600.0
+
+
 def test_bad_usage(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         recorder.main([])

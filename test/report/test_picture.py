@@ -124,6 +124,11 @@ def test_a_picture_is_drawn_of_what_there_is(left_out: tuple[Topic, ...], tmp_pa
     assert (shaded > 50_000) is (DIAGNOSTICS not in left_out)
 
 
+def test_a_name_is_no_formula(recorded: Run, tmp_path: Path) -> None:
+    picture.draw(recorded, tmp_path / "run.png", r"a$\frac$^{b", 0.0)
+    assert png_size(tmp_path / "run.png") > (600, 600)
+
+
 def test_the_truth_is_drawn_where_there_is_one(tmp_path: Path) -> None:
     black = []
     for name, left_out in (("with", ()), ("without", TRUTH)):
