@@ -217,20 +217,7 @@ class AtpMonitor(ManagedNode):
         if self._decision is None:
             return [Finding(Severity.ERROR, "nothing judged yet: does the clock run?")], {}
         finding = Finding(self._decision.severity, self._decision.message)
-        return [finding], numbers(self._config, self._decision)
-
-
-def numbers(config: SupervisionConfig, decision: Decision) -> dict[str, str]:
-    """Return the level and every number behind it; a number that is not known has no key."""
-    values = {
-        "target_position_m": config.target_position_m,
-        "target_speed_mps": config.target_speed_mps,
-        "curve_age_s": decision.curve_age_s,
-        "state_age_s": decision.state_age_s,
-        **({} if decision.reading is None else decision.reading._asdict()),
-    }
-    known = {key: f"{value:.3f}" for key, value in values.items() if value is not None}
-    return {"level": decision.level.name, **known}
+        return [finding], self._decision.numbers(self._config)
 
 
 def _log(node: Node, decision: Decision, awaited: bool) -> None:

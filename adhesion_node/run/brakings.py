@@ -56,27 +56,30 @@ class Braking(NamedTuple):
     cells: NDArray[np.void]
 
 
-def brakings(made: Iterable[Prediction], cell_m: float = CELL_M) -> Iterator[Braking]:
-    """Yield the brakings among predictions as soon as they are over; nothing else is kept."""
+def brakings(made: Iterable[Prediction], cell_m: float = CELL_M, sign: int = 1) -> Iterator[Braking]:
+    """Yield the brakings among predictions as soon as they are over; nothing else is kept.
+
+    `sign` is -1 where the chainage, by which places are told, falls along the run.
+    """
     braking: list[Prediction] = []
     for prediction in made:
         e = prediction.estimate
         if braking and (e.window == 0 or e.t_ns - braking[-1].estimate.t_ns > GAP_NS):
-            yield from _told(braking, cell_m)
+            yield from _told(braking, cell_m, sign)
             braking = []
         if e.window > 0 and not e.withheld:
             braking.append(prediction)
-    yield from _told(braking, cell_m)
+    yield from _told(braking, cell_m, sign)
 
 
-def _told(braking: list[Prediction], cell_m: float) -> Iterator[Braking]:
+def _told(braking: list[Prediction], cell_m: float, sign: int) -> Iterator[Braking]:
     """The braking of some predictions, if it was one."""
     if len(braking) < 2:
         return
     estimates = [made.estimate for made in braking]
     t_ns = np.array([e.t_ns for e in estimates])
     place, speed, mu, std, lower = np.array(
-        [(e.position_m, abs(e.speed_mps), e.mu, e.mu_std, e.mu_lower) for e in estimates]
+        [(sign * e.position_m, abs(e.speed_mps), e.mu, e.mu_std, e.mu_lower) for e in estimates]
     ).T
     if speed[0] - speed[-1] < LEAST_LOST_MPS:
         return

@@ -53,8 +53,8 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     def _note_way(self, estimate: Estimate) -> None:
         if estimate.speed_mps > -BACK_MPS:
             self._back_from_m = None
-        else:
-            self._back_from_m = max(estimate.position_m, self._back_from_m or estimate.position_m)
+        elif self._back_from_m is None or estimate.position_m > self._back_from_m:
+            self._back_from_m = estimate.position_m
         self.back_m = max(self.back_m, self._back_m(estimate))
 
     def _back_m(self, estimate: Estimate) -> float:

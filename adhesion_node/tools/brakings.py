@@ -71,7 +71,7 @@ class Recording(NamedTuple):
             recorded = offline.messages(reader, select_from(reader, self.remaps))
             pipeline = Pipeline(setup.config, setup.seed)
             made = offline.predictions(pipeline, None, recorded, setup.line, array("d"))
-            found = list(brakings(made, self.cell_m))
+            found = list(brakings(made, self.cell_m, setup.line.sign))
         if pipeline.last is None:
             raise ValueError(f"nothing to estimate from; dropped: {pipeline.dropped or 'nothing'}")
         rows = np.concatenate([np.empty(0, BRAKING), *(one.row for one in found)])

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -126,6 +127,19 @@ def test_a_manager_brings_a_node_up_and_takes_it_down(make_managed: Callable[...
     assert not managed.change("deactivate"), "of an inactive node"
     assert managed.change("shutdown")
     assert managed.state == "finalized"
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_a_node_that_is_destroyed_has_left_the_graph(make_managed: Callable[..., Managed], name: str) -> None:
+    managed = make_managed(NODES[name][0])
+    managed.wait(lambda: name in managed.manager.get_node_names())
+    managed.executor.remove_node(managed.node)
+    gc.disable()
+    try:
+        managed.node.destroy_node()
+        managed.wait(lambda: name not in managed.manager.get_node_names())
+    finally:
+        gc.enable()
 
 
 def test_what_is_known_is_kept_while_inactive_and_forgotten_by_a_cleanup(make_managed: Callable[..., Managed]) -> None:

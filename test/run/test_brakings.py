@@ -47,6 +47,13 @@ def test_a_braking_is_a_row_of_what_it_was_and_showed() -> None:
     assert row["safe_m"] == first.safe.distance_m[-1]
 
 
+def test_places_are_chainage_where_that_falls_along_the_run() -> None:
+    (found,) = brakings(braking(100.0, ADHESION, 0.07), sign=-1)
+    (row,) = found.row
+    assert (row["place_m"], row["place_end_m"], row["distance_m"]) == (-4000.0, -4360.0, 360.0)
+    assert found.cells["cell"].max() < 0
+
+
 def test_where_the_brake_limits_only_at_least_is_known() -> None:
     (found,) = brakings([*braking(100.0, BRAKE, 0.09)[:6], *braking(100.0, BRAKE, 0.08)[6:]])
     (row,) = found.row

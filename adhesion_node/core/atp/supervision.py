@@ -82,6 +82,18 @@ class Decision:
     curve_age_s: float | None = None
     state_age_s: float | None = None
 
+    def numbers(self, config: SupervisionConfig) -> dict[str, str]:
+        """Return the level and every number behind it; a number that is not known has no key."""
+        values = {
+            "target_position_m": config.target_position_m,
+            "target_speed_mps": config.target_speed_mps,
+            "curve_age_s": self.curve_age_s,
+            "state_age_s": self.state_age_s,
+            **({} if self.reading is None else self.reading._asdict()),
+        }
+        known = {key: f"{value:.3f}" for key, value in values.items() if value is not None}
+        return {"level": self.level.name, **known}
+
 
 def decide(
     config: SupervisionConfig,

@@ -129,7 +129,7 @@ class EstimatingNode(ManagedNode, Generic[P]):
 
     def close(self) -> None:
         """Use what still waits and publish what it gives."""
-        if not self.active:
+        if not self.configured:
             return
         self._publish(self.pipeline.finish())
         tally, dropped = self.pipeline.tally, self.pipeline.dropped or "none"

@@ -31,7 +31,8 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
         LifecycleNodeMixin.__init__(self)
         self.configured = self.active = False
         self._failure: Exception | None = None
-        self._kept = self._entities()
+        self._kept: set[Any] = set()
+        """What is there in every state."""
 
     def bring_up(self, values: Mapping[str, Any]) -> None:
         """Configure and activate, unless a manager does; raises what `open` does. Call at the end of `__init__`."""
@@ -49,6 +50,11 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
     @abstractmethod
     def resume(self) -> None:
         """Begin to work."""
+
+    def destroy_node(self) -> None:
+        """Leave the graph at once: the state machine would hold the node until it is collected as garbage."""
+        SettingsNode.destroy_node(self)
+        self._state_machine.destroy_when_not_in_use()
 
     def standing(self, told: Callable[[], Told]) -> Told:
         """What there is to tell: while the node does not work, that it does not."""
