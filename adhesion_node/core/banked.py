@@ -10,6 +10,7 @@ from .bank import following as bank
 from .bank.verdict import Findings, found
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail
+from .belief.rail_map import Way
 from .config import Config
 from .estimate import Estimate, estimate_of, unknown
 from .intake.outcome import Event, Outcome, counted
@@ -43,7 +44,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
 
     def rail() -> Rail:
         mean, _ = before.moments()
-        return state.knowledge.aged(config, measurement.t_ns, Gaussian(mean[:2], np.zeros((2, 2))))
+        return _here(config, state, measurement.t_ns, Gaussian(mean[:2], np.zeros((2, 2))))
 
     off = bank.off(config, memory, measurement)
     stepping = state.stepping.after(config, memory, measurement, off)
@@ -100,7 +101,10 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     mean, covariance = memory.bank.moments()
     belief = Gaussian(mean[:2], covariance[:2, :2])
     nothing = unknown(config, float(mean[1]))
-    findings = found(config, memory, knowledge.aged(config, newest.t_ns, belief), nothing)
+    before = knowledge.aged(config, newest.t_ns, belief)
+    if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
+        before = before._replace(lower=max(before.lower, _here(config, state, newest.t_ns, belief).lower))
+    findings = found(config, memory, before, nothing)
     verdict = _verdict(memory, findings)._replace(changed=memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict._replace(rail=findings.known))
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(
@@ -108,6 +112,15 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     )
     memory = memory._replace(log_likelihood=0.0)
     return state._replace(memory=memory, knowledge=knowledge, since_estimate=0, seen=estimate), estimate
+
+
+def _here(config: Config, state: State, t_ns: int, belief: Gaussian) -> Rail:
+    """The rail as this train knows it, aged, and as earlier trains saw it here."""
+    rail = state.knowledge.aged(config, t_ns, belief)
+    if config.rail_map is None:
+        return rail
+    way = Way(float(belief.mean[0]), float(belief.mean[1]), t_ns)
+    return config.rail_map.informed(rail, way, config.speed_law, config.map_trust)
 
 
 def _verdict(memory: bank.Memory, findings: Findings) -> Verdict:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from .bank import BANK, SUMMARY
+from .belief.rail_map import RailMap, Trust
 from .methods import METHODS
 from .physics.adhesion import LAWS, SpeedLaw
 from .physics.motion import Motion
@@ -33,6 +34,8 @@ class Config:
 
     train: Train = CRH3
     track: Track = LEVEL
+    rail_map: RailMap | None = None
+    """What earlier trains saw of the line; the bank begins a braking with it."""
     method: str = _method(
         BANK,
         "; ".join((f"{BANK}: {SUMMARY}", *(f"{name}: {method.summary}" for name, method in METHODS.items()))),
@@ -222,6 +225,12 @@ class Config:
     )
     unknown_std: float = _rail(0.04, "Standard deviation of mu where nothing is known", low=1e-3, high=1.0)
     memory_s: float = _rail(60.0, "Time in which knowledge that is not renewed fades to 1/e", "s", 1e-3, 1e6)
+    rail_map_days: float = _rail(
+        0.5, "Time in which it fades to 1/e that the rail is as earlier trains saw it", "days", 1e-3, 1e4
+    )
+    rail_map_trust: float = _rail(
+        0.9, "Probability that the rail is as earlier trains saw it just now; 0: a map is not used", low=0.0, high=1.0
+    )
     memory_m: float = _rail(3000.0, "Distance over which it fades to 1/e", "m", 1e-3, 1e7)
     max_lag_s: float = _intake(
         0.0, "How late a measurement may come and still be sorted in; results wait as long", "s", 0.0, 60.0
@@ -251,6 +260,8 @@ class Config:
             raise ValueError(f"train = {self.train!r}: give a Train, such as Train(mass_kg=400e3)")
         if not isinstance(self.track, Track):
             raise ValueError(f"track = {self.track!r}: give a Track, such as Track((Grade(0.0, 2000.0, 10.0),))")
+        if not isinstance(self.rail_map, RailMap | None):
+            raise ValueError(f"rail_map = {self.rail_map!r}: give a RailMap, or None")
         if self.step >= self.window:
             raise ValueError(f"step = {self.step}: choose less than the window, {self.window}")
 
@@ -274,6 +285,11 @@ class Config:
     def grade_error(self) -> float:
         """Standard deviation of the grade, rise over run."""
         return self.profile_std if self.track.sections else self.grade_std
+
+    @property
+    def map_trust(self) -> Trust:
+        """How far the map of the rail is believed."""
+        return Trust(self.rail_map_trust, self.rail_map_days)
 
     @property
     def motion(self) -> Motion:

@@ -36,8 +36,8 @@ CELL = np.dtype(
 """What a braking showed of a piece of track: its number, counted from 0 m; when and how fast; whether adhesion limited.
 If not, `mu` is NaN: all that is known is that the train used `used`, and that there is `mu_lower` at least."""
 
-SURE = 0.02
-"""Standard deviation of mu above which too little was seen to tell anything."""
+SURE = 0.01
+"""Standard deviation of mu above which a bound tells of the estimator rather than of the rail."""
 
 LEAST_LOST_MPS = 3.0 * KMH
 """What slows down less is no braking of which anything could be told."""
@@ -86,7 +86,8 @@ def _told(braking: list[Prediction], cell_m: float, sign: int) -> Iterator[Braki
     adhesion, brake = (
         np.array([e.regime is regime for e in estimates]) for regime in (Regime.ADHESION_LIMITED, Regime.BRAKE_LIMITED)
     )
-    shown = adhesion | brake | (std <= SURE)
+    shown, claimed = std <= SURE, adhesion
+    adhesion = adhesion & shown if (adhesion & shown).any() else adhesion
     seconds = 1e-9 * float(t_ns[-1] - t_ns[0])
     found = (np.median(mu[adhesion]), np.median(std[adhesion]), mu[adhesion].min()) if adhesion.any() else (np.nan,) * 3
     values: dict[str, Any] = {
@@ -101,9 +102,9 @@ def _told(braking: list[Prediction], cell_m: float, sign: int) -> Iterator[Braki
         **dict(zip(("mu", "mu_std", "mu_least"), found, strict=True)),
         "used": np.median(mu[shown]) if shown.any() else np.nan,
         "mu_lower": _bound(lower, adhesion, shown),
-        "share_adhesion": adhesion.mean(),
+        "share_adhesion": claimed.mean(),
         "share_brake": brake.mean(),
-        "share_unclaimed": 1.0 - adhesion.mean() - brake.mean(),
+        "share_unclaimed": 1.0 - claimed.mean() - brake.mean(),
         "safe_m": length_m(braking[0].safe),
         "nominal_m": length_m(braking[0].nominal),
         "estimates": len(braking),

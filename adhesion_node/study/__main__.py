@@ -9,6 +9,7 @@ from ..command.options import DONE, help_texts, json_option, report, run_tool
 from .bound import study as bound
 from .he import study as creep
 from .intervention import study as intervention
+from .real import remembered
 from .real import study as real
 from .robust import study as robust
 from .xie import distances, sensitivity, tables, tune_ekf
@@ -32,6 +33,11 @@ STUDIES = {
         real,
         "the estimator on trains, rails and sensors that share no model with it, held against goals",
         "--runs 20 --only leaves,wet --figures figures",
+    ),
+    "remembered": (
+        remembered,
+        "the safe curve at the first second of braking, with what earlier trains saw of the rail and without",
+        "--runs 4",
     ),
     "bound": (bound, "the posterior Cramér-Rao bound of mu over a braking", "--json -"),
     "intervention": (

@@ -22,6 +22,7 @@ from ..command.running import Arrays, add_running_options, run_all, running
 from ..run import offline
 from ..run.brakings import BRAKING, CELL, CELL_M, brakings
 from ..run.pipeline import Pipeline
+from ..run.rail_map import map_of
 from ..wire.settings import TRAIN_FILE, setup_of
 from ..wire.train_file import read_train
 
@@ -135,39 +136,6 @@ def table_of(rows: Sequence[pd.DataFrame]) -> pd.DataFrame:
     table = pd.concat(rows).sort_values("t_ns", ignore_index=True)
     table.insert(0, "time", pd.to_datetime(table["t_ns"], utc=True))
     return table[["train", "recording", *table.columns.drop(["train", "recording"])]]
-
-
-def map_of(cells: pd.DataFrame, cell_m: float) -> pd.DataFrame:
-    """The rail by piece of track and date.
-
-    `seen` counts brakings, `limited` those whose adhesion limited: `mu` is their mean, `mu_std` has their scatter and
-    their own errors, `mu_lowest` is the least. `used` is the mean of what the trains used, whatever limited them.
-    `mu_lower` is the least bound where adhesion limited, else the highest that was shown.
-    """
-    cells = cells.assign(
-        date=pd.to_datetime(cells["t_ns"], utc=True).dt.strftime("%Y-%m-%d"),
-        least=cells["mu_lower"].where(cells["limited"]),
-        variance=cells["mu_std"] ** 2,
-    )
-    by = cells.groupby(["cell", "date"])
-    rail = by.agg(
-        seen=("t_ns", "size"),
-        limited=("limited", "sum"),
-        mu=("mu", "mean"),
-        mu_lowest=("mu", "min"),
-        variance=("variance", "mean"),
-        scatter=("mu", "var"),
-        used=("used", "mean"),
-        least=("least", "min"),
-        most=("mu_lower", "max"),
-        speed_mps=("speed_mps", "mean"),
-        t_ns=("t_ns", "max"),
-    ).reset_index()
-    rail["mu_std"] = np.sqrt(rail.pop("variance") + rail.pop("scatter").fillna(0.0))
-    rail["mu_lower"] = rail.pop("least").fillna(rail.pop("most"))
-    rail.insert(0, "place_m", rail.pop("cell") * cell_m)
-    rail.insert(1, "length_m", cell_m)
-    return rail
 
 
 def _recording(text: str, values: dict[str, Any], options: argparse.Namespace) -> Recording:

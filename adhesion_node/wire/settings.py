@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core import Config
 from ..core.atp.config import SupervisionConfig
+from ..core.belief.rail_map import RailMap
 from ..core.creep.config import CreepConfig
 from ..core.creep.vehicle import Vehicle
 from ..core.intake.samples import MAX_POSITION_M
@@ -18,6 +19,7 @@ from ..core.physics.train import CRH3, Train
 from ..core.setting import Setting, check_settings, make, setting, settings_of
 from . import parameter_file, sensing
 from .codecs import Line
+from .rail_map_file import read_rail_map
 from .topics import ADHESION_INPUTS, CREEP_INPUTS
 from .train_file import read_train
 
@@ -56,6 +58,13 @@ TRAIN_FILE = Setting(
     "",
     "File that describes the train, or high_speed, metro, freight; a parameter given beside it counts first",
     group="train's file",
+)
+
+RAIL_MAP = Setting(
+    "rail_map",
+    "",
+    "File of the rail by place and date, of `brakings --map`: what earlier trains saw where a braking begins",
+    group="track",
 )
 
 SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
@@ -118,7 +127,7 @@ OF_NODES_ALONE = (AUTOSTART, *settings_of(Telling))
 
 SETTINGS = _marked(
     *(SEED, *OF_LINE, SENSOR_TIMEOUT, *sensing.settings(ADHESION_INPUTS), *OF_NODES_ALONE),
-    *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START),
+    *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START, RAIL_MAP),
 )
 """All settings of the estimator."""
 
@@ -191,7 +200,8 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     if line is not None:
         profile = _with_grades(profile, line.grades(train.length_m))
     of_line = make(Line, values, track=line, **sensing.of_line(ADHESION_INPUTS, values))
-    config = make(Config, values, train=train, track=profile.turned() if of_line.sign < 0 else profile)
+    track_run = profile.turned() if of_line.sign < 0 else profile
+    config = make(Config, values, train=train, track=track_run, rail_map=_rail_map(values, of_line.sign))
     words = _in_words(named or (DEFAULT_TRAIN if train == CRH3 else OWN_TRAIN), train)
     return Setup(config, int(seed), of_line, float(timeout_s), words)
 
@@ -217,6 +227,15 @@ def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":
     from .track_file import read_track_line  # only here: without a line no geodesy is loaded
 
     return read_track_line(str(path), float(start_m))
+
+
+def _rail_map(values: Mapping[str, Any], sign: int) -> RailMap | None:
+    """What earlier trains saw, where there is a file of it, in the sense of the positions."""
+    path = RAIL_MAP.check(values.get(RAIL_MAP.name, RAIL_MAP.default))
+    if not path:
+        return None
+    rail_map = read_rail_map(str(path))
+    return rail_map.turned() if sign < 0 else rail_map
 
 
 def _with_grades(track: Track, grades: tuple[Grade, ...]) -> Track:

@@ -11,8 +11,8 @@ import pandas as pd
 import pytest
 from test_offline import NO_TRUTH, samples, write_run
 
+from adhesion_node.run.rail_map import map_of
 from adhesion_node.tools import brakings
-from adhesion_node.tools.brakings import map_of
 
 
 @pytest.fixture(scope="module")

@@ -122,10 +122,15 @@ def write_changed(path: Path) -> dict[str, Any]:
     """Write the file with every value of the estimator changed, and return the values."""
     document = yaml.safe_load(DEFAULTS.read_text(encoding="utf-8"))
     section = document["/**/estimator"]["ros__parameters"]
+    path.with_suffix(".rail").write_text("", encoding="utf-8")
     path.with_suffix(".csv").write_text("lat,lon\n47,8\n47.1,8\n", encoding="utf-8")
     document["/**/estimator"]["ros__parameters"] = {
         **_changed(section),
-        **{"track_line": str(path.with_suffix(".csv")), "train_file": "metro"},
+        **{
+            "track_line": str(path.with_suffix(".csv")),
+            "train_file": "metro",
+            "rail_map": str(path.with_suffix(".rail")),
+        },
     }
     with path.open("w", encoding="utf-8") as stream:
         yaml.safe_dump(document, stream)

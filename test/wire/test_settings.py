@@ -18,13 +18,13 @@ from adhesion_node.wire import sensing
 from adhesion_node.wire.codecs import Line
 from adhesion_node.wire.settings import OF_LINE, OF_NODES_ALONE, SETTINGS, Setup, parse_setting, setup_of
 
-OF_FILES = ("track", "train_file")
-"""Settings, or beginnings of their names, that are no field of the configuration."""
+OF_FILES = {"track", "track_line", "track_start_m", "train_file", "rail_map"}
+"""Settings that are no number or word of the configuration."""
 
-FREE_TEXTS = {"train_file", "track", "frame", "track_line", "hardware_id", "child_frame"}
+FREE_TEXTS = {"train_file", "rail_map", "track", "frame", "track_line", "hardware_id", "child_frame"}
 """The settings that are neither a number nor one of a few words."""
 
-USED = [setting for setting in SETTINGS if setting not in OF_NODES_ALONE and not setting.name.startswith(OF_FILES)]
+USED = [setting for setting in SETTINGS if setting not in OF_NODES_ALONE and setting.name not in OF_FILES]
 """By an offline run, too."""
 
 NUMBERS = [setting for setting in SETTINGS if type(setting.default) in (int, float)]

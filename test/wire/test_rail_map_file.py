@@ -1,0 +1,73 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Files of the rail by place and date: what `brakings --map` wrote is read, in the sense of the positions."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from adhesion_node.core.belief.rail_map import Piece
+from adhesion_node.run.rail_map import map_of
+from adhesion_node.wire.rail_map_file import UNKNOWN_STD, read_rail_map
+from adhesion_node.wire.settings import setup_of
+
+
+def rail() -> pd.DataFrame:
+    """Return a map of two pieces: adhesion limited on the second alone."""
+    cells = {
+        "cell": [7, 3],
+        "t_ns": [1_700_000_000_123_456_789, 1_700_000_000_000_000_000],
+        "limited": [True, False],
+        "speed_mps": 30.0,
+        "mu": [0.05, float("nan")],
+        "mu_std": [0.003, float("nan")],
+        "used": [0.05, 0.08],
+        "mu_lower": [0.045, 0.075],
+    }
+    return map_of(pd.DataFrame(cells), 100.0)
+
+
+PIECES = (
+    Piece(300.0, 100.0, 1_700_000_000_000_000_000, 1, 0.08, UNKNOWN_STD, 0.075, 30.0, False),
+    Piece(700.0, 100.0, 1_700_000_000_123_456_789, 1, 0.05, 0.003, 0.045, 30.0, True),
+)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet"])
+def test_what_was_written_is_read(ending: str, tmp_path: Path) -> None:
+    path = tmp_path / f"rail{ending}"
+    rail().to_csv(path, index=False) if ending == ".csv" else rail().to_parquet(path, index=False)
+    assert read_rail_map(str(path)).pieces == PIECES
+    assert setup_of({"rail_map": str(path)}).config.rail_map == read_rail_map(str(path))
+    down = setup_of({"rail_map": str(path), "direction": "down"}).config.rail_map
+    assert down is not None
+    assert [piece.place_m for piece in down.pieces] == [-800.0, -400.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("place_m,date\n0,today\n", "lacks the columns length_m, t_ns, seen"),
+        (
+            "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,100,soon,1,,,0.1,0.1,30\n",
+            "row 1: .*: give numbers",
+        ),
+        (
+            "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,0,1,1,,,0.1,0.1,30\n",
+            "a length above 0",
+        ),
+    ],
+)
+def test_what_is_no_map_is_refused_with_its_file(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "rail.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=rf"rail_map = {path}: .*{message}"):
+        read_rail_map(str(path))
+
+
+def test_a_missing_file_is_said() -> None:
+    with pytest.raises(ValueError, match=r"rail_map = nowhere\.csv: not readable .*`brakings --map` writes one"):
+        setup_of({"rail_map": "nowhere.csv"})
