@@ -26,7 +26,7 @@ and of v^2 what rounding makes of it."""
 def read_curve(message: Any, line: Line) -> StampedCurve:
     """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected.
 
-    Where its places fall, so do its velocities from 0 on, and its accelerations are positive.
+    Where the chainage falls along it, its velocities are below 0 and its accelerations above, on a standing train too.
     """
     points = message.points
     if list(message.joint_names) != [TRAIN] or len(points) < 2:
@@ -38,7 +38,7 @@ def read_curve(message: Any, line: Line) -> StampedCurve:
     if not usable.all():
         index = int(np.argmin(usable))
         raise Rejected(Reason.NOT_FINITE, f"braking curve point {index} = {rows[index].tolist()}")
-    sign = -1 if rows[-1, 0] < rows[0, 0] else 1
+    sign = -1 if rows[0, 2] > 0 else 1
     place, velocity, acceleration, time = np.ascontiguousarray(rows.T) * [[sign], [sign], [sign], [1]]
     curve = BrakingCurve(place - place[0], velocity, -acceleration, time)
     _check_course(curve)

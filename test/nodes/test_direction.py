@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import messages
+import numpy as np
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
@@ -19,10 +20,12 @@ from test_estimator_node import Line, samples
 from test_faults_monitor import QUIET, Train, known
 
 from adhesion_node.core.atp.supervision import Level
+from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.wire import codecs, topics
 from adhesion_node.wire.codecs import DOWN
+from adhesion_node.wire.frames import placed
 
 MakeLine = Callable[..., Line]
 TRACK = "grade 1000 5000 -20; tunnel 2000 3000"
@@ -90,6 +93,15 @@ def test_results_are_read_along_the_run_or_as_chainage(make_line: MakeLine) -> N
     assert (along.sign, along.position_m) == (1, estimate.position_m)
     assert against.places_m == pytest.approx(-along.places_m)
     assert against.curve.speed_mps[0] > 0.0
+
+
+def test_the_curve_of_a_train_that_stands_is_read_in_either_direction() -> None:
+    standing = BrakingCurve(np.zeros(9), np.zeros(9), np.full(9, 0.5), np.zeros(9))
+    for direction in ("up", DOWN):
+        line = codecs.Line(direction=direction)
+        read = topics.BRAKING_CURVE.read(placed(messages.curve_message(5, standing, 700.0), line), line)
+        assert (read.position_m, read.sign) == (700.0, 1)
+        assert topics.BRAKING_CURVE.read(placed(messages.curve_message(5, standing, 700.0), line)).sign == line.sign
 
 
 def test_a_chainage_that_falls_unannounced_is_an_error_with_the_remedy(make_line: MakeLine) -> None:

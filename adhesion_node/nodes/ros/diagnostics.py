@@ -17,7 +17,6 @@ from adhesion_node.wire.settings import Telling
 from adhesion_node.wire.topics import DIAGNOSTICS, Topic
 
 from . import qos
-from .qos_events import Tell
 from .types import new
 
 JUMP_NS = 60_000_000_000
@@ -38,7 +37,7 @@ Told = tuple[list[Finding], dict[str, str]]
 class Diagnostics:
     """Speaks in /diagnostics of `part` of a node: by `tell`, and by a steady timer, so that no entry grows stale.
 
-    The stamps are the node's clock. `published` counts the messages; `hear` hears of the events of DDS.
+    The stamps are the node's clock. `published` counts the messages.
     """
 
     def __init__(
@@ -48,12 +47,11 @@ class Diagnostics:
         telling: Telling,
         told: Callable[[], Told],
         published: Counter[Topic],
-        hear: Tell | None = None,
     ) -> None:
         self.name = f"{node.get_fully_qualified_name().lstrip('/')}/{part}"
         self.hardware_id = telling.hardware_id or node.get_namespace().strip("/") or TRAIN
         self._node, self._told, self._published, self._stamp_ns = node, told, published, 0
-        self._output = qos.advertise(node, DIAGNOSTICS, tell=hear)
+        self._output = qos.advertise(node, DIAGNOSTICS)
         node.create_timer(telling.diagnostics_period_s, self.tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
     def tell(self) -> None:

@@ -69,7 +69,7 @@ class Intake:
     def change(self, line: Line, timeout_s: float) -> None:
         """Read and wait from now on with what has changed."""
         self._reader.line = line
-        self._silence.wait(timeout_s)
+        self._silence.change(timeout_s)
 
     def note(self, reason: str, text: str) -> None:
         """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of a reason is told at once."""

@@ -34,10 +34,13 @@ class Silence:
         self._heard_ns = 0
         self._timer = node.create_timer(self._period_s, self._on_tick, clock=Clock(clock_type=ClockType.STEADY_TIME))
 
-    def wait(self, timeout_s: float | None = None) -> None:
-        """Begin to wait, so long from now on if it is said."""
-        self._timeout_s = timeout_s or self._timeout_s
+    def wait(self) -> None:
+        """Begin to wait anew."""
         self.ever_heard, self.for_s, self._ticks = False, None, 0
+
+    def change(self, timeout_s: float) -> None:
+        """Wait so long from now on."""
+        self._timeout_s, self._ticks = timeout_s, 0
         self._timer.timer_period_ns = round(self._period_s * 1e9)
 
     @property
