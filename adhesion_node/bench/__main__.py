@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from ..command.options import DONE, help_texts, json_option, report, run_tool
-from . import gaussian, particle, step
+from . import against, gaussian, growth, particle, recording, step
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
 
@@ -22,6 +22,7 @@ PEERS = ("filterpy", "particles", "threadpoolctl")
 
 PARTICLE_STEPS, PARTICLES = 100, 200
 GAUSSIAN_STEPS = 50
+GROWTH_ROUNDS, AGAINST_ROUNDS = 3, 5
 
 Options = argparse.Namespace
 Section = Mapping[str, Any]
@@ -38,7 +39,8 @@ def _gaussian(options: Options) -> Section:
 
 
 def _step(options: Options) -> Section:
-    rows = [step.latency(rate_hz, options.journeys, options.seed) for rate_hz in (10.0, 100.0)]
+    ways = [(rate_hz, estimate_s) for estimate_s in (step.CONFIG.estimate_s, 0.0) for rate_hz in (10.0, 100.0)]
+    rows = [step.latency(rate_hz, options.journeys, options.seed, estimate_s) for rate_hz, estimate_s in ways]
     return {"settings": {"window": step.CONFIG.window, "step": step.CONFIG.step}, "rows": rows}
 
 
@@ -53,12 +55,28 @@ def _trains(options: Options) -> Section:
     return {"settings": {"rate_hz": 10.0, "seconds": options.seconds}, "rows": rows}
 
 
+def _recording(options: Options) -> Section:
+    return {"settings": {"rate_hz": 10.0}, "rows": [recording.replay(options.hours, 10.0, options.seed)]}
+
+
+def _growth(options: Options) -> Section:
+    return {"settings": {"rounds": GROWTH_ROUNDS}, "rows": growth.compare(GROWTH_ROUNDS, options.seed)}
+
+
+def _against(options: Options) -> Section:
+    rows = against.compare(options.against, AGAINST_ROUNDS, 10.0, options.seed)
+    return {"settings": {"rate_hz": 10.0}, "rows": rows}
+
+
 BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], str]] = {
     "particle": (_particle, PEERS[1:], "particle E and M step of one window"),
     "gaussian": (_gaussian, (PEERS[0], PEERS[2]), "Gaussian update of one window, EM converged"),
     "step": (_step, (), "a sample through the estimator in steady braking"),
     "memory": (_memory, (), "resident memory over a long journey"),
     "trains": (_trains, ("rclpy",), "braking trains in one process, an estimator each on one executor, through DDS"),
+    "recording": (_recording, (), "a recording through the offline replay"),
+    "growth": (_growth, (), "how the cost grows"),
+    "against": (_against, (), "the default method beside that of another revision, under the brake"),
 }
 """What runs it, the peers it needs, and its title."""
 
@@ -66,7 +84,12 @@ BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], st
 def main(args: Sequence[str] | None = None) -> int:
     """Run the benchmarks and print their tables."""
     texts = help_texts(
-        PURPOSE, "bench", "bench particle gaussian --rounds 20", "bench step memory --json -", "bench trains"
+        PURPOSE,
+        "bench",
+        "bench particle gaussian --rounds 20",
+        "bench step memory --json -",
+        "bench trains",
+        "bench --against HEAD~10",
     )
     parser = argparse.ArgumentParser("bench", parents=[json_option()], **texts)
     add = parser.add_argument
@@ -76,13 +99,17 @@ def main(args: Sequence[str] | None = None) -> int:
     add("--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)")
     add("--trains", type=int, default=20, help="in one process (default %(default)s)")
     add("--seconds", type=float, default=20.0, help="of them on their way (default %(default)s)")
+    add("--hours", type=float, default=0.5, help="of the recording that is replayed (default %(default)s)")
+    add("--against", metavar="REV", help="a revision of this clone, for the benchmark against, which is then run, too")
     add("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
     return run_tool(parser, _run, args)
 
 
 def _run(options: Options) -> int:
     _check(options)
-    names = options.names or list(BENCHMARKS)
+    names = options.names or [name for name in BENCHMARKS if name != "against"]
+    if options.against and "against" not in names:
+        names = [*names, "against"] if options.names else ["against"]
     missing = sorted({peer for name in names for peer in BENCHMARKS[name][1] if find_spec(peer) is None})
     if missing:
         raise ValueError(f"{', '.join(missing)} not installed: pip install '.[ros,bench]'")
@@ -99,7 +126,9 @@ def _check(options: Options) -> None:
     for name in options.names:
         if name not in BENCHMARKS:
             raise ValueError(f"benchmark {name!r}: choose of {', '.join(BENCHMARKS)}")
-    for name in ("rounds", "journeys", "minutes", "trains", "seconds"):
+    if "against" in options.names and not options.against:
+        raise ValueError("benchmark against: name the revision, --against REV")
+    for name in ("rounds", "journeys", "minutes", "trains", "seconds", "hours"):
         value = getattr(options, name)
         if not value > 0 or value == float("inf"):
             raise ValueError(f"{name} = {value}: give a number above 0")

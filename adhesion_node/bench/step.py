@@ -27,23 +27,28 @@ FILLED_SHARE = 0.2
 """Part of a long run after which everything that is to be allocated has been."""
 
 
-def latency(rate_hz: float, rounds: int, seed: int) -> dict[str, Any]:
+def latency(rate_hz: float, rounds: int, seed: int, estimate_s: float = CONFIG.estimate_s) -> dict[str, Any]:
     """What a sample takes in steady braking, and how many of them a second of CPU would bear."""
+    config = replace(CONFIG, estimate_s=estimate_s)
     journeys = (journey(rate_hz, np.random.default_rng([seed, turn])) for turn in range(rounds))
-    wall, cpu = zip(*(took for samples in journeys for took in _in_steady_braking(samples)), strict=True)
+    wall, cpu = zip(*(took for samples in journeys for took in _in_steady_braking(config, samples)), strict=True)
     per_second = 1.0 / float(np.mean(cpu))
     return {
         "rate_hz": rate_hz,
+        "estimate_s": estimate_s,
         **figures(wall),
         "cpu_p99_ms": figures(cpu)["p99_ms"],
         "samples_per_cpu_second": per_second,
         "headroom": per_second / rate_hz,
+        "core_percent": 100.0 * rate_hz / per_second,
     }
 
 
-def _in_steady_braking(samples: Iterable[tuple[PressureSample, PositionSample]]) -> list[tuple[float, float]]:
+def _in_steady_braking(
+    config: Config, samples: Iterable[tuple[PressureSample, PositionSample]]
+) -> list[tuple[float, float]]:
     """Seconds by the clock and of the processor for each sample of the first braking, from `STEADY_S` on to its end."""
-    pipeline, steady_ns, took = Pipeline(CONFIG, seed=1), None, list[tuple[float, float]]()
+    pipeline, steady_ns, took = Pipeline(config, seed=1), None, list[tuple[float, float]]()
     for pressure, position in samples:
         braked = pressure.pressure_pa > 0.0
         if braked and steady_ns is None:

@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
+from pathlib import Path
 from typing import Any
 from unittest import mock
 
@@ -18,9 +19,12 @@ import pytest
 from oracles import Linear, make_window, rts
 
 from adhesion_node.bench import __main__ as bench
-from adhesion_node.bench import gaussian, particle, scene, step, trains
+from adhesion_node.bench import against, gaussian, growth, particle, recording, scene, step, trains
 from adhesion_node.bench.timing import Contender, figures, interleave
 from adhesion_node.core.belief.gaussian import Gaussian
+
+BRAKED = json.dumps([(k * 10**8, 5.0 * k, 0.25, 410e3 if k > 9 else 0.0) for k in range(100)])
+"""Stamps, positions, their variance and brake pressures of 10 s, 9 of them braked."""
 
 
 @pytest.fixture
@@ -138,6 +142,7 @@ def test_latency_is_that_of_steady_braking() -> None:
     row = step.latency(10.0, rounds=1, seed=1)
     assert 300 < row["calls"] < 600
     assert row["headroom"] == pytest.approx(row["samples_per_cpu_second"] / 10.0)
+    assert row["core_percent"] == pytest.approx(100.0 / row["headroom"])
     assert row["cpu_p99_ms"] > 0.0
     assert 0.0 < row["median_ms"] <= row["p99_ms"] <= row["max_ms"]
 
@@ -148,6 +153,47 @@ def test_memory_is_read_while_the_estimator_runs() -> None:
     assert row["windows"] >= 8
     assert row["growth_mb"] == pytest.approx(row["end_mb"] - row["filled_mb"])
     assert row["end_mb"] > 10.0
+
+
+def test_a_recording_is_replayed_whole() -> None:
+    row = recording.replay(0.02, 10.0, seed=1)
+    assert row["positions"] == 720
+    assert row["cpu_seconds_per_10h"] == pytest.approx(500.0 * row["cpu_seconds"])
+    assert 0.0 < row["of_it_reading"] < 1.0
+
+
+def test_what_grows_has_an_exponent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "SECONDS", 3.0)
+    monkeypatch.setattr(growth, "SIZES", {"trains": (1, 4), "hypotheses": (20, 40), "rate_hz": (5, 20)})
+    rows = growth.compare(1, seed=1)
+    assert [(row["grows"], row["size"]) for row in rows][:3] == [("trains", 1), ("trains", 4), ("hypotheses", 20)]
+    ms = {row["size"]: row["ms"] for row in rows if row["grows"] == "trains"}
+    assert rows[0]["exponent"] == pytest.approx(math.log(ms[4] / ms[1]) / math.log(4.0))
+
+
+OTHER = """
+from typing import NamedTuple
+class Config: pass
+class Measurement(NamedTuple):
+    t_ns: int; position_m: float; variance_m2: float; brake_pressure_pa: float
+def init(config, seed): return 0
+def step(config, state, measurement): return state + 1, state % 2 or None
+"""
+"""An estimator of another tree: an estimate at every other measurement."""
+
+
+def test_another_revision_follows_the_same_measurements(tmp_path: Path) -> None:
+    _, braked, estimates = against._followed(str(against.ROOT), BRAKED)
+    assert braked == 90
+    assert 17 <= estimates <= 19
+    package = tmp_path / "adhesion_node"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    (package / "core.py").write_text(OTHER)
+    assert against._followed(str(tmp_path), BRAKED)[1:] == [90, 45]
+    (package / "core.py").write_text("raise ImportError('of long ago')")
+    with pytest.raises(ValueError, match=r"does not run here: .*of long ago"):
+        against._followed(str(tmp_path), BRAKED)
 
 
 def test_resident_memory_grows_with_what_is_held() -> None:
@@ -173,7 +219,8 @@ def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str]) -> 
     assert bench.main([*options, "--json", "-"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert set(result) == {"versions", "seed", "step", "memory"}
-    assert [row["rate_hz"] for row in result["step"]["rows"]] == [10.0, 100.0]
+    ways = [(row["rate_hz"], row["estimate_s"]) for row in result["step"]["rows"]]
+    assert ways == [(10.0, 0.5), (100.0, 0.5), (10.0, 0.0), (100.0, 0.0)]
     assert result["versions"]["numpy"] == np.__version__
     assert bench.main(["memory", "--minutes", "0.2"]) == 0
     shown = capsys.readouterr().out
@@ -186,6 +233,9 @@ def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str]) -> 
     ("args", "said"),
     [
         (["speed"], "choose of particle, gaussian, step, memory, trains"),
+        (["against"], "name the revision, --against REV"),
+        (["--against", "no-such-revision"], "give a revision, and run bench in a clone"),
+        (["recording", "--hours", "0"], "hours = 0"),
         (["--rounds", "0"], "rounds = 0"),
         (["memory", "--minutes", "inf"], "minutes = inf"),
         (["--seed", "-1"], "seed = -1"),

@@ -1,0 +1,98 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The default method beside that of another revision, which is checked out for the time of the measurement.
+
+Both follow the same measurements, in turns, each in a process of its own, through the public `init` and `step`.
+"""
+
+import json
+import math
+import os
+import subprocess
+import sys
+import tarfile
+from collections.abc import Sequence
+from io import BytesIO
+from itertools import islice
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from ..command.options import progress
+from .scene import SIGMA_M, journey
+
+ROOT = Path(__file__).resolve().parents[2]
+
+SECONDS = 120.0
+"""Of a journey that cruises for 20 s and then brakes."""
+
+FOLLOW = """
+import json, sys, time
+from adhesion_node.core import Config, Measurement, init, step
+config = Config()
+rows = [Measurement(t_ns, place, variance, pressure) for t_ns, place, variance, pressure in json.load(sys.stdin)]
+for _ in range(2):  # once to warm up
+    state, took, estimates = init(config, 1), 0.0, 0
+    for row in rows:
+        started = time.process_time()
+        state, estimate = step(config, state, row)
+        if row.brake_pressure_pa:
+            took += time.process_time() - started
+            estimates += estimate is not None
+print(json.dumps([1e3 * took, sum(row.brake_pressure_pa > 0.0 for row in rows), estimates]))
+"""
+"""Processor time, ms, of the measurements under the brake, their number, and that of the estimates."""
+
+
+def compare(revision: str, rounds: int, rate_hz: float, seed: int) -> list[dict[str, Any]]:
+    """Rows of the table: this tree and the revision. Raises ValueError where that is not to be had."""
+    samples = list(islice(journey(rate_hz, np.random.default_rng(seed)), round(SECONDS * rate_hz)))
+    given = json.dumps([(at.t_ns, at.position_m, SIGMA_M**2, braked.pressure_pa) for braked, at in samples])
+    with TemporaryDirectory(prefix="adhesion_bench_") as folder:
+        _check_out(revision, folder)
+        trees = {"this tree": str(ROOT), revision: folder}
+        found: dict[str, list[Sequence[float]]] = {name: [] for name in trees}
+        for _ in progress(range(rounds), "rounds", rounds):
+            for name, tree in trees.items():
+                found[name].append(_followed(tree, given))
+    medians = {name: np.median(rows, axis=0) for name, rows in found.items()}
+    ours = medians["this tree"][0]
+    return [
+        {
+            "revision": name,
+            "rounds": rounds,
+            "ms_per_measurement": float(took / measurements),
+            "ms_per_estimate": float(took / estimates) if estimates else math.nan,
+            "estimates": int(estimates),
+            "ratio": float(took / ours),
+        }
+        for name, (took, measurements, estimates) in medians.items()
+    ]
+
+
+def _check_out(revision: str, folder: str) -> None:
+    packed = subprocess.run(["git", "-C", str(ROOT), "archive", revision], capture_output=True, check=False)
+    if packed.returncode:
+        why = packed.stderr.decode().strip().splitlines()[-1]
+        raise ValueError(f"against = {revision!r}: {why}; give a revision, and run bench in a clone")
+    with tarfile.open(fileobj=BytesIO(packed.stdout)) as archive:
+        archive.extractall(folder, filter="data")
+
+
+def _followed(tree: str, given: str) -> Sequence[float]:
+    one_thread = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    run = subprocess.run(
+        [sys.executable, "-c", FOLLOW],
+        input=given,
+        cwd=tree,  # of `python -c` it is the first place that modules are looked for
+        env={**os.environ, **one_thread, "PYTHONPATH": tree},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if run.returncode:
+        raise ValueError(f"against: {tree} does not run here: {run.stderr.strip().splitlines()[-1]}")
+    result: Sequence[float] = json.loads(run.stdout)
+    return result
