@@ -17,9 +17,9 @@ from .metadata import LATEST_NS
 HEAD = Struct("<BQ")
 """Opcode and length of a record."""
 
-MAX_CHUNK_BYTES = 64 * 2**20
+MAX_CHUNK_BYTES = 32 * 2**20
 """Length of a chunk when decompressed. Writers end theirs at 64 kB to 4 MB, or with one longer message; a few bytes
-can stand for any number of them."""
+can stand for any number of them. Of the shortest messages so many make some 400 MB of objects."""
 
 
 def unpack(opcode: int, body: bytes) -> list[McapRecord]:
