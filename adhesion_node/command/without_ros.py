@@ -8,6 +8,7 @@ import sys
 from abc import ABCMeta
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from types import ModuleType
@@ -52,7 +53,8 @@ class _Finder(MetaPathFinder, Loader):
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         module = ModuleType(spec.name)
-        module.__dict__["__getattr__"] = lambda name: getattr(StandIn, name)
+        # each name is a class of its own, as a class may inherit from several
+        module.__dict__["__getattr__"] = cache(lambda name: _Anything(name, (StandIn,), {}))
         return module
 
     def exec_module(self, module: ModuleType) -> None:
