@@ -21,7 +21,7 @@ PIPE_PA, RUNS_MPS2, RUNS_MPS = 2.5e5, 0.05, 5.0
 MANY = 0.2
 """A part of all that is more than a fault now and then."""
 
-KNOWN_PART, KNOWN_MU = 0.5, 1.25 * Config().lowest_mu
+KNOWN_PART, KNOWN_MU = 0.4, 1.25 * Config().lowest_mu
 """A bound that is no more than this part of the adhesion, or this, says nothing but what was believed before."""
 
 

@@ -3,7 +3,9 @@
 """`study NAME`: reproduces the figures of the papers."""
 
 import argparse
+import sys
 from collections.abc import Sequence
+from pathlib import Path
 
 from ..command.options import DONE, help_texts, json_option, report, run_tool
 from .bound import study as bound
@@ -43,7 +45,7 @@ STUDIES = {
     "intervention": (
         intervention,
         "where the ATP monitor brakes by the identified adhesion and by fixed values",
-        "--json table.json --figure limits.png",
+        "--json table.json --figures figures",
     ),
     "creep": (
         creep,
@@ -67,9 +69,19 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
-    """Report the rows and the text that the study gives."""
+    """Report the rows and the text that the study gives, and say which figures it has drawn."""
+    folder: Path | None = getattr(options, "figures", None)
+    before = _written(folder)
     report(options.json, *options.run(options))
+    for path, when in sorted(_written(folder).items()):
+        if before.get(path) != when:
+            print(f"written: {path}", file=sys.stderr)
     return DONE
+
+
+def _written(folder: Path | None) -> dict[Path, int]:
+    """When the files of a folder were written; none where there is no folder."""
+    return {} if folder is None else {path: path.stat().st_mtime_ns for path in folder.glob("*") if path.is_file()}
 
 
 if __name__ == "__main__":

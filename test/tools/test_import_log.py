@@ -82,6 +82,8 @@ def test_however_it_is_written_a_log_is_read_and_how_is_said(
         ("%m/%d/%Y %H:%M:%S", [], 1_732_176_903 * S),
         ("%Y-%m-%dT%H:%M:%S.%fZ", ["--time-zone", "Europe/Berlin"], 1_732_176_903 * S),
         ("%Y-%m-%d %H:%M:%S", [], 1_732_176_903 * S),
+        ("%m/%d/%Y %I:%M:%S %p", [], 1_732_176_903 * S),
+        ("%m/%d/%Y %I:%M:%S.%f %p", [], 1_732_176_903 * S),
         ("%Hh%Mm%S %d-%b-%Y", ["--time-format", "%Hh%Mm%S %d-%b-%Y"], 1_732_176_903 * S),
     ],
 )
@@ -97,6 +99,46 @@ def test_times_since_1970_tell_their_unit(importing: Import, unit: str, per_s: i
     begin = 1_732_176_903
     assert importing(f"time,speed\n{begin * per_s},1\n{(begin + 1) * per_s},1\n") == 0
     assert [SPEED.read(message).t_ns for message in importing.messages("speed")] == [begin * S, (begin + 1) * S]
+
+
+def test_a_time_that_is_written_in_no_known_way_is_told_with_the_option(importing: Import) -> None:
+    log = "time,speed\n8:15:03 o'clock,1\n8:15:04 o'clock,1\n"
+    assert importing(log) == 2
+    assert "say how with --time-format" in importing.errors[0]
+    assert importing(log, "--time-format", "%H:%M:%S o'clock") == 0
+
+
+def test_the_days_of_a_spreadsheet(importing: Import) -> None:
+    rows = ride()
+    log = text(rows.assign(time=45617.34378472 + rows.time / 86400.0))
+    assert importing(log) == 1
+    assert "are the times in days? --time-unit excel" in importing.errors[0]
+    importing.output = importing.output.with_name("cured")
+    assert importing(log, "--time-unit", "excel") == 0
+    first, *_, last = (sample.t_ns for sample in importing.positions())
+    assert first == pytest.approx(1_732_176_903 * S, abs=S / 100)
+    assert last - first == pytest.approx(59.9 * S, abs=S / 100)
+
+
+def test_a_clock_of_whole_seconds_is_told(importing: Import) -> None:
+    rows = ride()
+    assert importing(text(rows.assign(time=rows.time.astype(int)))) == 1
+    assert importing.errors[0].endswith("rows share a time: log it with the fraction of the second")
+    assert importing.summary["written"] == 60
+
+
+def test_a_decimal_comma_that_is_the_delimiter_too_is_told(importing: Import) -> None:
+    assert importing("time,speed\n1,5,20,5\n") == 2
+    assert "or is it the decimal sign, too? Then export with ';'" in importing.errors[0]
+
+
+def test_all_that_is_odd_is_told_at_once(importing: Import) -> None:
+    rows = ride()
+    wrong = rows.assign(brake_pressure=rows.brake_pressure / 1e5, position=(120_000.0 - rows.position) / 1e3)
+    assert importing(text(wrong.assign(speed=3.6 * rows.speed))) == 1
+    told = " ".join(importing.summary["odd"])
+    assert all(cure in told for cure in ("--pressure-unit bar", "--direction down", "--position-unit km"))
+    assert "--speed-unit kmh" in told
 
 
 def test_the_clock_goes_on_after_midnight(importing: Import) -> None:

@@ -40,6 +40,8 @@ EARLIER = {"sbi": "SBI", "warning": "W", "permitted": "P", "indication": "I"}
 SLIPPERY_MPS2 = 0.7
 """Default of A_NVMAXREDADH2 and 3, the largest deceleration on rail declared slippery (SUBSET-026-3, A.3.2)."""
 
+PICTURE = "supervision.png"
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study intervention`."""
@@ -50,7 +52,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--kwet", type=float, default=0.8, help="K_wet_rst, a datum of each train; 0.8 is an example (default: 0.8)"
     )
     parser.add_argument("--seed", type=int, default=1, help="seed of the particle filter (default: 1)")
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw the limits at 200 km/h of tunnel_entry")
+    drawn = f"draw the limits at 200 km/h of tunnel_entry, {PICTURE}, into DIR"
+    parser.add_argument("--figures", type=Path, metavar="DIR", help=drawn)
 
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
@@ -61,8 +64,9 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     for scenario in BRAKINGS:
         said = predictions(options.bags / scenario, options.seed)
         table += rows(scenario, said, options.kwet)
-        if scenario == "tunnel_entry" and options.figure is not None:
-            _draw(said, options.figure)
+        if scenario == "tunnel_entry" and options.figures is not None:
+            options.figures.mkdir(parents=True, exist_ok=True)
+            _draw(said, options.figures / PICTURE)
     return table, "\n".join(lines(table))
 
 
@@ -72,7 +76,7 @@ def _draw(said: list[Prediction], path: Path) -> None:
 
     last = _last(said, 200.0 * KMH)
     if last is None or last.safe is None:
-        raise ValueError(f"figure = {path}: there is no braking curve at 200 km/h to draw")
+        raise ValueError(f"figures = {path.parent}: there is no braking curve at 200 km/h to draw")
     fixed = braking.curve(CRH3, last.estimate.speed_mps, WORST)
     title = f"Supervision limits by the lower bound of adhesion {last.estimate.mu_lower:.4f}"
     draw(SupervisionConfig(), last.safe, fixed, title, path)

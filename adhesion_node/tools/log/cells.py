@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import Array
-from .format import TIME_UNITS, Format
+from .format import EXCEL_1970, TIME_UNITS, Format
 
 NO_TIME = -1
 """Stands for a cell that is no time, and for one before 1970."""
@@ -26,6 +26,7 @@ FORMATS = (
     "ISO8601",
     *("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f"),
     *("%d-%m-%Y %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y%m%d %H:%M:%S.%f", CLOCK),
+    *("%m/%d/%Y %I:%M:%S.%f %p", "%d/%m/%Y %I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
 )
 """Formats of dates that are tried, in this order; a fraction of the second may be missing, its sign be a comma."""
 
@@ -65,22 +66,20 @@ def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype
     if pd.api.types.is_datetime64_any_dtype(cells):
         return _stamps(cells)
     if form.time_format is None:
-        unit, texts = TIME_UNITS[form.time_unit or "s"], map(str, cells)
-        sign = form.decimal or "."
-        return np.array([_count(text.replace(sign, "."), unit) for text in texts], dtype=np.int64)
+        unit, sign = form.time_unit or "s", form.decimal or "."
+        return np.array([_count(text.replace(sign, "."), unit) for text in map(str, cells)], dtype=np.int64)
     return _stamps(_parsed(cells.astype(str), form.time_format))
 
 
 def time_format(cells: Iterable[str]) -> str | None:
-    """Return the one of `FORMATS` that most cells have, the first of equals; None where they are numbers.
+    """Return the one of `FORMATS` that most cells have, the first of equals; None where none has a colon.
 
     >>> time_format(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_format(["0.1", "0.2"])
     ('%d.%m.%Y %H:%M:%S.%f', None)
     """
     text = pd.Series([cell for cell in cells if ":" in cell], dtype=object).astype(str)
     counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS}
-    best = max(FORMATS, key=lambda form: counts[form])
-    return best if counts[best] else None
+    return max(FORMATS, key=lambda form: counts[form]) if len(text) else None
 
 
 def time_unit(cells: Iterable[str], decimal: str) -> str:
@@ -108,7 +107,7 @@ def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
     if form in FORMATS:
         text = text.str.replace(",", ".", regex=False)
     if form in FORMATS[1:]:
-        text = text.where(text.str.contains(r":[0-9]+\.[0-9]+$"), text + ".0")
+        text = text.str.replace(r"^(.*:[0-9]+)(?=$| *[AaPp][Mm]$)", r"\g<1>.0", regex=True)
     if is_clock(form):
         form, text = f"%Y-%m-%d {form}", "1970-01-01 " + text
     return pd.to_datetime(text, format=form, errors="coerce", utc=True)
@@ -122,10 +121,10 @@ def _stamps(read: "pd.Series[Any]") -> "np.ndarray[Any, np.dtype[np.int64]]":
     return np.where(inside, index.where(inside, _EPOCH).as_unit("ns").asi8, NO_TIME)
 
 
-def _count(text: str, unit_ns: int) -> int:
+def _count(text: str, unit: str) -> int:
     """A number of units, exactly; digits beyond the nanosecond are rounded."""
     try:
-        value = Decimal(text) * unit_ns
+        value = (Decimal(text) - (EXCEL_1970 if unit == "excel" else 0)) * TIME_UNITS[unit]
     except ArithmeticError:
         return NO_TIME
     # Python also reads 1_000 as a number; in a log it is a misprint.

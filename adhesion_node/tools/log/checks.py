@@ -80,23 +80,20 @@ class Motion(NamedTuple):
 def odd(log: Log) -> list[str]:
     """Say what is odd, with the cure."""
     t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
-    texts = [*_rows_too_far(t_s, log.form), *_pressures(log)]
-    if texts or t_s[-1] < LEAST_S:
-        return texts
+    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_pressures(log)]
+    if of_time or t_s[-1] < LEAST_S:
+        return of_time + texts
     motion = _motion(log, t_s)
-    if motion.is_compared:
-        texts += _speed_against_positions(motion, log.form)
-    else:
-        texts += _slow_or_falling(motion)
-    texts += [] if texts else [*_too_fast(motion, log.form), *_hard(motion)]
-    return [*texts, *_pipe(motion), *_clock(log, t_s)]
+    of_way = [*(_speed_against_positions(motion, log.form) if motion.is_compared else _slow_or_falling(motion))]
+    of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion)]
+    return [*texts, *of_way, *_pipe(motion), *_clock(log, t_s)]
 
 
 def _rows_too_far(t_s: Array, form: Format) -> Iterator[str]:
     step_s = float(np.median(np.diff(t_s))) if len(t_s) > 2 else 1.0
     if form.time_unit in TIME_UNITS and not FASTEST_ROWS_S < step_s < SLOWEST_ROWS_S:
-        other = "ms" if step_s > 1.0 else "s"
-        yield f"a row every {step_s:g} s: are the times in {other}? --time-unit {other}"
+        other, cure = ("ms", "ms") if step_s > 1.0 else ("s", "s") if form.time_unit != "s" else ("days", "excel")
+        yield f"a row every {step_s:.3g} s: are the times in {other}? --time-unit {cure}"
 
 
 def _pressures(log: Log) -> Iterator[str]:
@@ -107,7 +104,8 @@ def _pressures(log: Log) -> Iterator[str]:
         least, most = gauge.min(), gauge.max()
         if 0.1 < most < 3000.0:
             unit = "bar" if most < 15.0 else "kpa"
-            yield f"{name} is {most:g} Pa at most: is it in {unit}? --pressure-unit {unit}"
+            percent = "" if most != 100.0 else "; per cent of a full brake are not read, give its pressure"
+            yield f"{name} is {most:g} Pa at most: is it in {unit}? --pressure-unit {unit}{percent}"
         elif 80e3 < least < 108e3:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
 

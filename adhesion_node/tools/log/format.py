@@ -19,8 +19,11 @@ from ...core.intake.samples import (
 from ...core.physics.train import CRH3, KMH
 from ...wire.codecs import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MAX_WHEEL_RADPS, MIN_ABSOLUTE_PA, Line
 
-TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1}
-"""In ns; besides there is `iso`, a date."""
+TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "excel": 86_400 * 10**9}
+"""In ns; besides there is `iso`, a date. `excel`: days, those of 1970 from 25569 on."""
+
+EXCEL_1970 = 25_569
+"""The day of a spreadsheet on which the epoch begins."""
 
 POSITION_UNITS = {"m": 1.0, "km": 1e3}
 PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5}

@@ -152,16 +152,21 @@ def _columns(header: Sequence[str], source: str, form: Format) -> Columns:
     needed = {name: option(ours) for ours, name in names.items() if ours in form.named or ours == "time"}
     for name, how in (needed | dict.fromkeys(form.axles, "--wheel-speeds")).items():
         if name not in header:
-            raise ValueError(f"{source}: column {name!r} is missing: it has {list(header)}; name one with {how} COL")
+            raise ValueError(f"{source}: column {name!r} is missing: it has {_listed(header)}; name one with {how} COL")
     used = {ours: name for ours, name in names.items() if name in header}
     if len({"lat", "lon"} & set(used)) == 1:
         used = {ours: name for ours, name in used.items() if ours not in ("lat", "lon")}
     if not any(set(group) <= set(used) for group in PLACES):
         remedy = "name one with --position COL, or --lat COL and --lon COL, or --speed COL"
-        raise ValueError(f"{source}: columns {list(header)}: has neither position, lat and lon, nor speed: {remedy}")
+        raise ValueError(f"{source}: columns {_listed(header)}: has neither position, lat and lon, nor speed: {remedy}")
     if {"brake_pipe", "brake_demand"} <= set(used):
         raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")
     return Columns(used, axles)
+
+
+def _listed(header: Sequence[str]) -> str:
+    text = str(list(header))
+    return text if len(text) <= 400 else f"{text[:400]}..."
 
 
 def _parquet(path: Path) -> pd.DataFrame:

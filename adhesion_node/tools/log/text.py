@@ -94,7 +94,8 @@ def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple
             at.append(line)
             rows.append(cells)
         elif text.strip():
-            why = f"{len(cells)} cells under {len(names)} columns: quote a cell that holds {delimiter!r}"
+            too = ", or is it the decimal sign, too? Then export with ';'" if delimiter == "," else ""
+            why = f"{len(cells)} cells under {len(names)} columns: quote a cell that holds {delimiter!r}{too}"
             refused.append(Refusal(line, "cell_count", f"{path}:{line}: row = {_shown(text)}: {why}"))
     return Block(pd.DataFrame(rows, index=at, columns=list(names), dtype=object), refused)
 

@@ -86,8 +86,10 @@ def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal
     t_ns = rows["t_ns"].to_numpy()
     reached = np.maximum.accumulate(t_ns)
     late = np.append(False, t_ns[1:] <= reached[:-1]) if len(t_ns) else np.zeros(0, dtype=bool)
-    falls = np.count_nonzero(np.diff(t_ns) < 0)
-    cure = SET_BACK if 0 < falls < 3 and late.sum() > 10 * falls else "drop repeated rows, or sort the log: --sort"
+    falls = int(np.count_nonzero(np.diff(t_ns) < 0))
+    cure = "drop repeated rows, or sort the log: --sort"
+    if falls < 3 and late.sum() > 10 * max(falls, 1):
+        cure = SET_BACK if falls else "rows share a time: log it with the fraction of the second"
     refused = [
         Refusal(
             line := int(rows.index[i]),

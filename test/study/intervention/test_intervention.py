@@ -77,15 +77,17 @@ def test_the_command_prints_the_table_and_writes_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(intervention, "predictions", lambda bag, seed: SAID)
-    options = ["--json", str(tmp_path / "table.json"), "--figure", str(tmp_path / "limits.png")]
+    options = ["--json", str(tmp_path / "table.json"), "--figures", str(tmp_path / "figures")]
     assert main(["intervention", *options]) == 0
     table = json.loads((tmp_path / "table.json").read_text())
     assert len(table) == 2 * 4 * 6
     for row in table:
         if row["ebi_m"] is not None:
             assert row["ebi_m"] < row["sbi_m"] < row["warning_m"] < row["permitted_m"] < row["indication_m"]
-    assert imread(tmp_path / "limits.png").shape[:2] == (800, 1440)
-    printed = capsys.readouterr().out.splitlines()
+    assert imread(tmp_path / "figures" / "supervision.png").shape[:2] == (800, 1440)
+    out, err = capsys.readouterr()
+    printed = out.splitlines()
+    assert f"written: {tmp_path / 'figures' / 'supervision.png'}" in err.splitlines()
     assert len(printed) == 2 * (2 + 4)
     assert printed[2].split()[3] == "no"  # curve
     # 280 km/h and 0.3 m/s: T_bs = 2 s, T_warning = 2 s, T_driver = 4 s, T_indication = 9 s
@@ -96,7 +98,7 @@ def test_without_a_curve_there_is_no_figure(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(intervention, "predictions", lambda bag, seed: SAID[:1])
-    assert main(["intervention", "--figure", str(tmp_path / "limits.png")]) == 2
+    assert main(["intervention", "--figures", str(tmp_path)]) == 2
     assert "there is no braking curve at 200 km/h" in capsys.readouterr().err
 
 
