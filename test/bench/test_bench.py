@@ -207,8 +207,8 @@ def test_trains_of_one_process_are_all_served(kind: str, monkeypatch: pytest.Mon
     monkeypatch.setattr(trains, "WARM_S", 0.5)
     row = trains.share(kind, count=3, rate_hz=10.0, seconds=1.0, seed=1)
     assert (row["executor"], row["trains"]) == (kind, 3)
-    assert row["calls"] + row["unused"] == pytest.approx(30, abs=6)
-    assert row["unused"] <= 6, "what is on its way at the end"
+    assert row["calls"] + row["unused"] == pytest.approx(30, abs=12)
+    assert row["unused"] <= 12, "what is on its way at the end"
     assert 0.0 < row["median_ms"] <= row["p99_ms"]
     assert row["cpu_ms_per_position"] > 0.0
 

@@ -96,14 +96,17 @@ def test_a_played_curve_waits_for_who_comes_late_until_it_is_too_old(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     short = copy(EXPIRING)
-    short.lifespan = Duration(seconds=0.5)
+    short.lifespan = Duration(seconds=1.0)
     with record(tmp_path / "live", BRAKING_CURVE, [short], executor, spin_until) as reader:
         (only,) = reader.messages()
-        with BagWriter(tmp_path / "bag") as writer:  # the same topic with two curves, 2 s apart
+        with BagWriter(tmp_path / "bag") as writer:  # the same topic with two curves, 4 s apart
             writer.add_topic(only.topic, only.type, offered=reader.infos[only.topic].offered)
-            for second in (1, 3):
+            for second in (1, 5):
                 writer.write(only.topic, only.type, only.cdr, second * S)
     heard: dict[str, int] = {"soon": 0, "late": 0}
+    nodes = {name: Node(name, context=context) for name in heard}
+    for node in nodes.values():
+        executor.add_node(node)
     with BagReader(tmp_path / "bag") as played:
         player = Replay(played, select_from(played, [], ["/elsewhere"]), subscribers=0, context=context)
         executor.add_node(player)
@@ -111,14 +114,12 @@ def test_a_played_curve_waits_for_who_comes_late_until_it_is_too_old(
         published_s = time.monotonic()
 
         def join(name: str) -> None:
-            node = Node(name, context=context)
-            executor.add_node(node)
             topic = BRAKING_CURVE._replace(name="elsewhere")
-            subscribe(node, topic, lambda _: heard.update({name: heard[name] + 1}), LATCHED)
+            subscribe(nodes[name], topic, lambda _: heard.update({name: heard[name] + 1}), LATCHED)
 
         join("soon")
         spin_until(executor, lambda: heard["soon"] == 1)
-        spin_until(executor, lambda: time.monotonic() > published_s + 0.7)
+        spin_until(executor, lambda: time.monotonic() > published_s + 1.3)
         assert player.published["/elsewhere"] == 1
         join("late")
         spin_until(executor, lambda: player.finished and heard["soon"] == 2 and heard["late"])

@@ -71,7 +71,7 @@ def test_a_line_whose_simulator_comes_last_plays_from_its_first_second(
         assert abs(times[0] - start_ns) < S
         player = Replay(reader, select_from(reader, []), subscribers=0, context=context)
         executor.add_node(player)
-        spin_until(executor, lambda: player.published["/position"] >= 5, 2.0)
+        spin_until(executor, lambda: player.published["/position"] >= 5)
 
 
 def test_what_waits_for_a_clock_is_bounded(
