@@ -24,7 +24,7 @@ from ..core import (
     WheelSample,
 )
 from ..core.physics.train import Array
-from .pipeline import Pipeline
+from .pipeline import BACK_M, Pipeline
 from .results import COLUMNS, row_of
 
 MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "brake_demand", "acceleration")
@@ -45,7 +45,8 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
 
     The result has `time` as the frame has it, and the columns of `replay --offline --out`; its `attrs` hold
     `measurements`, `accepted`, `dropped` by reason and the `digest`. Raises ValueError naming what is wrong with the
-    frame, the configuration or the seed, and what to do. Warns where many of the measurements were not used.
+    frame, the configuration or the seed, and what to do. Warns where many of the measurements were not used, or where
+    the positions fall along the run.
     """
     config = Config() if config is None else config
     if not isinstance(config, Config):
@@ -65,6 +66,9 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if pipeline.accepted < MOSTLY_USED * pipeline.measurements:
         text = f"{pipeline.accepted} of {pipeline.measurements} positions were used, dropped: {pipeline.dropped}"
         warnings.warn(f"{text}: are units, signs and standard deviations right?", stacklevel=2)
+    if pipeline.back_m > BACK_M:
+        text = "positions fall while the train runs: change their sign, and turn the track"
+        warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
     result.insert(0, "time", _like(result["t_ns"].to_numpy(), frame["time"]))
     result.attrs.update(used)

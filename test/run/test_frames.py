@@ -148,6 +148,12 @@ def test_what_is_no_setting_is_refused_by_name_value_and_remedy(make: Any, messa
         make()
 
 
+def test_positions_that_fall_along_the_run_are_warned_of() -> None:
+    frame = measured()
+    with pytest.warns(UserWarning, match="positions fall while the train runs: change their sign, and turn the track"):
+        estimate(frame.assign(position=-frame["position"]))
+
+
 def test_drops_that_matter_are_warned_of() -> None:
     frame = slipped(position=measured()["position"].where(measured().index % 2 == 0, 5e7))
     with pytest.warns(UserWarning, match="90 of 180 positions were used, dropped: {'INVALID': 90}: are units"):
