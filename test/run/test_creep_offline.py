@@ -125,7 +125,10 @@ def test_with_positions_the_estimator_is_chosen_by_name(tmp_path: Path) -> None:
     ("options", "message"),
     [
         (["--seed", "2"], "seed = 2: the creep identification draws nothing, leave it out"),
-        (["--set", "particles=20"], "setting 'particles=20': write NAME=VALUE with one of frame, sensor_timeout_s,"),
+        (
+            ["--set", "particles=20"],
+            "setting 'particles=20': write NAME=VALUE with one of sensor_timeout_s, use_speed,",
+        ),
         (["--set", "eta_min=2"], "eta_min = 2.0: give a value from 0.5 to 1"),
         (
             ["--estimator", "adhesion", "--topics", "wheel_speed"],
