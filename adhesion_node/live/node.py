@@ -89,6 +89,8 @@ class Live(Node):
         for status in read.entries:
             if "regime" in status.values:  # /diagnostics is shared with everybody
                 self.view.estimated(status.values, status.message, status.level > 0)
+            elif "lambda_m" in status.values:
+                self.view.creep(status.values, status.message, time.monotonic())
 
     def _on_status(self, read: Statuses) -> None:
         for status in read.entries:

@@ -5,12 +5,16 @@
 The parts are replaced as a whole and never changed in place, so that another thread may read them at any time.
 """
 
+import math
 from collections import deque
 from collections.abc import Mapping
 from itertools import islice
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ..core.atp.received import StampedCurve, TrainState
+from ..core.creep.curve import adhesion
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
@@ -40,6 +44,9 @@ SPACING_S, SPACING_M = 0.5, 20.0
 
 CURVE_POINTS, MOST_KEYS = 24, 100
 """Points of a curve, and entries of a status that are looked at."""
+
+CREEP_END = 0.3
+"""Creep up to which the creep curve is drawn."""
 
 COUNTS = ("measurements", "accepted", "windows", "changes", "resets")
 """What is told of the estimator's diagnostics."""
@@ -157,6 +164,25 @@ class View:
             self._mu = {name: value for name, value in self._mu.items() if name == "true_mu"}
             self._awaited = False
 
+    def creep(self, values: Mapping[str, str], message: str, now_s: float) -> None:
+        """The creep estimator's diagnostics: the curve through its peak, withheld or not, at the time `now_s`."""
+        known = numbers(values)
+        if not {"p1", "p2", "mu_max", "lambda_m"} <= known.keys():
+            return
+        theta = np.array([known["p1"], known["p2"]])
+        slope = known["mu_max"] * (theta[0] + 2.0 * math.sqrt(max(theta[1], 0.0)))  # (5) solved
+        creeps = np.linspace(0.0, CREEP_END, CURVE_POINTS)
+        self._parts["creep"] = {
+            "heard": round(now_s, 2),
+            "withheld": values.get("withheld") != "false",
+            "why": text_of(message),
+            "peak": [number(known["lambda_m"], 4), number(known["mu_max"], 4)],
+            "lower": number(known.get("mu_max_lower"), 4),
+            "upper": number(known.get("mu_max_upper"), 4),
+            "x": rounded(creeps, 4),
+            "y": rounded(adhesion(creeps, slope, theta), 4),
+        }
+
     def curve(self, name: str, placed: StampedCurve) -> None:
         """A braking curve, `safe` or `nominal`, which tells in which direction places are met."""
         if placed.sign != self._sign:
@@ -204,7 +230,7 @@ class View:
 
     def _clear(self) -> None:
         """Forget the last run; the adhesions stay, as those of an estimate come before its state."""
-        unknown = dict.fromkeys(("place_m", "train", "adhesion", "estimator", "supervision", "ahead"))
+        unknown = dict.fromkeys(("place_m", "train", "adhesion", "estimator", "supervision", "ahead", "creep"))
         self._parts: dict[str, Any] = {**unknown, "curves": {}, "history": Rows(), "passed": Rows(), "events": Rows()}
         self._run += 1
         self._awaited = False

@@ -67,6 +67,9 @@ TARGET_MPS2 = 0.18
 TARGET_M, STOP_M = 14500.0, 16000.0
 """The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
 
+NEARER_M = {"approach": 6300.0}
+"""Targets of scenarios that brake too late on purpose."""
+
 POLL_S = 0.05
 """Longest time until a signal is seen."""
 
@@ -176,7 +179,7 @@ def _task(options: argparse.Namespace, line: Path) -> Task:
             estimator |= {"track_line": str(line), "track_start_m": centre_line.BEGINS_M}
         return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": 0.0}, estimator)
     target_mps = SCENARIOS[options.scenario].end_speed_mps or 0.0
-    target_m = TARGET_M if target_mps else STOP_M
+    target_m = NEARER_M.get(options.scenario, TARGET_M if target_mps else STOP_M)
     return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": target_mps / KMH})
 
 

@@ -9,7 +9,7 @@ const STATE = "adhesion/state", MU = "adhesion/mu", CURVE = "adhesion/braking_cu
 const LIMITS = { permitted: "permitted", warning: "warning", sbi: "service brake", ebi: "emergency brake" };
 const KIND_OF = { adhesion_limited: "identified", brake_limited: "atleast" };
 const byId = (id) => document.getElementById(id);
-const drawDial = dial(byId("dial")), way = chart(byId("way")), course = chart(byId("adhesion"));
+const drawDial = dial(byId("dial")), way = chart(byId("way")), course = chart(byId("adhesion")), slip = chart(byId("creep-chart"));
 const number = (value, digits, unit = "") => (value === null || value === undefined ? "–" : value.toFixed(digits) + unit);
 const seconds = () => performance.now() / 1000;
 const nothing = () => ({ taken: {}, heard: {}, inputs: {}, history: [], passed: [], events: [], curves: {}, ended: false });
@@ -143,6 +143,17 @@ function drawHealth() {
   byId("events").replaceChildren(...events.slice(-EVENTS_SHOWN).reverse().map((event) => element("li", { class: `event ${event.kind}` }, `${event.t.toFixed(0)} s: ${event.text}`)));
 }
 
+function drawCreep() {
+  const { creep } = state, old = creep == null ? 0 : since(creep.heard), gone = silent() || old > STALE_S;
+  byId("creep").hidden = creep == null;
+  if (creep == null) return;
+  const [at, peak] = creep.peak, kind = creep.withheld ? "prior" : "identified", range = `${number(creep.lower, 3)} to ${number(creep.upper, 3)}`;
+  say("creep-text", gone ? `nothing from the creep estimator for ${old.toFixed(0)} s` : creep.withheld ? `withheld: ${creep.why}` : `peak ${number(peak, 3)} at a creep of ${number(at, 3)}, ${range}`);
+  slip.draw({ title: "Adhesion over creep", x: { label: "creep", range: [0, creep.x.at(-1)] }, y: { range: [0, 1.3 * Math.max(...creep.y, 0.1)] },
+              lines: [{ label: creep.withheld ? "prior, withheld" : "identified", kind, x: gone ? [] : creep.x, y: gone ? [] : creep.y }],
+              marks: gone || creep.withheld || at > creep.x.at(-1) ? [] : [{ x: at, y: peak, kind: "identified", label: "peak" }] });
+}
+
 function drawState() {
   const gone = silent(), gone_s = ((Date.now() - heardAt) / 1000).toFixed(0);
   document.body.classList.toggle("silent", gone);
@@ -155,7 +166,7 @@ function drawState() {
 
 function draw() {
   dirty = false;
-  for (const part of [drawCab, drawWay, drawAdhesion, drawHealth, drawState]) part();
+  for (const part of [drawCab, drawWay, drawAdhesion, drawHealth, drawCreep, drawState]) part();
 }
 
 function take(event) {

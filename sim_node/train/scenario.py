@@ -141,6 +141,9 @@ _LEFT = Track((Tunnel(_FROM_250 - 2000.0, _FROM_250),))
 _PATCH = ((_FROM_250 + 500.0, replace(WET, scale=0.45)), (_FROM_250 + 1500.0, WET))
 """500 m on, 1 km of the wet rail (leaves, oil) gives 0.45 of the wet adhesion."""
 
+_TOO_LATE_S = 48.0
+"""When the brake of `approach` comes."""
+
 _ALL = (
     _braking("tunnel_entry", 300, 100, (0.0, DRY), (_FROM_300, WET), track=_ENTERED),
     _braking("tunnel_exit", 250, 50, (0.0, DRY), (_FROM_250, WET), track=_LEFT),
@@ -156,6 +159,8 @@ _ALL = (
     _braking("grade_unknown", 300, 100, (0.0, WET), track=Track((Grade(0.0, 20e3, -100.0),))),
     _braking("overweight", 300, 100, (0.0, WET), train=replace(CRH3, mass_kg=1.1 * CRH3.mass_kg)),
     # A quarter of the wet adhesion: for more than three minutes nothing changes, and no change may be reported.
+    # Runs on towards its target, through every level of the supervision, and brakes when nothing is left.
+    Scenario("approach", 160 * KMH, Rail(((0.0, DRY),)), 150.0, Brake(_TOO_LATE_S), 50 * KMH),
     _braking("long_braking", 300, 100, (0.0, replace(WET, scale=0.25)), end_s=400.0),
 )
 

@@ -294,3 +294,14 @@ def test_a_falling_chainage_counts_along_the_run() -> None:
     assert (parts["sign"], parts["place_m"], parts["train"]["speed"]) == (-1, -8000.0, 288.0)
     assert (parts["supervision"]["target_m"], parts["passed"].rows[0]["position"]) == (-2000.0, -8000.0)
     assert parts["curves"]["safe"]["x"][:2] == sorted(parts["curves"]["safe"]["x"][:2])
+
+
+def test_the_creep_curve_goes_through_its_peak() -> None:
+    view = View()
+    view.creep({"p1": "80", "p2": "100", "mu_max": "0.2", "lambda_m": "0.1", "withheld": "false"}, "known", 3.0)
+    creep = view.parts(3.0)["creep"]
+    assert (creep["peak"], creep["withheld"], creep["heard"]) == ([0.1, 0.2], False, 3.0)
+    assert max(creep["y"]) == pytest.approx(0.2, abs=0.001)
+    assert creep["x"][int(np.argmax(creep["y"]))] == pytest.approx(0.1, abs=0.01)
+    view.creep({"p1": "nan"}, "", 4.0)
+    assert view.parts(4.0)["creep"]["heard"] == 3.0

@@ -273,6 +273,29 @@ def test_events_are_listed_and_marked() -> None:
         ]
 
 
+def test_the_creep_curve_its_peak_and_what_is_withheld() -> None:
+    known = {
+        "p1": "80",
+        "p2": "100",
+        "mu_max": "0.2",
+        "lambda_m": "0.1",
+        "mu_max_lower": "0.18",
+        "mu_max_upper": "0.22",
+    }
+    with line() as shown:
+        assert not shown.page.locator("#creep").is_visible()
+        shown.view.creep(known | {"withheld": "true"}, "the data do not reach the peak", 0.0)
+        shown.wait("withheld: the data do not reach the peak")
+        assert shown.page.evaluate("slip.plot.series[1].label") == "prior, withheld"
+        shown.view.creep(known | {"withheld": "false"}, "known", 0.0)
+        shown.wait("peak 0.200 at a creep of 0.100, 0.180 to 0.220")
+        assert shown.page.evaluate("slip.plot.series[1].label") == "identified"
+        shown.now_s = 4.0
+        shown.hear(POSITION)
+        shown.wait("nothing from the creep estimator for 4 s")
+        assert shown.page.evaluate("slip.plot.data[1].every((y) => y == null)")
+
+
 def test_ten_tabs_see_the_line() -> None:
     """A browser opens six streams of events to one host: the seventh tab stayed empty."""
     with line() as shown:

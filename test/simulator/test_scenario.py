@@ -18,7 +18,8 @@ from sim_node.train.plant import NO_NOISE, advance, simulate
 from sim_node.train.scenario import CRUISE_S, SCENARIOS, Brake, Rail, Scenario, braking_place, find
 
 OPEN_LINE = (*("constant_adhesion", "snow", "scaled_wet", "weak_brake", "grade_unknown", "overweight", "long_braking"),)
-NAMES = ("tunnel_entry", "tunnel_exit", "cruise", "dry_braking", "low_adhesion_patch", *OPEN_LINE)
+BEFORE = ("tunnel_entry", "tunnel_exit", "cruise", "dry_braking", "low_adhesion_patch")
+NAMES = (*BEFORE, *OPEN_LINE[:-1], "approach", OPEN_LINE[-1])
 
 
 def test_every_scenario_is_found_by_its_name() -> None:

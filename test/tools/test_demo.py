@@ -158,6 +158,13 @@ def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable
         assert [path.name for path in (tmp_path / name).iterdir()] == ["mine.txt"]
 
 
+def test_one_scenario_shows_every_level_of_the_supervision(run_demo: Callable[..., dict[str, Any]]) -> None:
+    told = run_demo("--scenario", "approach")["atp"].split(" > ")
+    once = list(dict.fromkeys(told[1:]))  # before the first pair of state and curve no distance is safe
+    assert once == ["NORMAL", "INDICATION", "OVERSPEED", "WARNING", "SERVICE_BRAKE", "EMERGENCY_BRAKE"]
+    assert told[-1] == "NORMAL", "the brake has made up for it"
+
+
 def test_bad_usage_ends_with_code_2(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as ended:
         demo.main(["--scenario", "avalanche"])

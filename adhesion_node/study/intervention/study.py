@@ -28,6 +28,7 @@ from ...run import offline
 from ...run.pipeline import Pipeline
 from ...run.score import Truth
 from ..trial.estimators import EXACT
+from ..trial.figures import add_figure_options, figures_of
 from ..xie.distances import BRAKINGS
 from ..xie.published import WORST
 
@@ -40,7 +41,7 @@ EARLIER = {"sbi": "SBI", "warning": "W", "permitted": "P", "indication": "I"}
 SLIPPERY_MPS2 = 0.7
 """Default of A_NVMAXREDADH2 and 3, the largest deceleration on rail declared slippery (SUBSET-026-3, A.3.2)."""
 
-PICTURE = "supervision.png"
+PICTURE = "supervision"
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -52,8 +53,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "--kwet", type=float, default=0.8, help="K_wet_rst, a datum of each train; 0.8 is an example (default: 0.8)"
     )
     parser.add_argument("--seed", type=int, default=1, help="seed of the particle filter (default: 1)")
-    drawn = f"draw the limits at 200 km/h of tunnel_entry, {PICTURE}, into DIR"
-    parser.add_argument("--figures", type=Path, metavar="DIR", help=drawn)
+    add_figure_options(parser, "the limits at 200 km/h of tunnel_entry")
 
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
@@ -64,9 +64,8 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     for scenario in BRAKINGS:
         said = predictions(options.bags / scenario, options.seed)
         table += rows(scenario, said, options.kwet)
-        if scenario == "tunnel_entry" and options.figures is not None:
-            options.figures.mkdir(parents=True, exist_ok=True)
-            _draw(said, options.figures / PICTURE)
+        if scenario == "tunnel_entry" and (figures := figures_of(options)) is not None:
+            _draw(said, figures.path(PICTURE))
     return table, "\n".join(lines(table))
 
 
