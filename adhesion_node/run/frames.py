@@ -5,7 +5,7 @@
 import math
 import re
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
 from typing import Any
 
@@ -18,6 +18,7 @@ from ..core import (
     DemandSample,
     ImuSample,
     PositionSample,
+    Prediction,
     PressureSample,
     Sample,
     SpeedSample,
@@ -25,7 +26,8 @@ from ..core import (
 )
 from ..core.physics.train import Array
 from .pipeline import BACK_M, Pipeline
-from .results import COLUMNS, row_of
+from .results import COLUMNS, Row, row_of
+from .seen import Seen, pressure_of
 
 MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "brake_demand", "acceleration")
 """Columns beside `time` and those of the axles; m, m^2, m/s, Pa above the atmosphere, m/s^2."""
@@ -44,9 +46,9 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     is the standard deviation of positions without a `variance`.
 
     The result has `time` as the frame has it, and the columns of `replay --offline --out`; its `attrs` hold
-    `measurements`, `accepted`, `dropped` by reason and the `digest`. Raises ValueError naming what is wrong with the
-    frame, the configuration or the seed, and what to do. Warns where many of the measurements were not used, or where
-    the positions fall along the run.
+    `measurements`, `accepted`, `dropped` by reason, the `digest`, and `why` nothing is identified, or None. Raises
+    ValueError naming what is wrong with the frame, the configuration or the seed, and what to do. Warns where many of
+    the measurements were not used, or where the positions fall along the run.
     """
     config = Config() if config is None else config
     if not isinstance(config, Config):
@@ -54,10 +56,11 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if not (isinstance(std_m, int | float) and 0.0 < std_m < math.inf):
         raise ValueError(f"std_m = {std_m!r}: give the positions' standard deviation, above 0 m")
     columns, t_ns = _checked(frame), _nanoseconds(frame["time"])
-    pipeline, rows = Pipeline(config, seed), []
-    for sample in _samples(t_ns, columns, std_m):
-        rows += [row_of(pipeline, made) for made in pipeline.push(sample)]
-    rows += [row_of(pipeline, made) for made in pipeline.finish()]
+    pipeline, rows, seen = Pipeline(config, seed), list[Row](), Seen()
+    for made in _predictions(pipeline, _samples(t_ns, columns, std_m)):
+        e = made.estimate
+        seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, e.speed_mps, pressure_of(pipeline))
+        rows.append(row_of(pipeline, made))
     used = {name: getattr(pipeline, name) for name in ("measurements", "accepted", "dropped", "digest")}
     if not rows:
         raise ValueError(
@@ -71,8 +74,14 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
         warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
     result.insert(0, "time", _like(result["t_ns"].to_numpy(), frame["time"]))
-    result.attrs.update(used)
+    result.attrs.update(used, why=seen.why_not())
     return result
+
+
+def _predictions(pipeline: Pipeline, samples: Iterable[Sample]) -> Iterator[Prediction]:
+    for sample in samples:
+        yield from pipeline.push(sample)
+    yield from pipeline.finish()
 
 
 def _checked(frame: pd.DataFrame) -> dict[str, Array]:

@@ -24,7 +24,7 @@ from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
 from .results import row_of, rows_to
 from .score import Identified, Point, Truth, mean_relative_error_percent
-from .seen import MANY, Seen
+from .seen import MANY, Seen, pressure_of
 
 Recorded = tuple[str, Any, int]
 """Our name of a message's topic, the message or why it is refused, its log time in ns."""
@@ -78,14 +78,6 @@ def _remarks(pipeline: Pipeline, why: str | None) -> Iterator[str]:
         yield f"nothing is identified: {why}"
     elif pipeline.back_m > BACK_M:
         yield BACKWARDS
-
-
-def pressure_of(pipeline: Pipeline) -> float | None:
-    """The newest brake pressure, or demand where there is none, gauge."""
-    newest = pipeline.state.newest
-    if newest is None or newest.brake_pressure_pa is not None:
-        return newest and newest.brake_pressure_pa
-    return newest.demand_pa
 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:

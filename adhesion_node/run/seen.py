@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 
 from ..core import Config, Regime
-from .pipeline import BACKWARDS
+from .pipeline import BACKWARDS, Pipeline
 
 BRAKES_MPS2, SPAN_S = 0.3, 3.0
 """A train that slows down less, over such a time, does not brake so that it tells of the adhesion."""
@@ -123,3 +123,11 @@ class Seen:
             f"braked by up to {self.hardest_mps2:.2f} m/s^2, and a weaker brake would look the same as a slippery rail:"
             " wheel speeds tell, a speed by radar or Doppler (speed_source), or a brake known better (brake_std)"
         )
+
+
+def pressure_of(pipeline: Pipeline) -> float | None:
+    """The newest brake pressure, or demand where there is none, gauge."""
+    newest = pipeline.state.newest
+    if newest is None or newest.brake_pressure_pa is not None:
+        return newest and newest.brake_pressure_pa
+    return newest.demand_pa

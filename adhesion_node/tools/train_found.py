@@ -2,6 +2,7 @@
 
 """Brake and resistance of a train from how it slows down: where it coasts, and where it brakes on a dry rail."""
 
+import json
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
@@ -90,13 +91,13 @@ class Found(NamedTuple):
             yield f"resistance   not found: nowhere does it coast for {COAST_S:g} s: no brake, no traction"
         else:
             one, listed = self.resistance, ", ".join(f"{each:.4g}" for each in self.coefficients)
-            text = f"{one.stretches} stretches of {COAST_S:g} s that coast, {one.left_out} others are driven"
+            text = f"{one.stretches} stretches of {COAST_S:g} s that coast; driven: {one.left_out}"
             yield f"resistance   {one.mean:.3f} ± {one.std:.3f} of the believed: {listed} N/kN; {text}"
         if self.brake is None:
             yield f"brake        not found: nowhere is its pressure steady for {BRAKE_S:g} s, and followed well"
         else:
             one = self.brake
-            text = f"{one.stretches} stretches of {BRAKE_S:g} s at steady pressure, {one.left_out} others slid"
+            text = f"{one.stretches} stretches of {BRAKE_S:g} s at steady pressure; slid: {one.left_out}"
             found = f"{one.mean:.3f} ± {one.std:.3f} of the believed: {self.full_brake_mps2:.3f} m/s^2"
             yield f"brake        {found}; {text}"
             yield "             on a rail that was not dry throughout it is the adhesion that was found, not the brake"
@@ -143,7 +144,7 @@ def file_of(found: Found, source: str) -> str:
     )
     return f"""\
 # Proposed by `train --estimate {source}`.
-name: as found in {source}
+name: {json.dumps(f"as found in {source}")}
 mass_kg: {train.mass_kg:g}
 length_m: {train.length_m:g}
 wheel_radius_m: {train.wheel_radius_m:g}
