@@ -16,7 +16,9 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -97,12 +99,13 @@ def names(burst: tuple[signal.Signals, ...]) -> str:
 
 
 def tries(count: int, seed: int) -> list[Ending]:
-    """Make so many tries beside a simulator that keeps them busy."""
-    rng = random.Random(seed)
+    """Make so many tries, on every core one at a time, beside a simulator that keeps them busy."""
+    moments = [random.Random(f"{seed} {number}") for number in range(count)]
     with tempfile.TemporaryDirectory() as folder:
         busy = start("simulator", "--ros-args", "-p", "scenario:=long_braking", "-p", "exit_at_end:=false")
         try:
-            return [attempt(rng, Path(folder)) for _ in range(count)]
+            with ThreadPoolExecutor(os.cpu_count()) as pool:
+                return list(pool.map(partial(attempt, folder=Path(folder)), moments))
         finally:
             busy.kill()
             busy.communicate()

@@ -109,15 +109,13 @@ def test_filter_and_smoother_are_exact_up_to_monte_carlo_error(mu: float) -> Non
 def test_log_likelihood_over_many_resamplings() -> None:
     window = make_window(LOUD, PRIOR, 0.07, np.random.default_rng(9), steps=60, sigma_m=0.2)
     exact = rts(LOUD, PRIOR, window, 0.07).log_likelihood
-    ratios, least = [], []
-    for seed in range(2 * RUNS):
-        found = _smooth(LOUD.motion, PRIOR, window, 0.07, 1000, seed)
-        ratios.append(math.exp(found.log_likelihood - exact))
-        least.append(found.ess)
-    _within(np.array(ratios), np.array(1.0))
+    windows, rngs = stack([PRIOR] * 2 * RUNS, [window] * 2 * RUNS), [np.random.default_rng(n) for n in range(2 * RUNS)]
+    runs = ParticleFilter(LOUD.motion, windows, 1000).run(np.full(2 * RUNS, 0.07), rngs)
+    ratios = np.exp(runs.log_likelihood - exact)
+    _within(ratios, np.array(1.0))
     assert np.std(ratios) < 0.5
-    assert max(least) < 500  # below half of them: it did resample
-    assert min(least) >= 1.0
+    assert runs.smallest_ess.max() < 500  # below half of them: it did resample
+    assert runs.smallest_ess.min() >= 1.0
 
 
 def test_likelihood_of_a_few_particles_is_without_bias() -> None:
