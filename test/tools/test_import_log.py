@@ -252,6 +252,22 @@ def test_the_speed_of_a_step_of_the_clock_is_said(importing: Import) -> None:
     assert "the clock was set back" in importing.errors[0]
 
 
+def test_there_and_back_is_said(importing: Import) -> None:
+    there = ride()
+    back = there.assign(time=there.time + 60.0, position=there.position.iloc[-1] - there.position + 1000.0)
+    assert importing(text(pd.concat([there, back]))) == 1
+    assert "the positions rise and fall: cut the log" in importing.errors[0]
+    assert len(importing.errors) == 1, "their speed is right all the same"
+
+
+def test_a_train_that_stands_for_long_is_not_odd(importing: Import) -> None:
+    rows = ride(82)
+    stands = pd.DataFrame({"time": 90.0 + np.arange(6000) / 10.0})
+    noise = np.random.default_rng(1).normal(0.0, 1.0, len(stands))
+    stands = stands.assign(position=rows.position.iloc[-1] + noise, speed=0.0, brake_pressure=3e5)
+    assert importing(text(pd.concat([rows, stands]))) == 0, importing.errors
+
+
 def test_a_stop_of_ten_minutes_without_rows_is_no_step_of_the_clock(importing: Import) -> None:
     rows = ride(89)
     rows = pd.concat([rows, ride().assign(time=rows.time + 700.0, position=rows.position.iloc[-1] + ride().position)])

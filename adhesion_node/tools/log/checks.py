@@ -28,6 +28,10 @@ HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
 
 SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
+"""Between two rows of a recorder."""
+
+MOVES_MPS, ONE_WAY = 2.0, 0.9
+"""Where a train moves its positions rise, or fall, for so much of its way; slower ones are noise."""
 
 BRAKES_MPS2, RUNS_MPS2 = -0.3, -0.1
 """A train that slows down more than by the first brakes; by less than the second, it runs or coasts."""
@@ -125,19 +129,18 @@ def _motion(log: Log, t_s: Array) -> Motion:
 def _speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
     """Positions and speeds tell the same way; if not, what the one is of the other tells why."""
     course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
-    ratio = float((course * speed).sum() / (speed * speed).sum())
-    if ratio < 0.0:
-        yield _falls(motion)
-    told = f"the positions move at {abs(ratio):.3g} times the speed"
+    ratio = float((np.abs(course) * speed).sum() / (speed * speed).sum())
+    yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
+    told = f"the positions move at {ratio:.3g} times the speed"
     for (place, place_m), (pace, pace_mps) in product(POSITION_UNITS.items(), SPEED_UNITS.items()):
         other = pace_mps / SPEED_UNITS[form.speed_unit] / (place_m / POSITION_UNITS[form.position_unit])
-        if abs(math.log(max(abs(ratio), 1e-30) / other)) < SAME:
+        if abs(math.log(max(ratio, 1e-30) / other)) < SAME:
             cures = [f"--position-unit {place}"] * (place != form.position_unit)
             cures += [f"--speed-unit {pace}"] * (pace != form.speed_unit)
             if cures:
                 yield f"{told}: another unit? {' '.join(cures)}"
             return
-    if abs(ratio) < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
+    if ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
         yield f"{told}: are they degrees? --lat COL --lon COL"
     else:
         yield f"{told}: are both units right, is the speed that of a wheel which slid?"
@@ -146,21 +149,26 @@ def _speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
 def _slow_or_falling(motion: Motion) -> Iterator[str]:
     """Positions alone: do they rise, and as fast as a train runs?"""
     course = motion.course_mps[np.isfinite(motion.course_mps)]
-    way_m, net_m = np.abs(course).sum(), course.sum()
-    if len(course) < LEAST_S or abs(net_m) < 0.8 * way_m:
+    if len(course) < LEAST_S:
         return
-    most = float(np.abs(course).max())
-    if 0.0 < most < 2e-3:
+    most, is_steady = float(np.abs(course).max()), abs(course.sum()) > 0.8 * np.abs(course).sum()
+    if is_steady and 0.0 < most < 2e-3:
         yield f"the train creeps at {most:.2g} m/s: are the positions degrees? --lat COL --lon COL"
-    elif 0.0 < most < 0.15:
+    elif is_steady and 0.0 < most < 0.15:
         yield f"the train creeps at {most:.2g} m/s: are the positions in km? --position-unit km"
-    elif net_m < -LEAST_M:
-        yield _falls(motion)
+    else:
+        yield from _against_chainage(motion, course[np.abs(course) > MOVES_MPS], LEAST_M)
 
 
-def _falls(motion: Motion) -> str:
-    first, last = motion.place_m[np.isfinite(motion.place_m)][[0, -1]]
-    return f"the positions fall, from {first:.0f} to {last:.0f} m: --direction down turns them"
+def _against_chainage(motion: Motion, course: Array, least_m: float) -> Iterator[str]:
+    """Whether the positions of a train that moves fall, or do both, by more than `least_m`."""
+    way_m = np.abs(course).sum()
+    fallen_m = -course[course < 0.0].sum()
+    if fallen_m > max(ONE_WAY * way_m, least_m):
+        first, last = motion.place_m[np.isfinite(motion.place_m)][[0, -1]]
+        yield f"the positions fall, from {first:.6g} to {last:.6g} m: --direction down turns them"
+    elif fallen_m > max((1.0 - ONE_WAY) * way_m, least_m):
+        yield "the positions rise and fall: cut the log, and import the way back with --direction down"
 
 
 def _hard(motion: Motion) -> Iterator[str]:
