@@ -262,6 +262,8 @@ class Config:
             raise ValueError(f"track = {self.track!r}: give a Track, such as Track((Grade(0.0, 2000.0, 10.0),))")
         if not isinstance(self.rail_map, RailMap | None):
             raise ValueError(f"rail_map = {self.rail_map!r}: give a RailMap, or None")
+        if self.rail_map is not None and self.method != BANK:
+            raise ValueError(f"rail_map with method = {self.method}: only {BANK} begins with a map, leave one out")
         if self.step >= self.window:
             raise ValueError(f"step = {self.step}: choose less than the window, {self.window}")
 

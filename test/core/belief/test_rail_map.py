@@ -159,3 +159,5 @@ def test_the_configuration_takes_a_map_alone() -> None:
     wrong: Any = "rail.csv"
     with pytest.raises(ValueError, match=r"rail_map = 'rail\.csv': give a RailMap, or None"):
         Config(rail_map=wrong)
+    with pytest.raises(ValueError, match="rail_map with method = rail_condition: only bank begins with a map"):
+        Config(rail_map=RailMap(()), method="rail_condition")
