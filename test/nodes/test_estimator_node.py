@@ -19,9 +19,10 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from adhesion_node.core import predict
+from adhesion_node.core import Config, predict
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, SpeedSample
 from adhesion_node.core.physics.train import GRAVITY
+from adhesion_node.nodes import estimator
 from adhesion_node.nodes.estimator import PARAMETERS, Estimator
 from adhesion_node.nodes.ros import qos, types
 from adhesion_node.run.pipeline import Pipeline
@@ -316,3 +317,11 @@ def test_by_its_speed_alone_and_beyond_the_node_runs_as_offline(line: Line) -> N
     line.estimator.close()
     assert line.estimator.digest == pipeline.digest
     assert line.estimator.pipeline.ticks == pipeline.ticks >= 13
+
+
+def test_what_is_compiled_is_so_before_the_node_is_there(context: Context, monkeypatch: pytest.MonkeyPatch) -> None:
+    warmed: list[Config] = []
+    monkeypatch.setattr(estimator, "warm_up", warmed.append)
+    node = Estimator(context=context)
+    assert warmed == [node.config]
+    node.destroy_node()

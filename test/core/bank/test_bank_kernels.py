@@ -16,7 +16,7 @@ import numpy_bank as by_numpy
 import pytest
 from banks import FULL, bank_of
 
-from adhesion_node.core.bank import branching, kernels, motion, seeing
+from adhesion_node.core.bank import branching, kernels, kinds, layout, motion, seeing
 from adhesion_node.core.bank.kinds import KINDS, NOISES
 from adhesion_node.core.bank.layout import Bank
 from adhesion_node.core.bank.motion import Braking
@@ -24,7 +24,7 @@ from adhesion_node.core.bank.verdict import quantiles
 from adhesion_node.core.config import Config
 from adhesion_node.core.estimator import warm_up
 from adhesion_node.core.physics.track import Grade, Track, Tunnel
-from adhesion_node.core.physics.train import CRH3
+from adhesion_node.core.physics.train import CRH3, GRAVITY
 
 LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
 KIND, LAW, NOISE = ([label[part] for label in LABELS] for part in range(3))
@@ -119,6 +119,11 @@ def test_a_kernel_file_stands_alone(module: Any) -> None:
         tree = ast.parse(file.read())
     found = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
     names = {alias.name for node in found for alias in node.names}
+    numbers = {**vars(kinds), **vars(layout), "GRAVITY": GRAVITY}.items()
+    constants = {name: value for name, value in numbers if isinstance(value, int | float)}
+    for name, value in vars(module).items():
+        if isinstance(value, int | float) and name in constants:
+            assert value == constants[name], name
     assert names <= {"annotations", "math", "numpy", "NDArray", "kernel", "TYPE_CHECKING", "NamedTuple"}
 
 
