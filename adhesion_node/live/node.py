@@ -46,8 +46,10 @@ class Live(Node):
         except ModuleNotFoundError as error:
             raise ValueError(f"{error.name} is missing: pip install '.[live]'") from error
         self.server = Server(host, port, lambda: self.view.parts(time.monotonic()), PERIOD_S)
-        if warning := exposure(host):
-            self.get_logger().warning(warning)
+        self.warning = exposure(host)
+        """Who else sees the page; empty: nobody."""
+        if self.warning:
+            self.get_logger().warning(self.warning)
         self.get_logger().info(f"open {self.server.url}")
 
     def close(self) -> None:

@@ -5,21 +5,18 @@
 The parts are replaced as a whole and never changed in place, so that another thread may read them at any time.
 """
 
-import math
 from collections import deque
 from collections.abc import Mapping
 from itertools import islice
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ..core.atp.received import StampedCurve, TrainState
-from ..core.creep.curve import adhesion
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
 from ..report.run import IN_WORDS
 from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
+from .creep import creep_part
 from .fit import number, numbers, rounded, text_of
 
 EXPECTED = {
@@ -44,9 +41,6 @@ SPACING_S, SPACING_M = 0.5, 20.0
 
 CURVE_POINTS, MOST_KEYS = 24, 100
 """Points of a curve, and entries of a status that are looked at."""
-
-CREEP_END = 0.3
-"""Creep up to which the creep curve is drawn."""
 
 COUNTS = ("measurements", "accepted", "windows", "changes", "resets")
 """What is told of the estimator's diagnostics."""
@@ -165,23 +159,9 @@ class View:
             self._awaited = False
 
     def creep(self, values: Mapping[str, str], message: str, now_s: float) -> None:
-        """The creep estimator's diagnostics: the curve through its peak, withheld or not, at the time `now_s`."""
-        known = numbers(values)
-        if not {"p1", "p2", "mu_max", "lambda_m"} <= known.keys():
-            return
-        theta = np.array([known["p1"], known["p2"]])
-        slope = known["mu_max"] * (theta[0] + 2.0 * math.sqrt(max(theta[1], 0.0)))  # (5) solved
-        creeps = np.linspace(0.0, CREEP_END, CURVE_POINTS)
-        self._parts["creep"] = {
-            "heard": round(now_s, 2),
-            "withheld": values.get("withheld") != "false",
-            "why": text_of(message),
-            "peak": [number(known["lambda_m"], 4), number(known["mu_max"], 4)],
-            "lower": number(known.get("mu_max_lower"), 4),
-            "upper": number(known.get("mu_max_upper"), 4),
-            "x": rounded(creeps, 4),
-            "y": rounded(adhesion(creeps, slope, theta), 4),
-        }
+        """The creep estimator's diagnostics, at the time `now_s`."""
+        if (part := creep_part(values, message)) is not None:
+            self._parts["creep"] = part | {"heard": round(now_s, 2)}
 
     def curve(self, name: str, placed: StampedCurve) -> None:
         """A braking curve, `safe` or `nominal`, which tells in which direction places are met."""

@@ -50,7 +50,7 @@ function shared(onChange = () => {}) {
   return view;
 }
 
-// A chart below `host`; it is drawn by draw(spec) with {title, unit, x: {label, range}, y: {range}, lines: [{label, kind, x, y}],
+// A chart below `host`; it is drawn by draw(spec) with {title, x: {label, range, sign}, y: {range}, lines: [{label, kind, x, y}],
 // bands: [{from, to, kind, label}], marks: [{x, y, kind, label}], events: [{x, kind, label}]}; null in a line is a gap.
 // cursor(x) marks the present; `onPick` hears of a place clicked. The wheel, a drag, + and - zoom, Shift and a drag or the
 // arrows pan, a double click or 0 shows all again.
@@ -137,7 +137,7 @@ function chart(host, { view = shared(), onPick = null } = {}) {
   }
 
   function make() {
-    const value = (_, number) => (number == null ? "–" : Number(number.toPrecision(spec.digits ?? 4)).toString());
+    const value = (_, number) => (number == null ? "–" : Number(number.toPrecision(4)).toString());
     // Along the run places count upwards; they are told as they stand on the line.
     const told = (x) => Number((x * (spec.x.sign ?? 1)).toPrecision(10)).toString();
     const axis = (more) => ({ stroke: () => ink("soft"), font: FONT, labelFont: FONT, grid: { stroke: () => ink("rule"), width: 1 }, ticks: { stroke: () => ink("rule"), width: 1 }, ...more });
