@@ -45,7 +45,10 @@ class Config:
         "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))
     )
     law_probability: float = _method(
-        0.5, "Probability of that shape; else that of low_adhesion, or no dependence on speed", low=0.0, high=1.0
+        0.3,
+        "Probability of that shape; else of half its dependence on speed (rail_condition: low_adhesion's), or of none",
+        low=0.0,
+        high=1.0,
     )
     rail_drift: float = _rail(0.001, "Drift of the rail condition, relative standard deviation over 1 s", "", 0.0, 1.0)
     change_threshold: float = _rail(
@@ -202,7 +205,7 @@ class Config:
         0.005, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
     profile_std: float = _unsure(
-        0.001, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1
+        0.0005, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1
     )
     resistance_std: float = _unsure(0.15, "Standard deviation of the running resistance, relative", "", 0.0, 1.0)
     mass_std: float = _unsure(0.05, "Standard deviation of the mass, relative", "", 0.0, 1.0)
@@ -238,7 +241,7 @@ class Config:
     max_gap_s: float = _intake(2.0, "Longest gap between measurements that a window may bridge", "s", 1e-3, 60.0)
     reset_s: float = _intake(60.0, "Jump of the stamps, either way, that starts the estimation anew", "s", 1.0, 1e6)
     tick_s: float = _intake(
-        0.5,
+        0.3,
         "Without a position for so long, by the stamps, the other sensors are used without one; 0: never",
         "s",
         0.0,

@@ -19,7 +19,7 @@ from ..physics.train import Array
 from .kernels import springing, weighing
 from .kernels.springing import Rule
 from .kernels.weighing import Pruning
-from .kinds import FREE, FREE_STD, HELD, KINDS, SLIDING
+from .kinds import FREE, FREE_STD, HELD, KINDS, PASSING, SLIDING
 from .layout import MU, ROUGH, Bank, joined
 from .motion import Braking, laws_of, rolling_use
 
@@ -44,6 +44,12 @@ STRONG = 0.03
 
 CHANGE_STD = 0.05
 """By how much the adhesion may have changed, standard deviation."""
+
+LESS, LESS_STD = (0.9, 0.6, 0.4, 0.25), 0.22
+"""Parts of what the brake needs that a rail may give on which axles begin to slide, each known so well."""
+
+PASSING_S, PASSED_S = 300.0, 3.0
+"""A border of the rail comes once in that time, and the train takes so long to pass it."""
 
 CHANGE_S, BEND_S = 600.0, 60.0
 """A rail changes abruptly once in that time, and how its adhesion depends on speed."""
@@ -93,8 +99,10 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
     """With what may have become different within the last `elapsed_s`, beside what springs from it.
 
     Of those that slide: the rail has changed, and maybe how its adhesion depends on speed; or that alone; or adhesion
-    has become more than the brake uses, likelier the nearer it was. Of those that roll: adhesion has become less than
-    the brake needs, mostly a little less. Where the wheels tell which it is, the other does not spring.
+    has become more than the brake uses, likelier the nearer it was; or the train passes a border: what it uses drifts
+    meanwhile, as a long train takes seconds to, and lasts again behind it. Of those that roll: adhesion has become less
+    than the brake needs, a little less while the brake rises, else any less. Where the wheels tell which it is, the
+    other does not spring.
     """
     laws, sliding = _likely(config)
     rule = Rule(
@@ -106,6 +114,11 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         bend_s=BEND_S,
         begin_s=RISING_S if braking.rising else STEADY_S,
         reached_s=REACHED_S,
+        passing=PASSING,
+        passing_s=PASSING_S,
+        passed_s=PASSED_S,
+        less=np.array(LESS[:1] if braking.rising else LESS),
+        less_std=LESS_STD,
         applied=float(braking.applied),
         told=float(braking.told),
         laws=laws,

@@ -15,11 +15,11 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import Array
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
-from .kinds import FREE, FREE_STD, NOISES
+from .kinds import FREE, FREE_STD, NOISES, PASSING
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
-from .motion import Braking, moved, open_variance, sliding, slow_variance, white_variance
+from .motion import Braking, moved, open_variance, slow_variance, white_variance
 from .plausible import Course
-from .seeing import Observation, acceleration_seen, corrected, not_slower, position_seen, speed_seen
+from .seeing import Observation, acceleration_seen, corrected, not_slower, position_seen, speed_seen, wheels_seen
 from .wheels import WheelsSeen, told
 
 if TYPE_CHECKING:
@@ -39,8 +39,9 @@ SPEED_ERROR_MPS = 0.03
 PAST_NS = 4 * S
 """How far back it can go."""
 
-CERTAIN, CHANGED = 0.99, 0.2
-"""Probability from which a change of the rail is told, and by how much it must have changed, relative."""
+DOUBTED, PASSED, CERTAIN, CHANGED = 0.1, 0.5, 0.99, 0.2
+"""Probabilities from which a change of the rail is in doubt, up to which it still goes on, and from which it is told,
+and by how much it must have changed."""
 
 WHEEL_SHARE = 0.008
 """Error of the fastest rim's speed, relative."""
@@ -73,6 +74,8 @@ class Memory(NamedTuple):
     """When the rail changed last, as far as it was told."""
     changes: int = 0
     """Changes of the rail told."""
+    steady_mu: float = 0.0
+    """Adhesion when none was in doubt."""
     course: Course = Course()
     past: tuple[tuple[int, Bank], ...] = ()
     """Beliefs of some seconds ago, to go back to where positions turn out to be wrong."""
@@ -287,9 +290,7 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):
             return misled(config, memory)
-        times = math.exp(memory.since_s * memory.braking.told)
-        evidence = np.log1p((times - 1.0) * sliding(config, bank, memory.braking))
-        bank = bank._replace(log_weight=bank.log_weight + evidence).normalised()
+        bank = wheels_seen(config, bank, memory.braking, memory.since_s).normalised()
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
@@ -314,11 +315,14 @@ def _led_again(memory: Memory) -> Memory:
 
 
 def _with_changes(memory: Memory) -> Memory:
-    """Tell a change of the rail once it is certain, and the adhesion another than it was some seconds ago."""
+    """Tell a change of the rail once it is certain and passed, and adhesion another than before that was in doubt."""
     bank = memory.bank
-    later = bank.changed_s > memory.told_s + 1e-6
-    if float(bank.weight @ later) < CERTAIN or not memory.past:
+    passing = bank.kind == PASSING
+    probability = float(bank.weight @ (passing | (bank.changed_s > memory.told_s + 1e-6)))
+    now = float(bank.weight @ bank.mean[:, MU])
+    if probability < DOUBTED:
+        return memory._replace(steady_mu=now)
+    if probability < CERTAIN or float(bank.weight @ passing) > PASSED:
         return memory
-    before, now = (float(each.weight @ each.mean[:, MU]) for each in (memory.past[0][1], bank))
-    changed = abs(now - before) > CHANGED * before
-    return memory._replace(told_s=float(bank.changed_s[later].max()), changes=memory.changes + changed)
+    changes = memory.changes + (abs(now - memory.steady_mu) > CHANGED * memory.steady_mu)
+    return memory._replace(told_s=memory.t_ns / S, changes=changes, steady_mu=now)

@@ -30,8 +30,9 @@ KINDS = (
     Kind("even", True, 0.003, 0.03, 0.035, 0.16),
     Kind("rough", True, 0.005, 0.07, 0.05, 0.1),
     Kind("restless", True, 0.02, 0.15, 0.07, 0.03),
+    Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
 )
-FREE, HELD = 0, 1
+FREE, HELD, PASSING = 0, 1, 6
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
 
 SLIDES = np.array([kind.slides for kind in KINDS])

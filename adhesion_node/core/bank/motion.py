@@ -15,7 +15,6 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
 
 from ..physics.adhesion import SpeedLaw
 from ..physics.train import Array
@@ -23,7 +22,7 @@ from . import kinds
 from .kernels import moving
 from .kernels.weighing import variances
 from .kinds import SLIDES
-from .layout import BRAKE, MU, POSITION, ROUGH, SPEED, Bank, Mask
+from .layout import BRAKE, POSITION, SPEED, Bank, Mask
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -34,6 +33,10 @@ it."""
 
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""
+
+
+HALF_AT_MPS = 30.0
+"""Where a law that depends on the speed half as much meets the other: slide protection levels out what it uses."""
 
 
 class Braking(NamedTuple):
@@ -63,9 +66,10 @@ class Use(NamedTuple):
 
 
 def laws_of(config: Config) -> tuple[tuple[SpeedLaw, float], ...]:
-    """How adhesion may depend on speed, with probabilities: the law, the low-adhesion law, not at all."""
-    rest = (1.0 - config.law_probability) / 2.0
-    return ((config.speed_law, config.law_probability), (config.low_law, rest), (SpeedLaw(1.0), rest))
+    """How adhesion may depend on speed, with probabilities: the law, half as much, not at all."""
+    law, rest = config.speed_law, (1.0 - config.law_probability) / 2.0
+    half = SpeedLaw(law.floor + float(law(np.asarray(HALF_AT_MPS))) / law.scale, law.gain_kmh, law.offset_kmh)
+    return ((law, config.law_probability), (half, rest), (SpeedLaw(1.0), rest))
 
 
 def resistance(config: Config, bank: Bank) -> Array:
@@ -83,14 +87,6 @@ def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
     rotating = config.train.rotating_mass_fraction
     needed = bank.mean[:, BRAKE] * braking.applied - rotating * resistance(config, bank)
     return np.asarray(needed / (1.0 + rotating))
-
-
-def sliding(config: Config, bank: Bank, braking: Braking) -> Array:
-    """Probability that axles slide, shape (H,): the rail gives less than the brake would use of it."""
-    mean, needed = bank.mean, rolling_use(config, bank, braking)
-    variance = bank.covariance[:, MU, MU] + bank.covariance[:, BRAKE, BRAKE] * braking.applied**2
-    short = needed - mean[:, MU] * (1.0 + mean[:, ROUGH])
-    return np.where(SLIDES[bank.kind], ndtr(short / np.sqrt(np.maximum(variance, 1e-12))), 0.0)
 
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:

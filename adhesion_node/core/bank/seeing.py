@@ -4,14 +4,17 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr
 
 from ..physics.train import GRAVITY, Array
 from .kernels import weighing
-from .layout import BIAS, OFFSET, PITCH, POSITION, SCALE, SPEED, Bank
-from .motion import BUILDING_UP, Braking, use, white_variance
+from .kinds import SLIDES
+from .layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSITION, ROUGH, SCALE, SPEED, Bank
+from .motion import BUILDING_UP, Braking, rolling_use, use, white_variance
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -24,6 +27,11 @@ UNSEEN = 1e12
 
 STEADY_ERROR, BRAKING_ERROR = 0.002, 0.06
 """What an accelerometer feels beside the mean brake: over g, and over the adhesion used, as axles slide in turns."""
+
+
+ROLLED, SLID = (0.85, 1.15), (1.0, 0.9)
+"""Parts of what the brake needs, and of what sliding axles use, between which adhesion lies where wheels roll or slide:
+rolling ones could use a seventh more than sliding ones, and some axles slide before the others."""
 
 
 class Observation(NamedTuple):
@@ -84,3 +92,28 @@ def not_slower(bank: Bank, rim_mps: float, std_mps: float) -> Bank:
     after = corrected(bank, seen._replace(variance=np.where(slower, std_mps**2, UNSEEN)))
     squared = np.minimum(seen.innovation / std_mps, CLIPPED) ** 2
     return after._replace(log_weight=bank.log_weight - np.where(slower, 0.5 * squared, 0.0))
+
+
+def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) -> Bank:
+    """Take in that wheels were seen to slide, or to roll: adhesion is below, or above, what the brake needs.
+
+    Each Gaussian becomes the one with the moments of what is left of it. The weights are not normalised.
+    """
+    mean, times = bank.mean, math.exp(elapsed_s * braking.told)
+    part, more = SLID if braking.told > 0.0 else ROLLED
+    slope = np.zeros(mean.shape)
+    slope[:, BRAKE] = part * braking.applied / (1.0 + config.train.rotating_mass_fraction)
+    slope[:, MU], slope[:, ROUGH] = -more * (1.0 + mean[:, ROUGH]), -more * mean[:, MU]
+    short = part * rolling_use(config, bank, braking) + slope[:, MU] * mean[:, MU]
+    gain = np.einsum("hij,hj->hi", bank.covariance, slope)
+    std = np.sqrt(np.maximum(np.einsum("hi,hi->h", gain, slope), 1e-12))
+    off = short / std
+    slides = np.where(SLIDES[bank.kind], times - 1.0, 0.0)
+    total = 1.0 + slides * ndtr(off)
+    pull = slides * np.exp(-0.5 * off**2) / math.sqrt(2.0 * math.pi) / total
+    gain /= std[:, None]
+    return bank._replace(
+        mean=mean + gain * pull[:, None],
+        covariance=bank.covariance - (pull * (pull + off))[:, None, None] * gain[:, :, None] * gain[:, None, :],
+        log_weight=bank.log_weight + np.log(total),
+    )

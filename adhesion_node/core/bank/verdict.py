@@ -27,6 +27,12 @@ if TYPE_CHECKING:
 SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
 """Parts of the present speed at which adhesion is foreseen."""
 
+DRIFT_AHEAD = 0.02
+"""Most drift that is counted on ahead: a border will have been passed."""
+
+LEAST_AHEAD = 0.002
+"""Adhesion less grade ahead counts as no less."""
+
 COUNTED_RISE = 0.5
 """Power of what a law promises for lower speeds that is counted on: slide protection uses less of it."""
 
@@ -154,7 +160,10 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     slope[:, ROUGH] *= rough_kept
     slope[:, GRADE] = grade_kept
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
-    roughness = kinds.ROUGHNESS[bank.kind] ** 2 * rough_added + kinds.DRIFT[bank.kind] ** 2 * time_s / 3.0
+    roughness = (
+        kinds.ROUGHNESS[bank.kind] ** 2 * rough_added
+        + np.minimum(kinds.DRIFT[bank.kind], DRIFT_AHEAD) ** 2 * time_s / 3.0
+    )
     variance = variances(slope, bank.covariance) + open_variance(config, bank) * grade_added
     variance += np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
     speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
@@ -164,7 +173,9 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     std = np.sqrt(np.maximum(variance, 1e-12)) * rising
     more = ~sliding & (used.value < known.lower)
     foreseen, std = np.where(more, known.lower, foreseen), np.where(more, 1e-6, std)
-    low = quantiles(bank.weight, foreseen, std, (missed,))[:, 0]
+    middle = np.maximum(foreseen, LEAST_AHEAD)
+    variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
+    low = np.exp(quantiles(bank.weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
     return Ahead(tuple(speeds.tolist()), tuple(np.maximum(low, 0.0).tolist()))
 
 

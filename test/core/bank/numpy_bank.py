@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, kinds, motion
-from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, SLIDES, SLIDING
+from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance
 from adhesion_node.core.bank.seeing import CLIPPED, Observation
@@ -129,7 +129,7 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
 
 
 def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> list[Bank]:
-    """The rail has changed, and maybe how its adhesion depends on speed; or that alone."""
+    """The rail has changed, and maybe how its adhesion depends on speed; or that alone; or a border is passed."""
     covariance = sliding.covariance.copy()
     covariance[:, MU, MU] += branching.CHANGE_STD**2
     now = np.full(sliding.log_weight.size, now_s)
@@ -142,7 +142,15 @@ def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> l
             children.append(other._replace(log_weight=weight - math.log(branching.CHANGE_S), law=laws, born_s=now))
             bent = sliding._replace(log_weight=weight - math.log(branching.BEND_S), law=laws, born_s=now)
             children.append(bent.part(sliding.law != law))
-    return children
+    steady, passing = sliding.part(sliding.kind != PASSING), sliding.part(sliding.kind == PASSING)
+    lasting = [kind for kind in SLIDING if kind != PASSING]
+    for kind in lasting:
+        share = KINDS[kind].prior / sum(KINDS[each].prior for each in lasting)
+        passed = passing.labelled(kind, passing.law, now_s, math.log(share * elapsed_s / branching.PASSED_S))
+        passed = passed._replace(changed_s=np.full(passed.law.size, now_s))
+        children.append(passed.with_fresh(ROUGH, 0.0, KINDS[kind].roughness))
+    begun = steady.labelled(PASSING, steady.law, now_s, math.log(elapsed_s / branching.PASSING_S))
+    return [*children, begun._replace(changed_s=np.full(begun.law.size, now_s))]
 
 
 def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
@@ -156,20 +164,22 @@ def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) ->
         near = float(ndtr((one.mean[0, MU] - 0.98 * most) / max(spread, 1e-6)))
         prior = elapsed_s * (1.0 / branching.CHANGE_S + near / branching.REACHED_S)
         total = np.logaddexp.reduce(alike.log_weight) - one.log_weight
-        found.append(one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0))))
+        rolls = one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0)))
+        found.append(rolls._replace(changed_s=np.full(1, now_s)))
     return found
 
 
 def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
-    """Adhesion has become less than the brake needs: mostly a little less."""
+    """Adhesion has become less than the brake needs: a little less while it rises, else any less."""
     needed = use(config, held, braking, resistance(config, held)).value
-    rate = elapsed_s / (branching.RISING_S if braking.rising else branching.STEADY_S)
+    parts = branching.LESS[:1] if braking.rising else branching.LESS
+    rate = elapsed_s / (branching.RISING_S if braking.rising else branching.STEADY_S) / len(parts)
     share = sum(KINDS[kind].prior for kind in SLIDING)
-    slipping = held.with_fresh(MU, 0.9 * needed, 0.2 * needed + 0.003)
     return [
-        slipping.with_fresh(ROUGH, 0.0, KINDS[kind].roughness).labelled(
-            kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share)
-        )
+        held.with_fresh(MU, less * needed, branching.LESS_STD * less * needed + 0.003)
+        .with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
+        .labelled(kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share))
+        for less in parts
         for law, (_, probability) in enumerate(laws_of(config))
         for kind in SLIDING
         if probability > 0.0

@@ -20,6 +20,7 @@ from adhesion_node.core.bank.seeing import (
     not_slower,
     position_seen,
     speed_seen,
+    wheels_seen,
 )
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.train import Array
@@ -144,3 +145,28 @@ def test_a_faster_rim_corrects_and_weighs() -> None:
     lost = before.log_weight - after.log_weight
     assert lost[slowest] >= lost[fastest]
     assert np.all(not_slower(BANK, 1000.0, 0.3).mean[:, SPEED] < 50.0)  # clipped
+
+
+@pytest.mark.parametrize("told", [4.0, -4.0])
+@pytest.mark.parametrize("mu", [0.03, 0.05, 0.09])
+def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu: float) -> None:
+    """Against sums over a grid of adhesion and brake factor: the likelihood is e^(told t) where axles would slide."""
+    bank = (
+        bank_of([2, 1], spread=0.0).with_fresh(MU, mu, 0.2 * mu).with_fresh(ROUGH, 0.0, 0.0).with_fresh(BRAKE, 1.0, 0.1)
+    )
+    after = wheels_seen(CONFIG, bank, Braking(0.06, told=told), 0.5)
+    assert after.log_weight[1] == bank.log_weight[1]  # what limits there is the brake, whatever the rail gives
+    assert after.mean[1] == pytest.approx(bank.mean[1])
+    rail, factor = np.meshgrid(np.linspace(0.0, 2.5 * mu, 1501), np.linspace(0.4, 1.6, 1201), indexing="ij")
+    density = norm.pdf(rail, mu, 0.2 * mu) * norm.pdf(factor, 1.0, 0.1)
+    rotating = CONFIG.train.rotating_mass_fraction
+    needed = (0.06 * factor - rotating * float(specific_resistance(bank.mean[:1, SPEED])[0])) / (1.0 + rotating)
+    slides = needed > 0.9 * rail if told > 0.0 else 0.85 * needed > 1.15 * rail
+    likely = density * np.where(slides, np.exp(0.5 * told), 1.0)
+    assert after.log_weight[0] - bank.log_weight[0] == pytest.approx(np.log(likely.sum() / density.sum()), abs=2e-3)
+    mean = float((likely * rail).sum() / likely.sum())
+    assert after.mean[0, MU] == pytest.approx(mean, abs=2e-3 * mu)
+    std = np.sqrt(float((likely * (rail - mean) ** 2).sum() / likely.sum()))
+    assert np.sqrt(after.covariance[0, MU, MU]) == pytest.approx(std, rel=5e-3)
+    both = float((likely * (rail - mean) * factor).sum() / likely.sum())
+    assert after.covariance[0, MU, BRAKE] == pytest.approx(both, abs=5e-3 * std * 0.1)

@@ -22,8 +22,9 @@ Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 
 MU, ROUGH, BRAKE, SIZE = 2, 3, 4, 10
 HELD = 1
-RAIL, LAW, ROLLS, SLIDES = 1, 2, 3, 4
-"""What is new of a hypothesis. A row of `rows` is its parent, law, kind, and this."""
+RAIL, LAW, ROLLS, BORDER, LASTS, SLIDES = 1, 2, 3, 4, 5, 6
+"""What is new of a hypothesis; from `SLIDES` on, by which part of `less`. A row of `rows` is its parent, law, kind, and
+this."""
 
 
 class Rule(NamedTuple):
@@ -40,6 +41,16 @@ class Rule(NamedTuple):
     """Time in which axles begin to slide."""
     reached_s: float
     """Time in which axles roll that the brake no longer makes slide."""
+    passing: int
+    """Kind of a rail whose border the train passes."""
+    passing_s: float
+    """Time in which it begins to pass one."""
+    passed_s: float
+    """Time that this takes."""
+    less: Array
+    """Parts of what the brake needs that a rail may give on which axles begin to slide."""
+    less_std: float
+    """How well each of them is known, relative."""
     applied: float
     told: float
     laws: Array
@@ -57,6 +68,23 @@ def _changed(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, 
                 if slides[h] and rule.laws[law] > 0.0 and (new == RAIL or bank.law[h] != law):
                     rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, bank.kind[h], new
                     weight[size] = bank.log_weight[h] + math.log(rule.laws[law] * rule.elapsed_s / every_s)
+                    size += 1
+    return size
+
+
+@kernel
+def _passing(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """The train begins to pass a border of the rail, or has passed it."""
+    lasting = rule.sliding[:, 1].sum() - rule.sliding[rule.passing, 1]
+    for kind in range(rule.sliding.shape[0]):
+        for h in range(slides.size):
+            if slides[h] and (kind == rule.passing) != (bank.kind[h] == rule.passing):
+                begins = kind == rule.passing
+                likely = 1.0 / rule.passing_s if begins else rule.sliding[kind, 1] / lasting / rule.passed_s
+                if likely > 0.0:
+                    rows[size, 0], rows[size, 1], rows[size, 2] = h, bank.law[h], kind
+                    rows[size, 3] = BORDER if begins else LASTS
+                    weight[size] = bank.log_weight[h] + math.log(likely * rule.elapsed_s)
                     size += 1
     return size
 
@@ -86,15 +114,16 @@ def _rolling(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, 
 @kernel
 def _begun(bank: Bank, holds: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
     """Adhesion has become less than the brake needs."""
-    rate = rule.elapsed_s / rule.begin_s / rule.sliding[:, 1].sum()
-    for law in range(rule.laws.size):
-        for kind in range(rule.sliding.shape[0]):
-            likely = rate * rule.laws[law] * rule.sliding[kind, 1]
-            for h in range(holds.size):
-                if holds[h] and likely > 0.0:
-                    rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, SLIDES
-                    weight[size] = bank.log_weight[h] + math.log(likely)
-                    size += 1
+    rate = rule.elapsed_s / rule.begin_s / rule.sliding[:, 1].sum() / rule.less.size
+    for part in range(rule.less.size):
+        for law in range(rule.laws.size):
+            for kind in range(rule.sliding.shape[0]):
+                likely = rate * rule.laws[law] * rule.sliding[kind, 1]
+                for h in range(holds.size):
+                    if holds[h] and likely > 0.0:
+                        rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, SLIDES + part
+                        weight[size] = bank.log_weight[h] + math.log(likely)
+                        size += 1
     return size
 
 
@@ -116,11 +145,13 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     strong = np.exp(bank.log_weight) > rule.strong
     slides = strong & (rule.sliding[:, 1][bank.kind] > 0.0)
     holds = strong & (bank.kind == HELD) & (rule.told >= 0.0)
-    most = count + (2 * rule.laws.size + 1) * slides.sum() + rule.laws.size * rule.sliding.shape[0] * holds.sum()
+    kinds, laws = rule.sliding.shape[0], rule.laws.size
+    most = count + (2 * laws + 1 + kinds) * slides.sum() + laws * kinds * rule.less.size * holds.sum()
     rows, weight = np.zeros((most, 4), np.intp), np.empty(most)
     for h in range(count):
         rows[h, 0], rows[h, 1], rows[h, 2], weight[h] = h, bank.law[h], bank.kind[h], bank.log_weight[h]
     size = _changed(bank, slides, rule, rows, weight, count)
+    size = _passing(bank, slides, rule, rows, weight, size)
     if rule.told <= 0.0 and slides.any():
         size = _rolling(bank, slides, rule, rows, weight, size)
     size = _begun(bank, holds, rule, rows, weight, size)
@@ -130,12 +161,15 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     for row in range(count, size):
         new, x, p = rows[row, 3], mean[row], covariance[row]
         born[row] = rule.now_s
-        if new == RAIL:
+        if new in (RAIL, ROLLS, BORDER, LASTS):
             changed[row] = rule.now_s
+        if new == RAIL:
             p[MU, MU] += rule.change_std**2
         if new == ROLLS:
             _fresh(x, p, ROUGH, 0.0, 0.0)
-        if new == SLIDES:
+        if new >= LASTS:
             _fresh(x, p, ROUGH, 0.0, rule.sliding[kind[row], 0])
-            _fresh(x, p, MU, 0.9 * needed[parent[row]], 0.2 * needed[parent[row]] + 0.003)
+        if new >= SLIDES:
+            gives = rule.less[new - SLIDES] * needed[parent[row]]
+            _fresh(x, p, MU, gives, rule.less_std * gives + 0.003)
     return mean, covariance, weight[:size].copy(), bank.noise[parent], law, kind, born, changed
