@@ -52,7 +52,7 @@ def _noises() -> Iterator[Sequence[str]]:
 
 def _laws() -> Iterator[Sequence[str]]:
     config = Config()
-    names = (f"`law` = {config.law}", f"`low_adhesion` = {config.low_adhesion}", "none: the same at any speed")
+    names = (f"`law` = {config.law}", "half of its dependence on speed", "none: the same at any speed")
     return ((name, f"{prior:g}") for name, (_, prior) in zip(names, laws_of(config), strict=True))
 
 

@@ -290,7 +290,8 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):
             return misled(config, memory)
-        bank = wheels_seen(config, bank, memory.braking, memory.since_s).normalised()
+        if memory.braking.told:
+            bank = wheels_seen(config, bank, memory.braking, memory.since_s).normalised()
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
