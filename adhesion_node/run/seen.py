@@ -86,8 +86,8 @@ class Seen:
 
     @property
     def identified(self) -> bool:
-        """Whether the adhesion limited, or most of the braking left open whether it did."""
-        is_open = self._limited > 0 or self._told > self._at_brake
+        """Whether the adhesion limited, or may have for more than the first moments of a braking."""
+        is_open = self._limited > 0 or self._told > MANY * self._at_brake
         return is_open and not (self._runs_back or self._runs_on)
 
     @property

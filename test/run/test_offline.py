@@ -15,6 +15,7 @@ import cdrs
 import messages
 import numpy as np
 import pytest
+from conftest import ROOT
 from rclpy.serialization import serialize_message
 
 from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize
@@ -506,3 +507,10 @@ def test_bad_usage_ends_with_code_2(bag: Path, capfd: pytest.CaptureFixture[str]
             replay.main(arguments)
         assert ended.value.code == 2
     assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("name", ["tunnel_entry", "tunnel_exit"])
+def test_something_is_identified_in_the_reference_recordings(name: str, offline: Offline) -> None:
+    code, result, _, err = offline(ROOT / "bags" / name, fast=False)
+    assert (code, err) == (0, [])
+    assert "why" not in result

@@ -54,6 +54,15 @@ def test_positions_that_fall_come_first() -> None:
     assert seen.why_not() == BACKWARDS
 
 
+@pytest.mark.parametrize(("open_s", "identified"), [(1, False), (8, True)])
+def test_the_first_moments_at_the_limit_of_the_brake_are_no_identification(open_s: int, identified: bool) -> None:
+    seen = Seen()
+    for i in range(80):
+        regime = "COASTING" if i < 2 * open_s + 6 else "BRAKE_LIMITED"
+        seen.note(i * S // 2, regime, 0.1, 0.09, 50.0 - 0.45 * i, 4e5)
+    assert seen.identified is identified
+
+
 def test_a_gap_is_no_braking() -> None:
     """40 m/s, then after a minute without estimates 5 m/s: nobody saw how it slowed down."""
     seen = Seen()
