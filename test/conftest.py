@@ -24,6 +24,9 @@ from hypothesis.configuration import set_hypothesis_home_dir
 from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 
+from adhesion_node.core import Config
+from adhesion_node.core.estimator import warm_up
+
 DOMAINS = range(1, 101)
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -55,6 +58,13 @@ def pytest_configure(config: pytest.Config) -> None:
     set_hypothesis_home_dir(os.path.join(home, "hypothesis"))
     os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Compile the kernels once, before there are workers: in a fresh clone that takes longer than some tests wait."""
+    if not hasattr(session.config, "workerinput"):
+        warm_up(Config())
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
