@@ -194,7 +194,7 @@ class Config:
         0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
     )
     ahead_std: float = _unsure(
-        0.03,
+        0.04,
         "By how much the adhesion, or the brake's force, may differ over the way ahead in the mean, relative",
         "",
         0.0,
