@@ -20,6 +20,7 @@ from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cases import Case, chosen
 from .goals import goals, missed, soonest
+from .least_error import least_error_percent
 from .score import score
 from .trials import found
 
@@ -28,6 +29,7 @@ JUDGED_SEEDS, TUNED_SEEDS = 1000, 5000
 
 SHOWN = (
     ("error %", 8, ".1f", "error_percent", 1.0),
+    ("least %", 7, ".1f", "error_least_percent", 1.0),
     ("naive %", 7, ".1f", "naive_error_percent", 1.0),
     ("cover %", 7, ".1f", "coverage95", 100.0),
     ("bound %", 7, ".1f", "bound_kept", 100.0),
@@ -101,7 +103,7 @@ def row(case: Case, scored: Mapping[str, Any]) -> dict[str, Any]:
         for goal in goals(case)
     }
     named = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
-    bound = {"found_soonest_s": soonest(case)}
+    bound = {"found_soonest_s": soonest(case), "error_least_percent": least_error_percent(case)}
     return {**named, **scored, **bound, "goals": ranges, "missed": missed(case, scored)}
 
 
