@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cache
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -59,9 +60,11 @@ def outcome(
     duration_s: float = 0.0,
     share: float = 0.0,
     knows_track: bool = False,
+    knows_law: bool = False,
 ) -> Outcome:
     plan, scenario = Plan(fault, start_s, duration_s, share), find("tunnel_entry")
     config = Config(track=scenario.track) if knows_track else Config()
+    config = replace(config, law_probability=0.9) if knows_law else config
     pipeline, predictions, truths = Pipeline(config, 1), list[Prediction](), {}
     for truth, sent in faulty_run(plan, scenario, period_of(plan, 0.1), seed, SETTINGS):
         truths[truth.t_ns] = truth

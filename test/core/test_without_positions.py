@@ -84,7 +84,7 @@ def test_an_outage_of_the_positions_is_gone_through(method: str, speed_variance:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_doppler_speed_alone_is_enough_to_run(method: str) -> None:
     pipeline, predictions = replayed(
-        Config(method=method, speed_source="doppler", iterations=10), stream(lambda _k: False, 0.0025)
+        Config(method=method, speed_source="doppler", iterations=10, tick_s=0.5), stream(lambda _k: False, 0.0025)
     )
     assert_finite(predictions)
     estimates = [each.estimate for each in predictions]

@@ -25,7 +25,7 @@ from adhesion_node.core.intake.outcome import Outcome
 from adhesion_node.core.intake.pairing import Gate, Inbox, Matched, Tick
 
 S = 1_000_000_000
-GATE = gate_of(Config())
+GATE = gate_of(Config(tick_s=0.5))
 
 MAKE: dict[str, Callable[[int], Sample]] = {
     "position": lambda t_ns: PositionSample(t_ns, 30e-9 * t_ns, 1.0),
@@ -155,7 +155,7 @@ def test_no_other_sensor_begins_by_itself(name: str) -> None:
 
 def test_without_position_and_speed_ticks_end_after_tick_for_s_and_a_speed_begins_them_again() -> None:
     sensors = [Sensor("position", 10, silent=(5.0, 1e3)), Sensor("speed", 10, silent=(10.0, 100.0)), PRESSURE]
-    ticks = run(sensors, 110.0, gate_of(Config(tick_for_s=20.0))).ticks_s
+    ticks = run(sensors, 110.0, gate_of(Config(tick_s=0.5, tick_for_s=20.0))).ticks_s
     assert max(later - before for before, later in pairwise(t for t in ticks if t < 29.9)) < 0.51
     assert [t for t in ticks if 30.0 < t < 100.0] == []
     assert ticks[-1] > 109.0
