@@ -24,7 +24,7 @@ def peaks(values: Array, most: int) -> Times:
     """Indices of about `most` values: the lowest and the highest of equal parts, with the first and the last.
 
     >>> peaks(np.array([0.0, 1.0, 9.0, 1.0, 1.0, -5.0, 1.0, 0.0]), 4).tolist()
-    [0, 2, 5, 7]
+    [0, 2, 4, 5, 7]
     """
     if values.size <= most:
         return np.arange(values.size)

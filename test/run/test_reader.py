@@ -15,6 +15,7 @@ from pyproj import Geod
 from test_offline import NO_TRUTH, START_NS, samples, write_run
 
 from adhesion_node.bag import BagWriter, encode
+from adhesion_node.core import Config
 from adhesion_node.nodes import replay
 from adhesion_node.run.offline import Recorded
 from adhesion_node.run.offline import replay as replayed
@@ -175,7 +176,7 @@ def test_the_offline_replay_runs_by_a_speed_alone(tmp_path: Path, capfd: pytest.
     assert replay.main([str(tmp_path / "bag"), "--offline", "--json", "-", *by_doppler]) == 0
     result = json.loads(capfd.readouterr().out)
     assert (result["measurements"], result["accepted"], result["dropped"]) == (0, 0, {})
-    assert result["ticks"] == len(samples()) * 0.1 / 0.5 - 1
+    assert result["ticks"] == pytest.approx(len(samples()) * 0.1 / Config().tick_s - 1)
     assert result["windows"] > 10
     assert result["mu_final"] > 0.0
 

@@ -240,5 +240,5 @@ def test_a_typo_is_named_with_the_nearest_parameter(make: Make) -> None:
 def test_the_effective_configuration_is_logged_once(make: Make, capfd: pytest.CaptureFixture[str]) -> None:
     declare(make({"start_mu": 0, "start_nu": 1}), SPECS)
     logged = capfd.readouterr().err
-    assert logged.count("start_mu = 0.0, particles = 20, law = wet") == 1
+    assert logged.count("start_mu = 0.0, all others") == 1
     assert logged.count("did you mean start_mu?") == 1
