@@ -3,7 +3,8 @@
 """`report BAG`: what a recording shows, as one HTML page that needs no network, and as PNG and PDF pictures.
 
 A recording that holds the results of the estimator is shown as recorded; of one that holds sensor messages alone the
-results are estimated first, with --set and --params. Several recordings stand side by side.
+results are estimated first, with --set and --params. Several recordings stand side by side. Of tables that `brakings`
+wrote, with its map or without: a row for each braking, the rail over place and date, and where it was low.
 """
 
 import argparse
@@ -19,9 +20,10 @@ from ..wire.settings import Setup, setup_of
 from .curves import Subject
 from .estimated import estimate_run
 from .findings import findings
+from .fleet.command import is_table, report_fleet
 from .page import report_page
 from .picture import draw
-from .run import RESULTS, read_run
+from .run import FIXED_MU, RESULTS, read_run
 from .table import table
 
 PICTURES = (".png", ".pdf")
@@ -29,6 +31,7 @@ PICTURES = (".png", ".pdf")
 EXAMPLES = (
     "report my_run --output my_report",
     "report before after --output both --target 100 --set train.mass_kg=400000",
+    "report brakings.parquet rail.parquet --output fleet",
 )
 
 
@@ -38,6 +41,8 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _work(options: argparse.Namespace) -> int:
+    if any(map(is_table, options.bags)):
+        return report_fleet(options.bags, options)
     if not 0.0 <= options.target <= 500.0:
         raise ValueError(f"target = {options.target}: give a speed from 0 to 500 km/h")
     given = parameters_of(options)
@@ -94,10 +99,12 @@ def _pictures(subject: Subject, output: Path, target_kmh: float) -> Iterator[str
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("report", parents=[json_option()], **help_texts(__doc__, *EXAMPLES))
     add = parser.add_argument
-    add("bags", metavar="BAG", nargs="+", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
+    add("bags", metavar="BAG", nargs="+", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not; tables")
     add("--output", metavar="DIR", required=True, help="folder of the report; one that is there is written over")
     add("--target", metavar="KMH", type=float, default=0.0, help="speed to which distances count (default: 0)")
     add("--estimate", action="store_true", help="estimate anew, whatever results the recording holds")
+    low = "of tables: an adhesion below it is a low spot (default: %(default)g)"
+    add("--low", metavar="MU", type=float, default=FIXED_MU, help=low)
     remap_option(add)
     setting_options(add)
     return parser

@@ -2,11 +2,9 @@
 
 """The report as one HTML page: findings, charts with a slider, drops, diagnostics, parameters and versions."""
 
-import platform
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
-from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
 from ..web import as_json, page
@@ -14,6 +12,7 @@ from ..wire.settings import SETTINGS
 from .curves import Subject, chart_data
 from .events import events
 from .findings import findings, listed
+from .parts import table_html, value_or, versions
 from .run import FIXED_MU, Run
 from .table import NO_ROWS, rows, shown
 
@@ -41,7 +40,7 @@ FINDINGS: tuple[tuple[str, _Write], ...] = (
     ("Lower bound of μ kept", lambda f, s: _kept(f) + _confidence(s)),
     ("Changes of the rail found", lambda f, s: _times(f["changes_s"])),
     ("Interventions of the ATP monitor", lambda f, s: _interventions(f, s.run)),
-    ("Mean relative error while adhesion limits", lambda f, s: _value(f["mean_relative_error_percent"], "{:.2f} %")),
+    ("Mean relative error while adhesion limits", lambda f, s: value_or(f["mean_relative_error_percent"], "{:.2f} %")),
     ("Messages not used", lambda f, s: escape(listed(f["dropped"]) or "none")),
 )
 """Lines of the table of findings: their names and how they are written."""
@@ -65,7 +64,7 @@ def report_page(title: str, subjects: Sequence[Subject], target_kmh: float, para
         _section("Distances", subjects, lambda subject: _distances(subject, target_kmh)),
         _section("Diagnostics", subjects, _diagnostics),
         _parameters(parameters),
-        _versions(),
+        versions(),
     )
     return page(
         "report",
@@ -82,11 +81,7 @@ def _findings(subjects: Sequence[Subject], target_kmh: float) -> str:
     body = ([escape(name), *map(write, found.values(), subjects)] for name, write in FINDINGS)
     brakings = "".join(f"<section><h3>{escape(name)}</h3>{_brakings(each)}</section>" for name, each in found.items())
     note = f"<p class='soft'>Distances are those to {target_kmh:g} km/h. A button shows the braking in the charts.</p>"
-    return _table(["finding", *map(escape, found)], body) + f"<h2>Brakings</h2>{note}{brakings}"
-
-
-def _value(value: float | None, form: str, absent: str = "–") -> str:
-    return absent if value is None else form.format(value)
+    return table_html(["finding", *map(escape, found)], body) + f"<h2>Brakings</h2>{note}{brakings}"
 
 
 def _identified(found: Mapping[str, Any]) -> str:
@@ -121,7 +116,7 @@ def _brakings(found: Mapping[str, Any]) -> str:
     header = ("from", "km/h", "limited by", "μ̂ identified", "else μ ≥", "at least, at the end", "bound kept")
     claims = ("rail changed", "fixed worst case", "saved at least, by every later bound")
     body = ([_jump(row), *(escape(cell) for cell in _told(row))] for row in found["brakings"])
-    return _table([*header, *claims], body) if found["brakings"] else "<p>The train did not brake.</p>"
+    return table_html([*header, *claims], body) if found["brakings"] else "<p>The train did not brake.</p>"
 
 
 def _jump(row: Mapping[str, Any]) -> str:
@@ -134,9 +129,9 @@ def _told(row: Mapping[str, Any]) -> Iterator[str]:
     shares = (("adhesion", row["adhesion_share"]), ("the brake", row["brake_share"]))
     yield ", ".join(f"{name} {share:.0%}" for name, share in shares if share) or "nothing is claimed"
     yield "–" if row["mu_low"] is None else f"{row['mu_low']:.4f} to {row['mu_high']:.4f}"
-    yield _value(row["mu_at_least"], "{:.4f}")
-    yield _value(row["mu_lower"], "{:.4f}")
-    yield _value(row["bound_kept_percent"], "{:.1f} %")
+    yield value_or(row["mu_at_least"], "{:.4f}")
+    yield value_or(row["mu_lower"], "{:.4f}")
+    yield value_or(row["bound_kept_percent"], "{:.1f} %")
     yield _times(row["changes_s"])
     yield "–" if row["fixed_m"] is None else f"{row['fixed_m']:.0f} m from {row['identified_at_kmh']:.0f} km/h"
     saved, fixed = row["saved_at_least_m"], row["fixed_m"]
@@ -159,19 +154,19 @@ def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject],
 def _distances(subject: Subject, target_kmh: float) -> str:
     header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "by bound m", f"fixed {FIXED_MU} m"]
     body = list(rows(subject.run, target_kmh, subject.config.train, "–"))
-    return _table(shown(subject.run, header), body, "number") if body else f"<p>{escape(NO_ROWS)}</p>"
+    return table_html(shown(subject.run, header), body, "number") if body else f"<p>{escape(NO_ROWS)}</p>"
 
 
 def _diagnostics(subject: Subject) -> str:
     counts = subject.run.counts.items()
-    return _table(["value", "last"], ([escape(key), f"<code>{escape(value)}</code>"] for key, value in counts))
+    return table_html(["value", "last"], ([escape(key), f"<code>{escape(value)}</code>"] for key, value in counts))
 
 
 def _events(subject: Subject) -> str:
     run, found = subject.run, events(subject.run)
     body = [[f"{(t_ns - run.origin_ns) * 1e-9:.1f} s", kind, escape(text)] for t_ns, kind, text in found[:MOST_CHANGES]]
     more = f"<p>and {len(found) - MOST_CHANGES} more</p>" if len(found) > MOST_CHANGES else ""
-    return (_table(["time", "kind", "what"], body) + more) if body else "<p>None recorded.</p>"
+    return (table_html(["time", "kind", "what"], body) + more) if body else "<p>None recorded.</p>"
 
 
 def _parameters(given: Mapping[str, Any]) -> str:
@@ -184,26 +179,5 @@ def _parameters(given: Mapping[str, Any]) -> str:
     return (
         f"<h2>Parameters</h2><p>{changed or 'All at their defaults.'} A recording does not hold the parameters of the "
         "estimator that ran beside it; forces and the fixed worst case take the train from here.</p>"
-        f"<details><summary>All parameters</summary>{_table(['name', 'value', 'unit', 'meaning'], body)}</details>"
+        f"<details><summary>All parameters</summary>{table_html(['name', 'value', 'unit', 'meaning'], body)}</details>"
     )
-
-
-def _versions() -> str:
-    names = ("adhesion_node", "numpy", "scipy")
-    listed = [f"{name} {_version(name)}" for name in names] + [f"Python {platform.python_version()}"]
-    return f"<h2>Versions</h2><p>{escape(', '.join(listed))}</p>"
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:  # run from the source tree
-        return "not installed"
-
-
-def _table(header: Sequence[str], body: Iterable[Sequence[str]], kind: str = "") -> str:
-    """A table of cells that are HTML already."""
-    of_kind = f' class="{kind}"' if kind else ""
-    head = "".join(f"<th{of_kind}>{cell}</th>" for cell in header)
-    lines = "".join("<tr>" + "".join(f"<td{of_kind}>{cell}</td>" for cell in row) + "</tr>" for row in body)
-    return f'<div class="scroll" tabindex="0"><table><thead><tr>{head}</tr></thead><tbody>{lines}</tbody></table></div>'

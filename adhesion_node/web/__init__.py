@@ -11,8 +11,16 @@ POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inli
 """What a page may do: nothing but what stands in it."""
 
 _CHARTS = ("uplot.js", "chart.js")
-STYLES = {"report": ("uplot.css", "style.css"), "live": ("uplot.css", "style.css", "live.css")}
-SCRIPTS = {"report": (*_CHARTS, "report.js"), "live": (*_CHARTS, "dial.js", "live.js")}
+STYLES = {
+    "report": ("uplot.css", "style.css"),
+    "fleet": ("uplot.css", "style.css", "fleet.css"),
+    "live": ("uplot.css", "style.css", "live.css"),
+}
+SCRIPTS = {
+    "report": (*_CHARTS, "report.js"),
+    "fleet": (*_CHARTS, "fleet.js"),
+    "live": (*_CHARTS, "dial.js", "live.js"),
+}
 """What stands in each page, in this order."""
 
 

@@ -1,0 +1,47 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""`report BRAKINGS.parquet`: the page of a table of brakings."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from ...command.options import DONE, FAILED, report
+from ...run.offline import parameters_of
+from .page import fleet_page
+from .rail import low_spots, read_fleet
+
+ENDINGS = (".csv", ".parquet")
+
+
+def is_table(path: str) -> bool:
+    """Whether it is a table rather than a recording."""
+    return Path(path).suffix.lower() in ENDINGS
+
+
+def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
+    """Write the page and say what it shows; the exit code of the tool."""
+    if not 0.0 < options.low <= 1.0:
+        raise ValueError(f"low = {options.low}: give an adhesion coefficient above 0, to 1")
+    recordings = [path for path in paths if not is_table(path)]
+    if recordings:
+        raise ValueError(f"bags = {', '.join(recordings)}: give recordings, or tables of brakings, not both")
+    if parameters_of(options) or options.estimate or options.remap or options.target:
+        raise ValueError(f"tables = {', '.join(paths)}: are shown as written, give settings to `brakings`")
+    fleet = read_fleet([Path(path) for path in paths])
+    html, spots = fleet_page(fleet, options.low), low_spots(fleet.rail, options.low)
+    output = Path(options.output)
+    output.mkdir(parents=True, exist_ok=True)
+    page = output / "report.html"
+    page.write_text(html, encoding="utf-8")
+    limited = int(fleet.brakings["mu"].notna().sum())
+    result: dict[str, Any] = {"page": str(page), "brakings": len(fleet.brakings), "limited": limited}
+    result["low_spots"] = [spot._asdict() for spot in spots]
+    lines = [f"{len(fleet.brakings)} brakings, the adhesion limited in {limited}; low spots: {len(spots)}"]
+    lines += [f"{s.from_m:.0f} to {s.to_m:.0f} m: {s.lowest:.4f}, {s.low_dates} of {s.dates} dates" for s in spots]
+    report(options.json, result, "\n".join([*lines, str(page)]))
+    if not limited:
+        print("report: nothing is identified: the adhesion limited in no braking", file=sys.stderr)
+    return DONE if limited else FAILED

@@ -1,0 +1,120 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Tables of brakings and of the rail as `brakings` writes them, and where the rail was low."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ...core.physics.train import KMH
+from ...run.brakings import BRAKING, CELL_M
+from ...run.rail_map import map_of
+
+RAIL = ("place_m", "length_m", "date", "seen", "limited", "mu", "mu_lowest", "used", "mu_lower")
+
+
+class Fleet(NamedTuple):
+    """Brakings in the order of time, and the rail by piece of track and date."""
+
+    brakings: pd.DataFrame
+    rail: pd.DataFrame
+    by_piece: bool
+    """The rail is a map that was written beside the brakings; else each braking counts alike along its whole way."""
+
+
+class Spot(NamedTuple):
+    """Neighbouring pieces in each of which a braking showed a low adhesion."""
+
+    from_m: float
+    to_m: float
+    lowest: float
+    mu_lower: float
+    """The least bound of its low pieces."""
+    seen: int
+    limited: int
+    """Brakings that showed it; those whose adhesion limited there."""
+    dates: int
+    low_dates: int
+    """Dates on which it was seen, and was low."""
+    newest: str
+    """Date on which it was low."""
+
+
+def read_fleet(paths: Sequence[Path]) -> Fleet:
+    """Read tables of brakings and at most one map. Raises ValueError with what to mend."""
+    tables, maps = list[pd.DataFrame](), list[pd.DataFrame]()
+    for path in paths:
+        frame = _read(path)
+        is_map = "length_m" in frame
+        wanted = RAIL if is_map else ("train", "recording", *(BRAKING.names or ()))
+        if lacking := [name for name in wanted if name not in frame]:
+            raise ValueError(
+                f"table = {path}: lacks the columns {', '.join(lacking)}: give what `brakings` writes; "
+                "`import_csv` makes a recording of a log"
+            )
+        (maps if is_map else tables).append(frame)
+    if not tables or len(maps) > 1:
+        raise ValueError(f"tables = {len(tables)} of brakings, {len(maps)} maps: give one or more, and one map at most")
+    brakings = pd.concat(tables).sort_values("t_ns", ignore_index=True)
+    if brakings.empty:
+        raise ValueError(f"tables = {', '.join(map(str, paths))}: hold no braking, there is nothing to show")
+    brakings["time"] = pd.to_datetime(brakings["t_ns"], utc=True)
+    rail = maps[0] if maps else spread(brakings)
+    return Fleet(brakings, rail.sort_values(["date", "place_m"], ignore_index=True), bool(maps))
+
+
+def spread(brakings: pd.DataFrame, cell_m: float = CELL_M) -> pd.DataFrame:
+    """The rail by piece and date, as if each braking had shown what it did on its whole way."""
+    ends = np.floor(brakings[["place_m", "place_end_m"]].to_numpy(np.float64) / cell_m).astype(np.int64)
+    ways = [np.arange(min(pair), max(pair) + 1) for pair in ends.tolist()]
+    cells = brakings.loc[brakings.index.repeat([way.size for way in ways])].assign(
+        cell=np.concatenate([np.arange(0), *ways]),
+        limited=lambda rows: rows["mu"].notna(),
+        speed_mps=lambda rows: 0.5 * KMH * (rows["from_kmh"] + rows["to_kmh"]),
+    )
+    return map_of(cells, cell_m)
+
+
+def over_dates(rail: pd.DataFrame) -> pd.DataFrame:
+    """The rail by piece: lowest adhesion and least bound of all dates, where any adhesion limited, else the highest."""
+    least = rail["mu_lower"].where(rail["mu"].notna())
+    by = rail.assign(least=least).groupby("place_m")
+    found = by.agg(length_m=("length_m", "max"), mu=("mu_lowest", "min"), used=("used", "max"), least=("least", "min"))
+    return found.assign(mu_lower=found["least"].fillna(by["mu_lower"].max())).reset_index()
+
+
+def low_spots(rail: pd.DataFrame, low: float) -> list[Spot]:
+    """Where an adhesion below `low` was identified, the lowest first."""
+    pieces = rail[rail["mu_lowest"] < low].groupby("place_m")["length_m"].max()
+    places, ends = pieces.index.to_numpy(np.float64), (pieces.index + pieces).to_numpy(np.float64)
+    parts = np.split(np.arange(places.size), np.flatnonzero(places[1:] > ends[:-1] + 1e-6) + 1)
+    spots = [_spot(rail[rail["place_m"].isin(places[part])], ends[part[-1]], low) for part in parts if part.size]
+    return sorted(spots, key=lambda spot: spot.lowest)
+
+
+def _spot(rows: pd.DataFrame, to_m: float, low: float) -> Spot:
+    was_low = rows[rows["mu_lowest"] < low]
+    by_date = rows.groupby("date")[["seen", "limited"]].max().sum()  # a braking shows several of the pieces
+    return Spot(
+        from_m=float(rows["place_m"].min()),
+        to_m=float(to_m),
+        lowest=float(rows["mu_lowest"].min()),
+        mu_lower=float(was_low["mu_lower"].min()),
+        seen=int(by_date["seen"]),
+        limited=int(by_date["limited"]),
+        dates=int(rows["date"].nunique()),
+        low_dates=int(was_low["date"].nunique()),
+        newest=str(was_low["date"].max()),
+    )
+
+
+def _read(path: Path) -> pd.DataFrame:
+    try:
+        return pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path)
+    except ImportError as error:
+        raise ValueError(f"table = {path}: needs pyarrow, pip install '.[parquet]', or give a .csv") from error
+    except (OSError, ValueError) as error:
+        raise ValueError(f"table = {path}: not readable ({error}): `brakings` writes one") from error
