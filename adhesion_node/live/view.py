@@ -15,9 +15,9 @@ from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
 from ..report.run import IN_WORDS
+from ..web.creep import creep_part
+from ..web.fit import number, numbers, rounded, text_of
 from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
-from .creep import creep_part
-from .fit import number, numbers, rounded, text_of
 
 EXPECTED = {
     POSITION: "position",

@@ -13,6 +13,7 @@ from ..core.physics.train import KMH
 from .ahead import SHOWN, ahead
 from .brakings import Braking, brakings, exactly, regimes_at
 from .charts import Chart, charts
+from .creep import creep_data
 from .events import events
 from .findings import distances, first_identified
 from .run import FIXED_MU, IN_WORDS, Curve, Distances, Run, bands
@@ -70,6 +71,7 @@ def chart_data(subject: Subject, target_kmh: float) -> dict[str, Any]:
         "path": {name: [column[i] for i in forward] for name, column in way.items()},
         "fixed": {"x": rounded(fixed.distance_m, 1), "y": rounded(fixed.speed_mps / KMH, 2)},
         "moments": moments,
+        "creep": creep_data(run.creep, run.origin_ns),
         "opens_at": moments[-1]["t"] if first is None else number(seconds[first], 2),
     }
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..web import as_json, page
 from ..wire.settings import SETTINGS
+from .creep import creep_in_words
 from .curves import Subject, chart_data
 from .events import events
 from .findings import findings, listed
@@ -40,6 +41,7 @@ FINDINGS: tuple[tuple[str, _Write], ...] = (
     ("Lower bound of μ kept", lambda f, s: _kept(f) + _confidence(s)),
     ("Changes of the rail found", lambda f, s: _times(f["changes_s"])),
     ("Interventions of the ATP monitor", lambda f, s: _interventions(f, s.run)),
+    ("Peak of the creep curve", lambda f, s: escape(creep_in_words(s.run.creep))),
     ("Mean relative error while adhesion limits", lambda f, s: value_or(f["mean_relative_error_percent"], "{:.2f} %")),
     ("Messages not used", lambda f, s: escape(listed(f["dropped"]) or "none")),
 )

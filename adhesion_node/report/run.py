@@ -19,6 +19,7 @@ from ..core.physics.train import GRAVITY, Array, Train
 from ..wire import topics
 from ..wire.codecs import NOMINAL, Line
 from ..wire.topics import Topic
+from .creep import Curves, read_creep
 from .series import (
     NONE,
     Series,
@@ -100,6 +101,8 @@ class Run(NamedTuple):
     """Changes of the rail found so far, counted."""
     said: tuple[tuple[int, Mapping[str, float]], ...] = ()
     """Numbers of the ATP monitor by key, at their times."""
+    creep: Curves = ()
+    """Of the creep estimator."""
     counts: Mapping[str, str] = MappingProxyType({})
     """Last diagnostics by key."""
 
@@ -161,7 +164,7 @@ def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
 
 
 def read_inputs(reader: BagReader, recorded: Mapping[str, str], line: Line) -> Run:
-    """Read the truth and the brake pressure above the air of `line`, or the demand where there is no pressure.
+    """Read truth, creep curves and the brake pressure above the air of `line`, or the demand without a pressure.
 
     `recorded` has their names in the recording where these differ.
     """
@@ -171,6 +174,7 @@ def read_inputs(reader: BagReader, recorded: Mapping[str, str], line: Line) -> R
 
     pressure = series(topics.BRAKE_PRESSURE, attrgetter("pressure_pa"))
     return Run(
+        creep=read_creep(reader),
         true_mu=series(topics.TRUTH_MU, float),
         true_position=series(topics.TRUTH_STATE, attrgetter("position_m")),
         true_speed=series(topics.TRUTH_STATE, attrgetter("speed_mps")),

@@ -94,17 +94,17 @@ def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read the value of `key` in a topic of diagnostics, as texts."""
-    return _texts((t_ns, status.values[key]) for t_ns, status in _told(reader, topic, key))
+    return _texts((t_ns, status.values[key]) for t_ns, status in statuses(reader, topic, key))
 
 
 def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read what the statuses that have `key` say while they are not OK; "" while they are."""
-    return _texts((t_ns, status.message if status.level else "") for t_ns, status in _told(reader, topic, key))
+    return _texts((t_ns, status.message if status.level else "") for t_ns, status in statuses(reader, topic, key))
 
 
 def read_numbers(reader: BagReader, topic: Topic, key: str) -> tuple[tuple[int, dict[str, float]], ...]:
     """Read the numbers of the statuses that have `key`, at their times."""
-    rows = ((t_ns, _numbers(status.values)) for t_ns, status in _told(reader, topic, key))
+    rows = ((t_ns, _numbers(status.values)) for t_ns, status in statuses(reader, topic, key))
     return tuple(sorted(rows, key=lambda row: row[0]))
 
 
@@ -122,7 +122,7 @@ def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str
     return dict(found[-1]) if found else {}
 
 
-def _told(reader: BagReader, topic: Topic, key: str) -> Iterator[tuple[int, Status]]:
+def statuses(reader: BagReader, topic: Topic, key: str) -> Iterator[tuple[int, Status]]:
     """Yield the statuses that have `key`, at the stamp of the estimate of which they tell, else at their own."""
     for sample in read_topic(reader, topic):
         for status in _with_key(sample.read, key):

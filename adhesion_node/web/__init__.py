@@ -17,9 +17,9 @@ STYLES = {
     "live": ("uplot.css", "style.css", "live.css"),
 }
 SCRIPTS = {
-    "report": (*_CHARTS, "report.js"),
+    "report": (*_CHARTS, "creep.js", "report.js"),
     "fleet": (*_CHARTS, "fleet.js"),
-    "live": (*_CHARTS, "dial.js", "live.js"),
+    "live": (*_CHARTS, "dial.js", "creep.js", "live.js"),
 }
 """What stands in each page, in this order."""
 

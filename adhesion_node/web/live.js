@@ -147,11 +147,8 @@ function drawCreep() {
   const { creep } = state, old = creep == null ? 0 : since(creep.heard), gone = silent() || old > STALE_S;
   byId("creep").hidden = creep == null;
   if (creep == null) return;
-  const [at, peak] = creep.peak, kind = creep.withheld ? "prior" : "identified", range = `${number(creep.lower, 3)} to ${number(creep.upper, 3)}`;
-  say("creep-text", gone ? `nothing from the creep estimator for ${old.toFixed(0)} s` : creep.withheld ? `withheld: ${creep.why}` : `peak ${number(peak, 3)} at a creep of ${number(at, 3)}, ${range}`);
-  slip.draw({ title: "Adhesion over creep", x: { label: "creep", range: [0, creep.x.at(-1)] }, y: { range: [0, 1.3 * Math.max(...creep.y, 0.1)] },
-              lines: [{ label: creep.withheld ? "prior, withheld" : "identified", kind, x: gone ? [] : creep.x, y: gone ? [] : creep.y }],
-              marks: gone || creep.withheld || at > creep.x.at(-1) ? [] : [{ x: at, y: peak, kind: "identified", label: "peak" }] });
+  say("creep-text", gone ? `nothing from the creep estimator for ${old.toFixed(0)} s` : creepText(creep));
+  drawCreepCurve(slip, creep, gone);
 }
 
 function drawState() {

@@ -14,15 +14,16 @@ const common = (i) => ({ range: [Math.min(...all((run) => run.charts[i].range[0]
 const time = { label: "time, s", range: [0, longest] };
 const number = (value, digits, unit = "") => (value === null ? "–" : value.toFixed(digits) + unit);
 
-// The newest moment at a time; the first one before it.
-function momentAt(run, t) {
-  let low = 0, high = run.moments.length;
+// The newest of some at a time; the first one before it.
+function newest(each, t) {
+  let low = 0, high = each.length;
   while (high - low > 1) {
     const middle = (low + high) >> 1;
-    if (run.moments[middle].t <= t) low = middle; else high = middle;
+    if (each[middle].t <= t) low = middle; else high = middle;
   }
-  return run.moments[low];
+  return each[low];
 }
+const momentAt = (run, t) => newest(run.moments, t);
 
 // The fixed worst case from a speed on: a part of its one curve from the highest.
 function fixedFrom(run, { place, speed }) {
@@ -68,11 +69,16 @@ const columns = runs.map((run) => {
     made.draw({ ...spec, x: time, y: common(i), bands: run.bands, events: i ? [] : run.events });
     return made;
   });
+  const slip = run.creep.length > 0 ? chart(grid) : null, about = slip && host.appendChild(element("p", { class: "creep" }));
   return (t, wide) => {
     const moment = momentAt(run, t);
     text.textContent = (runs.length > 1 ? `${run.name}: ` : "") + readout(moment);
     charts.forEach((made) => made.cursor(t));
     curve.draw(curveChart(run, moment, wide));
+    if (slip === null) return;
+    const creep = newest(run.creep, t), none = creep.t > t;
+    drawCreepCurve(slip, creep, none);
+    about.textContent = none ? "Creep curve: no estimate yet" : `Creep curve at ${creep.t.toFixed(1)} s: ${creepText(creep)}`;
   };
 });
 

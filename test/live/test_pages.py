@@ -284,7 +284,7 @@ def test_the_creep_curve_its_peak_and_what_is_withheld() -> None:
     }
     with line() as shown:
         assert not shown.page.locator("#creep").is_visible()
-        shown.view.creep(known | {"withheld": "true"}, "the data do not reach the peak", 0.0)
+        shown.view.creep(known | {"withheld": "true"}, "withheld: the data do not reach the peak", 0.0)
         shown.wait("withheld: the data do not reach the peak")
         assert shown.page.evaluate("slip.plot.series[1].label") == "prior, withheld"
         shown.view.creep(known | {"withheld": "false"}, "known", 0.0)

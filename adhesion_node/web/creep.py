@@ -25,7 +25,7 @@ def creep_part(values: Mapping[str, str], message: str) -> dict[str, Any] | None
     creeps = np.linspace(0.0, CREEP_END, POINTS)
     return {
         "withheld": values.get("withheld") != "false",
-        "why": text_of(message),
+        "why": text_of(message.removeprefix("withheld: ")),
         "peak": [number(known["lambda_m"], 4), number(known["mu_max"], 4)],
         "lower": number(known.get("mu_max_lower"), 4),
         "upper": number(known.get("mu_max_upper"), 4),

@@ -1,0 +1,43 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The creep curve as the diagnostics of a recorded creep estimator told it, its peak and why that was withheld."""
+
+from collections.abc import Sequence
+from operator import itemgetter
+from typing import Any
+
+from ..bag import BagReader
+from ..web.creep import creep_part
+from ..wire.topics import DIAGNOSTICS
+from .series import statuses
+from .thinning import evenly, number
+
+MOST_CURVES = 200
+"""Curves of a run at most, evenly spread over its time."""
+
+Curves = tuple[tuple[int, dict[str, Any]], ...]
+"""Curves as the pages draw them, at their times, ns."""
+
+
+def read_creep(reader: BagReader) -> Curves:
+    """Read all curves; none where no creep estimator was recorded."""
+    told = ((t_ns, creep_part(each.values, each.message)) for t_ns, each in statuses(reader, DIAGNOSTICS, "lambda_m"))
+    return tuple(sorted(((t_ns, part) for t_ns, part in told if part is not None), key=itemgetter(0)))
+
+
+def creep_data(curves: Curves, origin_ns: int) -> list[dict[str, Any]]:
+    """What the script of the report draws; `t` in s from the start of the run."""
+    kept = [curves[i] for i in evenly(len(curves), MOST_CURVES)]
+    return [{"t": number((t_ns - origin_ns) * 1e-9, 2), **part} for t_ns, part in kept]
+
+
+def creep_in_words(curves: Sequence[tuple[int, dict[str, Any]]]) -> str:
+    """How often the peak was known, and the last of what was told."""
+    if not curves:
+        return "not recorded"
+    known = [part for _, part in curves if not part["withheld"]]
+    last = known[-1] if known else None
+    text = f"known in {len(known)} of {len(curves)} estimates"
+    if last is not None:
+        text += f", last {last['peak'][1]:.3f} at a creep of {last['peak'][0]:.3f}"
+    return text + (f"; at the end withheld: {curves[-1][1]['why']}" if curves[-1][1]["withheld"] else "")
