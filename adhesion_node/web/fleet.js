@@ -5,7 +5,7 @@
 
 const { lines, track, highest, low } = JSON.parse(document.getElementById("data").textContent);
 const date = document.getElementById("date"), view = shared(), rail = chart(document.getElementById("place"), { view });
-const LABELS = { identified: "identified", atleast: "at least, the brake limits", bound: "lower bound" };
+const LABELS = { identified: "identified", atleast: "at least: what was used", bound: "lower bound" };
 
 function show() {
   const { x, ...found } = lines[date.value], title = date.selectedIndex === 0 ? "lowest of all dates" : date.value;

@@ -35,7 +35,7 @@ def braking(train: str, day: int, place_m: float, mu: float = np.nan, **others: 
 BRAKINGS = (
     braking("unit_7", 0, 1000.0, 0.05),
     braking("unit_8 <b>", 1, 1100.0, 0.12),
-    braking("unit_8 <b>", 1, 5000.0),
+    braking("unit_8 <b>", 1, 5000.0, share_brake=0.6, share_unclaimed=0.4),
 )
 
 
@@ -116,7 +116,8 @@ def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture
         (["brakings.csv", "run.mcap"], "give recordings, or tables of brakings, not both"),
         (["log.csv"], "log.csv: lacks the columns train, recording, t_ns"),
         (["rail.csv"], "tables = 0 of brakings, 1 maps"),
-        (["none.csv"], "none.csv: not readable"),
+        (["none.csv"], "none.csv: is not there"),
+        (["broken.parquet"], "broken.parquet: not readable"),
         (["nothing.csv"], "hold no braking"),
         (["brakings.csv", "--low", "0"], "low = 0.0: give"),
         (["brakings.csv", "--set", "train.mass_kg=400000"], "are shown as written, give settings to `brakings`"),
@@ -127,7 +128,8 @@ def test_what_cannot_be_shown_is_said(
 ) -> None:
     rail(tmp_path / "rail.csv")
     (tmp_path / "log.csv").write_text("t,v\n1,2\n", encoding="utf-8")
+    (tmp_path / "broken.parquet").write_bytes(b"nothing")
     pd.read_csv(table).iloc[:0].to_csv(tmp_path / "nothing.csv", index=False)
-    paths = [str(tmp_path / each) if each.endswith((".csv", ".mcap")) else each for each in given]
+    paths = [str(tmp_path / each) if each.endswith((".csv", ".mcap", ".parquet")) else each for each in given]
     assert main([*paths, "--output", str(tmp_path / "report")]) == 2
     assert said in capfd.readouterr().err

@@ -66,7 +66,7 @@ def test_the_page_says_what_the_brakings_showed(report: str) -> None:
         first, _, last = rows(page, -1)
         assert first[:5] == ["2023-11-14 22:13:20", "unit_7", "1.00 → 1.25", "100 → 40", "0.00"]
         assert first[5:] == ["adhesion 80%, the brake 20%", "0.0500 ± 0.0010", "0.0450", "–", "0.0400", "500", "0"]
-        assert last[5:10] == ["the brake 100%", "–", "–", "0.1100", "0.1000"]
+        assert last[5:10] == ["the brake 60%, nothing is claimed 40%", "–", "–", "0.1100", "0.1000"]
         assert troubles == []
     assert asked == [report]
 
@@ -83,7 +83,7 @@ def test_the_map_has_a_strip_for_each_date(report: str) -> None:
         assert new == ["1.00 to 1.10 km: 0.1200", "1.00 to 1.10 km: 0.1100", "9.00 to 9.10 km: 0.1000"]
         assert old == ["1.00 to 1.20 km: 0.0500", "1.00 to 1.10 km: 0.0400", "1.10 to 1.20 km: 0.0550"]
         legend = page.locator(".legend span").all_inner_texts()
-        assert legend == ["below 0.05", "from 0.05", "from 0.0726", "from 0.1", "from 0.15"]
+        assert legend == ["below 0.05", "0.05 to 0.0726", "0.0726 to 0.1", "0.1 to 0.15", "from 0.15"]
         strip, tile = strips.nth(1).bounding_box(), strips.nth(1).locator("rect").first.bounding_box()
         assert tile["width"] / strip["width"] == pytest.approx(200.0 / 8100.0, rel=0.1)
         colours = {
@@ -100,7 +100,7 @@ def test_the_chart_has_the_date_and_place_that_were_chosen(report: str) -> None:
         assert title.inner_text() == "Adhesion over place, lowest of all dates"
         lines = drawn(page)
         assert lines["identified"] == [(1.0, 0.05), (1.099999, 0.05), (1.1, 0.065), (1.199999, 0.065)]
-        assert lines["at least, the brake limits"] == [(9.0, 0.11), (9.099999, 0.11)]
+        assert lines["at least: what was used"] == [(9.0, 0.11), (9.099999, 0.11)]
         page.get_by_role("button", name=DATES[1], exact=True).click()
         assert title.inner_text() == f"Adhesion over place, {DATES[1]}"
         assert drawn(page)["identified"] == [(1.0, 0.12), (1.099999, 0.12)]

@@ -4,6 +4,7 @@
 
 from collections.abc import Iterator
 from html import escape
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -113,8 +114,8 @@ def _button(text: str, from_m: float, to_m: float, date: str = ALL) -> str:
 
 
 def _legend() -> str:
-    names = ["below", *(f"from {edge:g}" for edge in EDGES)]
-    names[0] += f" {EDGES[0]:g}"
+    between = (f"{low:g} to {high:g}" for low, high in pairwise(EDGES))
+    names = (f"below {EDGES[0]:g}", *between, f"from {EDGES[-1]:g}")
     return "".join(f'<span><i class="tile m{kind}"></i>{name}</span>' for kind, name in enumerate(names))
 
 
@@ -156,7 +157,7 @@ def _brakings(brakings: pd.DataFrame) -> str:
 
 def _row(row: dict[str, Any]) -> list[str]:
     identified = row["mu"] == row["mu"]
-    shares = (("adhesion", row["share_adhesion"]), ("the brake", row["share_brake"]))
+    limits = (("adhesion", "share_adhesion"), ("the brake", "share_brake"), ("nothing is claimed", "share_unclaimed"))
     mu = f"{row['mu']:.4f} ± {row['mu_std']:.4f}" if identified else "–"
     return [
         _button(f"{row['time']:%Y-%m-%d %H:%M:%S}", row["place_m"], row["place_end_m"], f"{row['time']:%Y-%m-%d}"),
@@ -164,7 +165,7 @@ def _row(row: dict[str, Any]) -> list[str]:
         f"{row['place_m'] / 1e3:.2f} → {row['place_end_m'] / 1e3:.2f}",
         f"{row['from_kmh']:.0f} → {row['to_kmh']:.0f}",
         f"{row['deceleration_mps2']:.2f}",
-        ", ".join(f"{name} {share:.0%}" for name, share in shares if share > 0.0) or "nothing is claimed",
+        ", ".join(f"{name} {row[share]:.0%}" for name, share in limits if row[share] > 0.005),
         mu,
         value_or(row["mu_least"], "{:.4f}"),
         "–" if identified else value_or(row["used"], "{:.4f}"),

@@ -112,6 +112,8 @@ def _spot(rows: pd.DataFrame, to_m: float, low: float) -> Spot:
 
 
 def _read(path: Path) -> pd.DataFrame:
+    if not path.exists():
+        raise ValueError(f"table = {path}: is not there")
     try:
         return pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path)
     except ImportError as error:
