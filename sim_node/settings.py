@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from adhesion_node.core.setting import Setting, settings_of
+from adhesion_node.wire.telling import TELLING
 from adhesion_node.wire.topics import POSITION, WHEEL_SPEED, Topic
 
 from .faults.plan import Plan
@@ -44,11 +45,13 @@ SIMULATOR = (
     SENSORS,
     *settings_of(SensorSettings, group="sensors"),
     *settings_of(Plan, group="fault"),
+    *TELLING,
 )
 
 SLIP_SIMULATOR = (
     *_run(slip_scenario.SCENARIOS, "creep_switch", 100.0, WHEEL_SPEED),
     *settings_of(SlipNoise, group="sensors"),
+    *TELLING,
 )
 
 OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(

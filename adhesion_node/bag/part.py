@@ -90,9 +90,14 @@ class Part:
         self.last_ns = max(self.last_ns, log_ns)
         self.count += 1
 
+    @property
+    def size(self) -> int:
+        """Bytes that the operating system has; what is `unsaved` is not among them."""
+        return self._stream.tell()
+
     def bound(self) -> int:
         """Return what the finished file will not exceed, in bytes."""
-        return self._stream.tell() + self._chunk_bytes + self._summary_bytes
+        return self.size + self._chunk_bytes + self._summary_bytes
 
     def advance(self, log_ns: int) -> None:
         """End the chunk where a message of this time would not belong into it any more."""

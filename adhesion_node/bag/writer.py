@@ -98,6 +98,16 @@ class BagWriter:
         """Messages that the death of this process would cost."""
         return self._part.unsaved
 
+    @property
+    def file(self) -> Path:
+        """The file that is written at present."""
+        return self.path / file_name(len(self._files))
+
+    @property
+    def size(self) -> int:
+        """Bytes of the present file that the operating system has."""
+        return self._part.size
+
     def advance(self, log_ns: int) -> None:
         """Tell that what follows is of this time or later: a chunk whose span is over is handed on at once."""
         self._part.advance(log_ns)

@@ -12,12 +12,14 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from rclpy.node import Node
-
+from ..core.atp.supervision import Severity
 from ..nodes.ros import qos
+from ..nodes.ros.diagnostics import Diagnostics, Finding, Told
+from ..nodes.ros.params import SettingsNode, declare
 from ..wire import topics
 from ..wire.codecs import Rejected
 from ..wire.results import Statuses
+from ..wire.telling import TELLING
 from ..wire.topics import Frame
 from .view import View
 
@@ -25,7 +27,7 @@ PERIOD_S = 0.1
 """Time between two looks of a page at the view."""
 
 
-class Live(Node):
+class Live(SettingsNode):
     """Shows the run in a browser: speed against its limits, adhesion with its bound, health of the inputs.
 
     `--host` and `--port` say where the page is served; by default only this machine sees it.
@@ -33,7 +35,8 @@ class Live(Node):
 
     def __init__(self, host: str, port: int, **kwargs: Any) -> None:
         """Serve at once. Raises OSError when the address is taken, ValueError when aiohttp is missing."""
-        super().__init__("live", **kwargs)
+        super().__init__("live", automatically_declare_parameters_from_overrides=True, **kwargs)
+        values = declare(self, TELLING, quiet=True)
         self.view = View()
         for topic, take in self._inputs().items():
             qos.subscribe(self, topic, self._receiver(topic, take))
@@ -50,11 +53,20 @@ class Live(Node):
         """Who else sees the page; empty: nobody."""
         if self.warning:
             self.get_logger().warning(self.warning)
+        self._diagnostics = Diagnostics(self, "page", values, self._told)
         self.get_logger().info(f"open {self.server.url}")
 
     def close(self) -> None:
         """End the pages and give the address back."""
         self.server.close()
+
+    def _told(self) -> Told:
+        found = [Finding(Severity.OK, f"open {self.server.url}")]
+        if self.warning:
+            found.append(Finding(Severity.WARN, self.warning))
+        now_s, heard = time.monotonic(), self.view.last_heard()
+        ages = {f"age_s.{name}": f"{now_s - at_s:.1f}" for name, at_s in heard.items()}
+        return found, {"viewers": str(self.server.viewers), **ages}
 
     def _inputs(self) -> dict[topics.Topic, Callable[[Any], None]]:
         """How what is read of each topic is taken, in the order in which the estimator publishes."""

@@ -87,10 +87,14 @@ class View:
             "sign": self._sign,
             "now": round(now_s, 2),
             "inputs": {topic.name: self._health(topic, now_s) for topic in EXPECTED},
-            "heard": {topic.name: round(at[-1], 2) for topic in EXPECTED if (at := tuple(self._arrivals[topic]))},
+            "heard": {name: round(at_s, 2) for name, at_s in self.last_heard().items()},
             "taken": self._taken,
             "ended": self._ended_s is not None,
         }
+
+    def last_heard(self) -> dict[str, float]:
+        """When the last message of each expected topic came, by its name; of none that is silent from the start."""
+        return {topic.name: at[-1] for topic in EXPECTED if (at := tuple(self._arrivals[topic]))}
 
     def heard(self, topic: Topic, now_s: float, refusal: str = "") -> None:
         """A message of a topic has come; `refusal` says why it cannot be shown."""

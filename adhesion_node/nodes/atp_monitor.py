@@ -28,7 +28,7 @@ from adhesion_node.core.physics.train import KMH
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Line, Rejected
-from adhesion_node.wire.settings import ATP_SETTINGS, Telling, Watchdogs
+from adhesion_node.wire.settings import ATP_SETTINGS, Watchdogs
 from adhesion_node.wire.topics import Topic
 
 from .ros import qos, runtime
@@ -65,7 +65,7 @@ class AtpMonitor(ManagedNode):
         self._now_ns = self._stamp_ns = self._seen_ns = 0
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         told = partial(self.standing, self._told)
-        self._diagnostics = Diagnostics(self, "supervision", make(Telling, values), told, self.published)
+        self._diagnostics = Diagnostics(self, "supervision", values, told, self.published)
         self.bring_up(values)
 
     def open(self) -> None:

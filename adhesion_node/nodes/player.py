@@ -12,14 +12,17 @@ from typing import Any
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
 from rclpy.duration import Duration
-from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
 
 from ..bag import BagReader, Record
+from ..core.atp.supervision import Severity
 from ..wire import topics
+from ..wire.telling import TELLING
 from .offers import as_recorded, expires
+from .ros.diagnostics import Diagnostics, Finding, Told
 from .ros.discovery import Subscribers
+from .ros.params import SettingsNode, declare
 from .ros.qos import advertise
 from .ros.types import new
 
@@ -39,7 +42,7 @@ ACKNOWLEDGED_S = 10.0
 """Longest wait for reliable subscribers to take what was published."""
 
 
-class Replay(Node):
+class Replay(SettingsNode):
     """Publishes the records of `selection` (recorded name -> topic name), as raw bytes, each log time on /clock first.
 
     `rate` is the speed against the log times; 0 publishes as fast as the reliable subscribers take it. It starts
@@ -52,11 +55,12 @@ class Replay(Node):
     ) -> None:
         if not math.isfinite(rate) or rate < 0:
             raise ValueError(f"rate = {rate!r}: give a finite factor, or 0 for as fast as possible")
-        super().__init__("replay", **kwargs)
+        super().__init__("replay", automatically_declare_parameters_from_overrides=True, **kwargs)
+        values = declare(self, TELLING, quiet=True)
         self.finished = False
         self.failure: str | None = None
         self.published: Counter[str] = Counter()
-        self._rate = rate
+        self._rate, self._left = rate, sum(reader.counts[source] for source in selection)
         self._wanted = subscribers
         self._clock_out = advertise(self, topics.CLOCK)
         self._outputs = {
@@ -73,6 +77,7 @@ class Replay(Node):
         self._subscribers = Subscribers(self._outputs.values(), self._position(), subscribers)
         period = PERIOD_S if rate else RUSH_PERIOD_S
         self.create_timer(period, self.tick, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
+        self._diagnostics = Diagnostics(self, "playing", values, self._told)
 
     def tick(self) -> None:
         """Publish what is due."""
@@ -86,6 +91,17 @@ class Replay(Node):
         except ValueError as error:  # the recording turns out unreadable on the way
             self.failure = str(error)
             self.finished = True
+
+    def _told(self) -> Told:
+        finding = Finding(Severity.OK, "the end of the recording" if self.finished else "playing")
+        if self.failure is not None:
+            finding = Finding(Severity.ERROR, self.failure)
+        elif self._origin is None:
+            waits = f"waiting for {self._wanted} subscriber(s) to {self._position().topic_name}"
+            finding = Finding(Severity.OK, waits)
+        published = sum(self.published.values())
+        next_ns = "none" if self._next is None else str(self._next[0])
+        return [finding], {"next_ns": next_ns, "published": str(published), "left": str(self._left - published)}
 
     def _start_when_heard(self) -> None:
         now = time.monotonic()

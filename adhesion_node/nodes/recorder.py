@@ -12,17 +12,20 @@ from typing import Any, NamedTuple
 
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ..bag import BagWriter, Limits, deserialize, serialize
 from ..bag.writer import MB
 from ..command.options import help_texts, run_tool
+from ..core.atp.supervision import Severity
 from ..wire import topics
 from ..wire.codecs import stamp_ns
+from ..wire.telling import TELLING
 from .log_time import SimulatedTime
 from .offers import offered
 from .ros import runtime
+from .ros.diagnostics import Diagnostics, Finding, Told
+from .ros.params import SettingsNode, declare
 from .ros.qos import subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
@@ -35,6 +38,8 @@ ROUNDS = 5
 """A message that log time has not brought to the disk goes there after so many rounds of the system's clock: /clock
 stands still or is slow. A busy machine misses rounds, so it does not change what equal runs leave, as a deadline would.
 """
+
+NO_CLOCK = "no /clock yet, what comes waits for it: is the simulator running? Else leave use_sim_time out"
 
 HELD = 10_000
 """Messages that wait for the first /clock at most."""
@@ -63,7 +68,7 @@ class _Message(NamedTuple):
     stamp_ns: int
 
 
-class Recorder(Node):
+class Recorder(SettingsNode):
     """Records `topics.RECORDED` under their resolved names into the new directory `output`.
 
     The log time is the node's time: the system clock at arrival, or with `use_sim_time` the /clock in force when the
@@ -84,7 +89,8 @@ class Recorder(Node):
 
         That is for a /clock that does not stand still, and leaves equal bytes on the slowest machine too.
         """
-        super().__init__("recorder", **kwargs)
+        super().__init__("recorder", automatically_declare_parameters_from_overrides=True, **kwargs)
+        values = declare(self, TELLING, quiet=True)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
         self._time = SimulatedTime()
         self._last_ns = 0
@@ -94,6 +100,7 @@ class Recorder(Node):
         """Arrivals at the latest rounds."""
         self._oldest_unsaved = 0
         self._pending: list[_Message] = []
+        self._given_up = 0
         if self._simulated:
             subscribe(self, topics.CLOCK, self._on_clock)
         for topic in topics.RECORDED:
@@ -101,6 +108,7 @@ class Recorder(Node):
         self._writer = BagWriter(output, limits)
         each_round = self._writer.check_disk if by_log_time else self.save
         self.create_timer(ROUND_S, each_round, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
+        self._diagnostics = Diagnostics(self, "recording", values, self._told)
         self.get_logger().info(f"recording to {output}")
 
     @property
@@ -116,18 +124,33 @@ class Recorder(Node):
         if self._time.begun:
             self._release(lambda message: message.arrival <= due)
         elif self._pending:
-            waits = "no /clock yet, what comes waits for it: is the simulator running? Else leave use_sim_time out"
-            self.get_logger().warning(waits, once=True)
+            self.get_logger().warning(NO_CLOCK, once=True)
         if self._writer.unsaved and self._oldest_unsaved <= due:
             self._writer.flush()
 
     def close(self) -> None:
         """Write the rest, the index and the metadata."""
+        for timer in self.timers:
+            timer.cancel()
         try:
             self._release(lambda _: True)
         finally:  # the disk may be full by now
             self._writer.close()
         self.get_logger().info(f"recorded {sum(self.counts.values())} messages to {self._writer.path}")
+
+    def _told(self) -> Told:
+        found = [Finding(Severity.OK, f"recording to {self._writer.path}")]
+        if self._simulated and not self._time.begun:
+            found.append(Finding(Severity.WARN, NO_CLOCK))
+        if self._given_up:
+            found.append(Finding(Severity.WARN, f"{self._given_up} messages given up: they waited for /clock"))
+        numbers = {
+            "written": sum(self.counts.values()),
+            "bytes": self._writer.size,
+            "waiting": len(self._pending),
+            "dropped": self._given_up,
+        }
+        return found, {"file": str(self._writer.file), **{name: str(number) for name, number in numbers.items()}}
 
     def _receiver(self, topic: topics.Topic) -> Callable[..., None]:
         """Return the callback of a topic; with its second argument rclpy passes the time stamps of DDS."""
@@ -169,6 +192,7 @@ class Recorder(Node):
     def _limit_what_waits(self) -> None:
         if not self._time.begun and len(self._pending) > HELD:
             del self._pending[0]
+            self._given_up += 1
             self.get_logger().warning(
                 f"no /clock: of {HELD} messages that wait for it the oldest is given up", once=True
             )

@@ -11,6 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
+from functools import partial
 from itertools import count, pairwise
 from pathlib import Path
 from shutil import copytree
@@ -45,7 +46,7 @@ from ..run.score import Truth
 from ..wire.codecs import NS
 from ..wire.settings import setup_of
 from ..wire.topics import ATP_STATUS
-from .line import Pace, Task, executor_of_line, play
+from .line import UNASKED, Pace, Task, executor_of_line, parameters, play
 
 EXAMPLES = (
     "demo",
@@ -118,7 +119,8 @@ def _demo(options: argparse.Namespace) -> int:
 
 def _live(options: argparse.Namespace, executor: SingleThreadedExecutor, progress: _Progress) -> int:
     """Run at real time with a page in the browser, until Ctrl-C."""
-    with stop_on_signals() as stop, closing(Live(options.host, options.port, context=executor.context)) as page:
+    page_of = partial(Live, parameter_overrides=parameters(**UNASKED), context=executor.context)
+    with stop_on_signals() as stop, closing(page_of(options.host, options.port)) as page:
         executor.add_node(page)
 
         def wait(done: Callable[[], bool]) -> bool:

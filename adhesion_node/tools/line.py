@@ -38,6 +38,9 @@ PATIENCE_S = 10.0
 NEVER_S = 3600.0
 """By the machine's own clock: longer than a tick can take."""
 
+UNASKED = {"diagnostics_period_s": NEVER_S}
+"""Of every node of the line and beside it: each would tell when the machine's clock says so."""
+
 NODES = ("recorder", "estimator", "atp_monitor", "simulator", "live")
 """Their errors are shown, the rest of their log is not: who runs the line says himself how far it is."""
 
@@ -76,14 +79,13 @@ def play(executor: SingleThreadedExecutor, task: Task, bag: Path, pace: Pace) ->
     """
     context = executor.context
     # First: a bad seed ends here, before anything is written.
-    happening = _parameters(**task.simulator, seed=task.seed)
+    happening = parameters(**task.simulator, seed=task.seed)
     simulator = Simulator(paced=False, parameter_overrides=happening, context=context)
-    simulated = partial(_parameters, use_sim_time=True)
+    simulated = partial(parameters, use_sim_time=True, **UNASKED)
     recorder = Recorder(bag, by_log_time=True, parameter_overrides=simulated(), context=context)
-    unasked = {"diagnostics_period_s": NEVER_S}
-    identifying = simulated(**task.estimator, seed=task.seed, sensor_timeout_s=NEVER_S, **unasked)
+    identifying = simulated(**task.estimator, seed=task.seed, sensor_timeout_s=NEVER_S)
     estimator = Estimator(parameter_overrides=identifying, context=context)
-    supervising = simulated(**task.monitor, clock_timeout_s=NEVER_S, **unasked)
+    supervising = simulated(**task.monitor, clock_timeout_s=NEVER_S)
     monitor = AtpMonitor(parameter_overrides=supervising, context=context)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)
@@ -170,5 +172,6 @@ def _at_rest(simulator: Simulator, estimator: Estimator, monitor: AtpMonitor, re
     )
 
 
-def _parameters(**values: Any) -> list[Parameter]:
+def parameters(**values: Any) -> list[Parameter]:
+    """Parameters of a node by name."""
     return [Parameter(name, value=value) for name, value in values.items()]

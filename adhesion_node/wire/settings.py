@@ -20,6 +20,7 @@ from ..core.setting import Setting, check_settings, make, setting, settings_of
 from . import parameter_file, sensing
 from .codecs import Line
 from .rail_map_file import read_rail_map
+from .telling import TELLING
 from .topics import ADHESION_INPUTS, CREEP_INPUTS
 from .train_file import read_train
 
@@ -76,22 +77,8 @@ AUTOSTART = Setting(
     "autostart", True, "Configure and activate at start; if not, a manager of life cycles does", group="start"
 )
 
-_TOLD = "diagnostics"
 _SILENCE = "Silence of the sensor after which /diagnostics says STALE"
 SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
-
-
-@dataclass(frozen=True, slots=True)
-class Telling:
-    """How a node speaks in /diagnostics. Raises ValueError naming what is out of range."""
-
-    hardware_id: str = setting("", "Name of the train in /diagnostics; empty: the namespace, else train", group=_TOLD)
-    diagnostics_period_s: float = setting(
-        1.0, "Time, by the machine's clock, between two /diagnostics at most", "s", 0.1, 3600.0, group=_TOLD
-    )
-
-    def __post_init__(self) -> None:
-        check_settings(self, "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,8 +109,8 @@ def _marked(*settings: Setting) -> tuple[Setting, ...]:
 
 
 _OF_TRAIN = settings_of(Train, "train.", "train")
-OF_NODES_ALONE = (AUTOSTART, *settings_of(Telling))
-"""What every node has and no offline run asks for."""
+OF_NODES_ALONE = (AUTOSTART, *TELLING)
+"""What every node of the train has and no offline run asks for."""
 
 SETTINGS = _marked(
     *(SEED, *OF_LINE, SENSOR_TIMEOUT, *sensing.settings(ADHESION_INPUTS), *OF_NODES_ALONE),
@@ -148,7 +135,12 @@ ATP_SETTINGS = (
 """All settings of the ATP monitor."""
 
 OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
-    {"estimator": SETTINGS, "creep_estimator": CREEP_SETTINGS, "atp_monitor": ATP_SETTINGS}
+    {
+        "estimator": SETTINGS,
+        "creep_estimator": CREEP_SETTINGS,
+        "atp_monitor": ATP_SETTINGS,
+        **dict.fromkeys(("recorder", "replay", "live"), TELLING),
+    }
 )
 """The settings of every node by its name; those of the simulators are in sim_node/settings.py."""
 

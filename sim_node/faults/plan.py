@@ -17,6 +17,7 @@ import numpy as np
 from adhesion_node.core.physics.track import Grade, Track
 from adhesion_node.core.setting import check_settings, setting
 
+from ..train.plant import Truth
 from ..train.run import run
 from ..train.scenario import Scenario
 from ..train.sensors import SensorSettings, Tick, messages_of
@@ -154,6 +155,11 @@ def told(plan: Plan) -> list[tuple[float, str]]:
         return []
     ends = [(dose.start_s + dose.duration_s, f"{plan.fault} ends")] if math.isfinite(dose.duration_s) else []
     return [(dose.start_s, f"{plan.fault} begins: {fault.description}"), *ends]
+
+
+def active(plan: Plan, truth: Truth) -> bool:
+    """Whether the fault is at work at this sample."""
+    return plan.fault != NONE and (FAULTS[plan.fault].stream is _same or plan.dose.now(truth))
 
 
 def period_of(plan: Plan, period_s: float) -> float:

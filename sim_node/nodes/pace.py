@@ -15,7 +15,9 @@ from typing import Any
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 
+from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.ros.diagnostics import Diagnostics, Finding, Told
 from adhesion_node.nodes.ros.discovery import PERIOD_S, Subscribers
 from adhesion_node.nodes.ros.params import SettingsNode, declare
 from adhesion_node.nodes.ros.qos import advertise
@@ -43,6 +45,8 @@ class RunNode(SettingsNode, ABC):
         """Messages published by topic."""
         self.now_ns = 0
         """Time of the newest one, as on /clock."""
+        self.truth: Any = None
+        """The newest one."""
         self._start_ns = round(self.values["start_time_s"] * 1e9)
         self.changes: list[tuple[int, Any]] = []
         """When, as on /clock, what `news` tells began to be so."""
@@ -60,6 +64,7 @@ class RunNode(SettingsNode, ABC):
         self._ahead = next(run, None)
         self._outputs = {topic: advertise(self, topic) for topic in (CLOCK, *topics)}
         if paced:
+            self._diagnostics = Diagnostics(self, "run", self.values, self.told, self.sent)
             if self.values["wait_for"]:
                 self.log(f"waiting for {self.values['wait_for']} subscriber(s) to {self._awaited.name}")
             self._subscribers = Subscribers(
@@ -83,6 +88,7 @@ class RunNode(SettingsNode, ABC):
         if not self.samples:
             self.log(f"{scenario}: started at {self._start_ns / 1e9:.1f} s")
         truth, measured = sample
+        self.truth = truth
         self._ahead = next(self._run, None)
         self.now_ns = self._start_ns + truth.t_ns
         state, news = self.news(truth)
@@ -93,6 +99,14 @@ class RunNode(SettingsNode, ABC):
         self.publish(truth, measured)
         self.samples += 1
         return True
+
+    def told(self) -> Told:
+        """What there is to tell in /diagnostics."""
+        waits = f"waiting for {self.values['wait_for']} subscriber(s) to {self._awaited.name}"
+        state = "ended" if self._ended else "running" if self.samples else waits
+        scenario = str(self.values["scenario"])
+        numbers = {"samples": str(self.samples), "simulated_s": f"{self.now_ns / NS:.1f}"}
+        return [Finding(Severity.OK, f"scenario {scenario}: {state}")], {"scenario": scenario, **numbers}
 
     @abstractmethod
     def news(self, truth: Any) -> tuple[Any, str]:

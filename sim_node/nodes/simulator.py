@@ -14,13 +14,15 @@ The parameter `fault` lets something go wrong. The scenarios of a real train hav
 from collections.abc import Iterator, Sequence
 from typing import Any
 
+from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.physics.train import KMH
 from adhesion_node.core.setting import make
 from adhesion_node.nodes.ros import runtime
+from adhesion_node.nodes.ros.diagnostics import Finding, Told
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import NS
 
-from ..faults.plan import NONE, Plan, faulty_run, period_of, told
+from ..faults.plan import FAULTS, NONE, Plan, active, faulty_run, period_of, told
 from ..real.drive import drive
 from ..real.plant.scenarios import SCENARIOS as REAL
 from ..real.run import ticks
@@ -76,6 +78,13 @@ class Simulator(RunNode):
         there = tuple(topic for topic in topics.ADHESION_INPUTS if topic in sent)
         per_s = self.values["rate_hz"] + len(driven.messages) / float(driven.journey.time_s[-1])
         return ticks(driven, 1.0 / self.values["rate_hz"]), there, 1.0 / per_s
+
+    def told(self) -> Told:
+        """Tell of the fault, too."""
+        (findings, values), plan = super().told(), make(Plan, self.values)
+        at_work = self.truth is not None and active(plan, self.truth)
+        wanted = [Finding(Severity.WARN, f"fault {plan.fault}: {FAULTS[plan.fault].description}")] if at_work else []
+        return [*findings, *wanted], {**values, "fault": plan.fault, "fault_active": str(at_work).lower()}
 
     def news(self, truth: Truth) -> tuple[str, str]:
         """Tell the regimes."""

@@ -4,8 +4,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import messages
@@ -15,20 +17,32 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from recorded import write_steps
 
+from adhesion_node.bag import BagReader, select
+from adhesion_node.live.node import Live
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.creep_estimator import CreepEstimator
 from adhesion_node.nodes.estimator import Estimator
+from adhesion_node.nodes.player import Replay
+from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import stamp_ns
 from adhesion_node.wire.topics import Topic
+from sim_node.nodes.simulator import Simulator
+from sim_node.nodes.slip_simulator import SlipSimulator
 
 S = 10**9
 NODES: dict[str, Callable[..., Node]] = {
     "estimator/adhesion": Estimator,
     "creep_estimator/peak": CreepEstimator,
     "atp_monitor/supervision": AtpMonitor,
+    "recorder/recording": Recorder,
+    "replay/playing": Replay,
+    "live/page": Live,
+    "simulator/run": Simulator,
+    "slip_simulator/run": SlipSimulator,
 }
 
 
@@ -47,7 +61,8 @@ class Line:
         qos.subscribe(self.driver, topics.DIAGNOSTICS, self.told.append)
         for node in (self.node, self.driver):
             executor.add_node(node)
-        spin_until(executor, lambda: self.node.count_subscribers(topics.DIAGNOSTICS.name) == 1)
+        own = sum(end.topic_name == topics.DIAGNOSTICS.name for end in self.node.subscriptions)
+        spin_until(executor, lambda: self.node.count_subscribers(topics.DIAGNOSTICS.name) == 1 + own)
 
     def outlet(self, topic: Topic) -> Any:
         output = qos.advertise(self.driver, topic)
@@ -62,6 +77,14 @@ class Line:
         self.told.clear()
         self.wait(lambda: any(words in array.status[0].message for array in self.told))
 
+    def wait_for_values(self, **wanted: str) -> None:
+        """Wait for these values among those that are told."""
+        self.wait(lambda: self.told and wanted.items() <= self.values.items())
+
+    @property
+    def values(self) -> dict[str, str]:
+        return {pair.key: pair.value for pair in self.last.values}
+
     @property
     def last(self) -> DiagnosticStatus:
         (status,) = self.told[-1].status
@@ -73,14 +96,32 @@ def make_line(executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Callab
     return lambda make, **given: Line(executor, spin_until, make, **given)
 
 
+@pytest.fixture
+def beside(tmp_path: Path) -> Iterator[dict[Any, Callable[..., Node]]]:
+    """The nodes that take more than parameters, with it; closed at the end. The player has 40 steps."""
+    write_steps(tmp_path / "played", 40)
+    with ExitStack() as stack:
+        reader = stack.enter_context(BagReader(tmp_path / "played"))
+
+        def closed(make: Callable[..., Any], *given: Any, **others: Any) -> Any:
+            return stack.enter_context(closing(make(*given, **others)))
+
+        yield {
+            Recorder: partial(closed, Recorder, tmp_path / "bag"),
+            Replay: partial(Replay, reader, select(reader.topics), 0.0, 0),
+            Live: partial(closed, Live, "127.0.0.1", 0),
+        }
+
+
 @pytest.mark.parametrize("use_sim_time", [False, True], ids=["system time", "no /clock"])
 @pytest.mark.parametrize("entry", NODES)
 def test_every_node_speaks_without_being_spoken_to(
-    make_line: Callable[..., Line], entry: str, use_sim_time: bool
+    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]], entry: str, use_sim_time: bool
 ) -> None:
     """No sensor ever, a /clock that is not there; the silence of the sensors alone would be told once an hour."""
-    own = {} if entry.startswith("atp") else {"sensor_timeout_s": 3600.0}
-    line = make_line(NODES[entry], use_sim_time=use_sim_time, diagnostics_period_s=0.1, namespace="/train1", **own)
+    own = {"sensor_timeout_s": 3600.0} if "estimator" in entry else {}
+    make = beside.get(NODES[entry], NODES[entry])
+    line = make_line(make, use_sim_time=use_sim_time, diagnostics_period_s=0.1, namespace="/train1", **own)
     line.wait(lambda: len(line.told) > 5, 2.0)
     assert (line.last.name, line.last.hardware_id) == (f"train1/{entry}", "train1")
     assert line.last.message
@@ -100,15 +141,13 @@ def test_stamps_are_the_clock_of_the_node_and_those_of_the_data_are_values(make_
     line.wait(lambda: line.node.get_clock().now().nanoseconds == 1000 * S)
     line.told.clear()
     line.wait(lambda: len(line.told) > 1)
-    values = {pair.key: pair.value for pair in line.last.values}
-    assert values["stamp_ns"] == "none"
+    assert line.values["stamp_ns"] == "none"
     for step in range(20):
         position.publish(messages.position(7 * S + step * S // 10, 3.0 * step, 0.5))
     line.wait(lambda: line.node.latest is not None)
     line.told.clear()
     line.wait(lambda: line.told)
-    values = {pair.key: pair.value for pair in line.last.values}
-    assert values["stamp_ns"] == str(line.node.latest.t_ns)
+    assert line.values["stamp_ns"] == str(line.node.latest.t_ns)
     assert 7 * S < line.node.latest.t_ns < 10 * S
     assert all(1000 * S <= stamp_ns(array.header) < 1000 * S + 1000 for array in line.told)
 
@@ -117,7 +156,7 @@ def test_an_emergency_of_the_monitor_is_an_error(make_line: Callable[..., Line])
     line = make_line(AtpMonitor, diagnostics_period_s=0.1)
     line.wait_until_said("no safe distance is known")
     assert line.last.level == DiagnosticStatus.ERROR
-    assert {pair.key: pair.value for pair in line.last.values}["level"] == "EMERGENCY_BRAKE"
+    assert line.values["level"] == "EMERGENCY_BRAKE"
 
 
 def test_two_publishers_of_a_sensor_are_told(make_line: Callable[..., Line]) -> None:
@@ -152,3 +191,75 @@ def test_resets_again_and_again_are_told(make_line: Callable[..., Line]) -> None
     assert "resets so far" not in line.last.message
     play(400)
     line.wait_until_said("2 resets so far, 2 of them within 60 s: stamps or positions jump")
+
+
+def test_the_recorder_tells_what_it_has_written(
+    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]], tmp_path: Path
+) -> None:
+    line = make_line(beside[Recorder], diagnostics_period_s=0.1)
+    line.outlet(topics.MU).publish(messages.mu_message(0.08))
+    line.wait(lambda: line.told and int(line.values["bytes"]) > 0 and line.node.counts.get("/adhesion/mu") == 1)
+    assert line.last.level == DiagnosticStatus.OK
+    assert Path(line.values["file"]).parent == tmp_path / "bag"
+    assert Path(line.values["file"]).exists()
+    assert 0 < int(line.values["written"]) <= sum(line.node.counts.values())
+    assert line.values["dropped"] == "0"
+
+
+def test_the_recorder_tells_that_there_is_no_clock(
+    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
+) -> None:
+    line = make_line(beside[Recorder], diagnostics_period_s=0.1, use_sim_time=True)
+    line.wait_until_said("no /clock yet")
+    assert line.last.level == DiagnosticStatus.WARN
+    line.outlet(topics.CLOCK).publish(messages.clock(1000 * S))
+    line.wait(lambda: line.last.level == DiagnosticStatus.OK)
+
+
+def test_the_player_tells_how_much_is_left(
+    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
+) -> None:
+    line = make_line(beside[Replay], diagnostics_period_s=0.1)
+    line.wait_for_values(published="80", left="0", next_ns="none")
+    assert line.last.message == "the end of the recording"
+
+
+def test_a_player_that_waits_tells_for_whom(make_line: Callable[..., Line], tmp_path: Path) -> None:
+    write_steps(tmp_path / "bag", 3)
+    with BagReader(tmp_path / "bag") as reader:
+        line = make_line(partial(Replay, reader, select(reader.topics)), diagnostics_period_s=0.1)
+        line.wait_until_said("waiting for 1 subscriber(s) to /position")
+    assert (line.values["published"], line.values["left"]) == ("0", "6")
+
+
+def test_the_page_tells_who_looks_and_how_old_is_what_it_shows(
+    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
+) -> None:
+    line = make_line(beside[Live], diagnostics_period_s=0.1)
+    line.wait_for_values(viewers="0")
+    assert line.last.message == f"open {line.node.server.url}"
+    assert "age_s.adhesion/mu" not in line.values
+    line.outlet(topics.MU).publish(messages.mu_message(0.08))
+    line.wait(lambda: "age_s.adhesion/mu" in line.values)
+    assert 0.0 <= float(line.values["age_s.adhesion/mu"]) < 10.0
+
+
+@pytest.mark.parametrize(
+    ("fault", "begins_s", "active"), [("loss", 0.0, True), ("loss", 1e5, False), ("mass", 0.0, True)]
+)
+def test_the_simulator_tells_its_fault(
+    make_line: Callable[..., Line], fault: str, begins_s: float, active: bool
+) -> None:
+    line = make_line(Simulator, diagnostics_period_s=0.1, fault=fault, fault_start_s=begins_s)
+    line.wait(lambda: line.told and int(line.values["samples"]) > 1)
+    assert line.last.level == (DiagnosticStatus.WARN if active else DiagnosticStatus.OK)
+    assert (f"fault {fault}" in line.last.message) is active
+    assert (line.values["fault"], line.values["fault_active"]) == (fault, str(active).lower())
+    assert line.values["scenario"] == "tunnel_entry"
+    assert float(line.values["simulated_s"]) > 1000.0
+
+
+def test_a_simulator_that_waits_tells_for_whom(make_line: Callable[..., Line]) -> None:
+    line = make_line(SlipSimulator, diagnostics_period_s=0.1, wait_for=1)
+    line.wait_until_said("waiting for 1 subscriber(s) to wheel_speed")
+    assert line.values["samples"] == "0"

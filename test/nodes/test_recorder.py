@@ -42,6 +42,8 @@ from adhesion_node.wire.topics import (
 )
 
 S = 10**9
+SILENT = [Parameter("diagnostics_period_s", value=3600.0)]
+"""What the recorder says of itself once a second would be recorded."""
 
 
 def publishers(node: Node, *topics: Topic) -> dict[Topic, Publisher]:
@@ -68,7 +70,7 @@ def clock(t_ns: int) -> Clock:
 
 
 def simulated() -> list[Parameter]:
-    return [Parameter("use_sim_time", value=True)]
+    return [Parameter("use_sim_time", value=True), *SILENT]
 
 
 def start(
@@ -82,7 +84,7 @@ def start(
     """Return a recorder and publishers of `topics` and /clock that have found each other."""
     talker = Node("talker", context=context, namespace="/train1")
     ends = publishers(talker, *topics, CLOCK)
-    recording = Recorder(path, context=context, namespace="/train1", parameter_overrides=simulated() if sim else [])
+    recording = Recorder(path, context=context, namespace="/train1", parameter_overrides=simulated() if sim else SILENT)
     executor.add_node(talker)
     executor.add_node(recording)
     heard = [end for topic, end in ends.items() if sim or topic is not CLOCK]
@@ -185,7 +187,7 @@ def test_a_curve_from_before_the_recorder_is_recorded(
     talker = Node("talker", context=context)
     executor.add_node(talker)
     publishers(talker, BRAKING_CURVE)[BRAKING_CURVE].publish(stamped(BRAKING_CURVE, 4 * S))
-    recording = Recorder(tmp_path / "bag", context=context)
+    recording = Recorder(tmp_path / "bag", context=context, parameter_overrides=SILENT)
     executor.add_node(recording)
     spin_until(executor, lambda: recording.counts == {"/adhesion/braking_curve": 1})
     recording.close()
@@ -235,7 +237,8 @@ def recording_process(path: Path, *arguments: str) -> Iterator[subprocess.Popen[
     private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
     environment = {name: value for name, value in os.environ.items() if name not in private}
     code = "import sys; from adhesion_node.nodes.recorder import main; sys.exit(main())"
-    command = [sys.executable, "-c", code, "--output", str(path), *arguments]
+    silent = ("--ros-args", "-p", "diagnostics_period_s:=3600.0")
+    command = [sys.executable, "-c", code, "--output", str(path), *arguments, *silent]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:

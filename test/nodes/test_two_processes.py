@@ -78,6 +78,8 @@ class Operator(Node):
 
     def _hear(self, message: Any) -> None:
         (status,) = message.status
+        if status.name != "estimator/adhesion":
+            return
         self.levels.append(status.level)
         self.heard.append({pair.key: pair.value for pair in status.values})
 

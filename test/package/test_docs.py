@@ -58,6 +58,9 @@ HEADINGS = {
     "creep_estimator": "Creep estimator",
     "simulator": "Simulator",
     "slip_simulator": "Slip simulator",
+    "recorder": "Recorder",
+    "replay": "Replay",
+    "live": "Live page",
 }
 
 
@@ -193,8 +196,6 @@ def topic_rows() -> set[tuple[str, str]]:
 
 def documented(program: str) -> set[str]:
     """Return the parameters that the page of parameters lists for a program."""
-    if program not in HEADINGS:
-        return set()
     return set(re.findall(r"^\| `([\w.]+)` \|", section("parameters.md", HEADINGS[program]), re.MULTILINE))
 
 

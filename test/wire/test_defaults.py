@@ -24,6 +24,7 @@ from adhesion_node.core import Config
 from adhesion_node.core.setting import Setting, Value
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator, replay
 from adhesion_node.tools import defaults
+from adhesion_node.wire.telling import TELLING
 from sim_node.nodes import simulator
 from sim_node.nodes import slip_simulator as slip_node
 
@@ -86,7 +87,10 @@ def test_the_file_is_what_the_declarations_say() -> None:
 
 
 def test_there_is_a_section_for_each_node_with_parameters() -> None:
-    assert set(sections()) == set(NODES)
+    told = typed({spec.name: spec.default for spec in TELLING})
+    others = {name: typed(values) for name, values in sections().items() if name not in NODES}
+    assert set(NODES) < set(sections())
+    assert others == dict.fromkeys(("recorder", "replay", "live"), told)
 
 
 @pytest.mark.parametrize("name", NODES)

@@ -4,16 +4,17 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.core.setting import make
 from adhesion_node.wire.codecs import TRAIN
 from adhesion_node.wire.results import Status
-from adhesion_node.wire.settings import Telling
+from adhesion_node.wire.telling import Telling
 from adhesion_node.wire.topics import DIAGNOSTICS, Topic
 
 from . import qos
@@ -37,20 +38,23 @@ Told = tuple[list[Finding], dict[str, str]]
 class Diagnostics:
     """Speaks in /diagnostics of `part` of a node: by `tell`, and by a steady timer, so that no entry grows stale.
 
-    The stamps are the node's clock. `published` counts the messages.
+    `values` are those of the node's settings, of `Telling` among them. The stamps are the node's clock. `published`
+    counts the messages.
     """
 
     def __init__(
         self,
         node: Node,
         part: str,
-        telling: Telling,
+        values: Mapping[str, Any],
         told: Callable[[], Told],
-        published: Counter[Topic],
+        published: Counter[Topic] | None = None,
     ) -> None:
+        telling = make(Telling, values)
         self.name = f"{node.get_fully_qualified_name().lstrip('/')}/{part}"
         self.hardware_id = telling.hardware_id or node.get_namespace().strip("/") or TRAIN
-        self._node, self._told, self._published, self._stamp_ns = node, told, published, 0
+        self._published = Counter() if published is None else published
+        self._node, self._told, self._stamp_ns = node, told, 0
         self._output = qos.advertise(node, DIAGNOSTICS)
         node.create_timer(telling.diagnostics_period_s, self.tell, clock=Clock(clock_type=ClockType.STEADY_TIME))
 

@@ -14,13 +14,13 @@ from std_srvs.srv import SetBool, Trigger
 
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
-from adhesion_node.core.setting import Setting, make
+from adhesion_node.core.setting import Setting
 from adhesion_node.run.engine import EstimatorPipeline
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import NS, Line, Rejected
 from adhesion_node.wire.frames import placed
-from adhesion_node.wire.settings import Telling, preset
+from adhesion_node.wire.settings import preset
 from adhesion_node.wire.topics import Topic
 
 from . import qos
@@ -74,7 +74,7 @@ class EstimatingNode(ManagedNode, Generic[P]):
         values = declare(self, kind.parameters, preset, self._change)
         self.published: Counter[Topic] = Counter()
         told = partial(self.standing, self._told)
-        self._diagnostics = Diagnostics(self, kind.entry, make(Telling, values), told, self.published)
+        self._diagnostics = Diagnostics(self, kind.entry, values, told, self.published)
         self.bring_up(values)
 
     def open(self) -> None:

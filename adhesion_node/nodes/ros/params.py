@@ -85,15 +85,20 @@ def descriptor(setting: Setting) -> ParameterDescriptor:
 
 
 def declare(
-    node: Node, settings: Sequence[Setting], preset: Preset | None = None, change: Change | None = None
+    node: Node,
+    settings: Sequence[Setting],
+    preset: Preset | None = None,
+    change: Change | None = None,
+    *,
+    quiet: bool = False,
 ) -> dict[str, Any]:
     """Declare every setting as a parameter of `node` and return the effective values as plain Python ones.
 
     `preset` changes defaults by what the node was given, a train's file for one. All values are checked before the
     first is accepted; a bad one raises ValueError with name, value and what is allowed. Afterwards those that may
-    change do so through `change`; the others are read-only. What is not at its default is logged once. Construct the
-    node with `automatically_declare_parameters_from_overrides=True`: then parameters that it was given but does not
-    have are logged as well.
+    change do so through `change`; the others are read-only. What is not at its default is logged once, and
+    unless `quiet` that all is. Construct the node with `automatically_declare_parameters_from_overrides=True`: then
+    parameters that it was given but does not have are logged as well.
     """
     if node.has_parameter(_USE_SIM_TIME.name):
         _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
@@ -111,6 +116,8 @@ def declare(
     for message in unknown(node, settings):
         node.get_logger().warning(message)
     told = [f"{name} = {value}" for name, value in values.items() if value != defaults[name]]
+    if quiet and not told:
+        return values
     node.get_logger().info(
         "parameters: " + ", ".join([*told, "all others at their defaults" if told else "all defaults"])
     )
