@@ -15,9 +15,9 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import Array
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
-from .kinds import FREE, FREE_STD, NOISES, PASSING
+from .kinds import FREE, FREE_STD, HELD, NOISES, PASSING, SLIDES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
-from .motion import Braking, moved, open_variance, slow_variance, white_variance
+from .motion import Braking, moved, open_variance, resistance, slow_variance, use, white_variance
 from .plausible import Course
 from .seeing import Observation, acceleration_seen, corrected, not_slower, position_seen, speed_seen, wheels_seen
 from .wheels import WheelsSeen, told
@@ -42,6 +42,12 @@ PAST_NS = 4 * S
 DOUBTED, PASSED, CERTAIN, CHANGED = 0.1, 0.5, 0.99, 0.2
 """Probabilities from which a change of the rail is in doubt, up to which it still goes on, and from which it is told,
 and by how much it must have changed."""
+
+SETTLING_S = 8.0
+"""For so long behind its opening a braking tells no change."""
+
+SLID = 0.9
+"""Probability from which axles slid."""
 
 WHEEL_SHARE = 0.008
 """Error of the fastest rim's speed, relative."""
@@ -71,11 +77,13 @@ class Memory(NamedTuple):
     known: Rail = Rail(0.0, 1.0, 0.0)
     """The rail as it was known when the braking began."""
     told_s: float = 0.0
-    """When the rail changed last, as far as it was told."""
+    """When a change of the rail was told last; it is later ones that are told."""
     changes: int = 0
     """Changes of the rail told."""
-    steady_mu: float = 0.0
-    """Adhesion when none was in doubt."""
+    steady: float = 0.0
+    """Adhesion used when none was in doubt, ..."""
+    slid: bool = False
+    """... and whether axles slid then."""
     course: Course = Course()
     past: tuple[tuple[int, Bank], ...] = ()
     """Beliefs of some seconds ago, to go back to where positions turn out to be wrong."""
@@ -282,7 +290,8 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if braked and not memory.braked:
         likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
         known = rail()
-        return memory._replace(bank=opened(config, likely, known), since_s=0.0, seen=1, told_s=0.0, known=known)
+        told_s = now_s + SETTLING_S
+        return memory._replace(bank=opened(config, likely, known), since_s=0.0, seen=1, told_s=told_s, known=known)
     if memory.braked and not braked:
         return memory._replace(bank=closed(bank), seen=0)
     if not memory.braked:
@@ -295,7 +304,7 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
-    return _with_changes(memory._replace(bank=pruned(bank), seen=memory.seen + 1))
+    return _with_changes(config, memory._replace(bank=pruned(bank), seen=memory.seen + 1))
 
 
 def misled(config: Config, memory: Memory) -> Memory:
@@ -315,15 +324,21 @@ def _led_again(memory: Memory) -> Memory:
     return memory._replace(bank=bank, misled=False, course=Course())
 
 
-def _with_changes(memory: Memory) -> Memory:
-    """Tell a change of the rail once it is certain and passed, and adhesion another than before that was in doubt."""
-    bank = memory.bank
+def _with_changes(config: Config, memory: Memory) -> Memory:
+    """Tell a change of the rail once it is certain and passed, and the adhesion used another than before any doubt.
+
+    That axles roll, where they slid before, is one, too. While the brake may still build up none is told.
+    """
+    bank, now_s = memory.bank, memory.t_ns / S
     passing = bank.kind == PASSING
-    probability = float(bank.weight @ (passing | (bank.changed_s > memory.told_s + 1e-6)))
-    now = float(bank.weight @ bank.mean[:, MU])
-    if probability < DOUBTED:
-        return memory._replace(steady_mu=now)
-    if probability < CERTAIN or float(bank.weight @ passing) > PASSED:
+    later = passing | (bank.changed_s > memory.told_s + 1e-6) | (memory.slid & (bank.kind == HELD))
+    probability = float(bank.weight @ later)
+    settling = now_s < memory.told_s
+    if not settling and (DOUBTED <= probability < CERTAIN or float(bank.weight @ passing) > PASSED):
         return memory
-    changes = memory.changes + (abs(now - memory.steady_mu) > CHANGED * memory.steady_mu)
-    return memory._replace(told_s=memory.t_ns / S, changes=changes, steady_mu=now)
+    used = use(config, bank, memory.braking, resistance(config, bank))
+    steady, slid = float(bank.weight @ used.value), bool(bank.weight @ SLIDES[bank.kind] > SLID)
+    if settling or probability < DOUBTED:
+        return memory._replace(steady=steady, slid=slid)
+    changes = memory.changes + (abs(steady - memory.steady) > CHANGED * memory.steady)
+    return memory._replace(told_s=now_s, changes=changes, steady=steady, slid=slid)

@@ -164,8 +164,7 @@ def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) ->
         near = float(ndtr((one.mean[0, MU] - 0.98 * most) / max(spread, 1e-6)))
         prior = elapsed_s * (1.0 / branching.CHANGE_S + near / branching.REACHED_S)
         total = np.logaddexp.reduce(alike.log_weight) - one.log_weight
-        rolls = one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0)))
-        found.append(rolls._replace(changed_s=np.full(1, now_s)))
+        found.append(one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0))))
     return found
 
 

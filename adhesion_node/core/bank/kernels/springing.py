@@ -161,7 +161,7 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     for row in range(count, size):
         new, x, p = rows[row, 3], mean[row], covariance[row]
         born[row] = rule.now_s
-        if new in (RAIL, ROLLS, BORDER, LASTS):
+        if new in (RAIL, BORDER, LASTS):
             changed[row] = rule.now_s
         if new == RAIL:
             p[MU, MU] += rule.change_std**2
