@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from ..command.options import DONE, help_texts, json_option, report, run_tool
-from . import against, gaussian, growth, particle, recording, step
+from . import against, gaussian, growth, particle, step
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
 
@@ -56,6 +56,8 @@ def _trains(options: Options) -> Section:
 
 
 def _recording(options: Options) -> Section:
+    from . import recording  # what it reads and writes needs more than a train does
+
     return {"settings": {"rate_hz": 10.0}, "rows": [recording.replay(options.hours, 10.0, options.seed)]}
 
 
