@@ -19,6 +19,7 @@ from .kernels import mixture
 from .kernels.weighing import variances
 from .layout import GRADE, MU, ROUGH, SPEED, Bank
 from .motion import Braking, laws_of, open_variance, resistance, use
+from .seeing import ROLLED
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -111,12 +112,16 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         ahead = ahead.at_least(least)
     else:
         regime = _regime(config, memory, slides, rail.mu)
-        partial = memory.braking.applied < PARTIAL * config.train.specific_brake(config.train.full_pressure_pa)
-        least = least if partial and regime is not Regime.ADHESION_LIMITED else 0.0
+        kept = _is_partial(config, memory.braking) and regime is not Regime.ADHESION_LIMITED
+        least = least if kept else 0.0
     lower = max(rail.lower, least)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
     return Findings(regime, rail, belief, ahead, known)
+
+
+def _is_partial(config: Config, braking: Braking) -> bool:
+    return braking.applied < PARTIAL * config.train.specific_brake(config.train.full_pressure_pa)
 
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
@@ -171,7 +176,9 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** COUNTED_RISE
     foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
     std = np.sqrt(np.maximum(variance, 1e-12)) * rising
-    more = ~sliding & (used.value < known.lower)
+    # the whole brake may make axles slide that roll under a part of it
+    borne = used.value * (ROLLED[0] / ROLLED[1] if _is_partial(config, braking) else 1.0)
+    foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < known.lower)
     foreseen, std = np.where(more, known.lower, foreseen), np.where(more, 1e-6, std)
     middle = np.maximum(foreseen, LEAST_AHEAD)
     variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all

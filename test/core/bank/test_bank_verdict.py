@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.bank.following import Memory
 from adhesion_node.core.bank.kinds import KINDS
 from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank
-from adhesion_node.core.bank.motion import Braking
+from adhesion_node.core.bank.motion import Braking, resistance, use
 from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
@@ -110,6 +111,18 @@ def test_the_safer_the_longer() -> None:
         for missed in (0.5, 0.1, 0.05, 0.01, 0.001)
     ]
     assert lengths == sorted(lengths)
+
+
+@pytest.mark.parametrize(("share", "counted"), [(1.0, 1.0), (0.5, 0.85 / 1.15)])
+def test_rolling_axles_may_slide_under_the_whole_brake(share: float, counted: float) -> None:
+    """Under a part of it that is counted on which sliding axles would use; what was known stays."""
+    bank = bank_of([1], spread=0.0).with_fresh(GRADE, 0.0, 0.0)
+    bank = bank._replace(covariance=1e-8 * bank.covariance)
+    config, braking = replace(CONFIG, ahead_std=0.0, grade_std=0.0, resistance_std=0.0), Braking(share * FULL)
+    used = float(use(config, bank, braking, resistance(config, bank)).value[0])
+    for known in (0.0, 0.2 * FULL, 0.6 * FULL):
+        ahead = counted_on(config, bank, 0.5, braking, Rail(0.05, 0.04, known))
+        assert ahead.mu == pytest.approx([max(counted * used, known)] * 6, rel=0.01)
 
 
 def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:
