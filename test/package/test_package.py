@@ -130,7 +130,7 @@ def test_the_manifest_names_somebody_and_a_place() -> None:
 def test_contributions_come_under_the_license() -> None:
     """In its own words, as ament_copyright asks for."""
     license_, contributing = (
-        " ".join((ROOT / name).read_text(encoding="utf-8").split()) for name in ("LICENSE", "CONTRIBUTING.md")
+        " ".join((ROOT / name).read_text(encoding="utf-8").split()) for name in ("LICENSE", "doc/contributing.md")
     )
     clause = re.search(r"5\. Submission of Contributions\. .* regarding such Contributions\.", license_)
     assert clause is not None
