@@ -159,3 +159,13 @@ def test_one_second_of_braking_claims_nothing() -> None:
     for early in estimates[-2:]:
         assert early.ahead is not None
         assert max(early.ahead.mu) <= 0.05
+
+
+@pytest.mark.parametrize("before", [[(5.0, 0.0)], [(5.0, 0.0), (6.0, 410e3), (5.0, 0.0)]])
+def test_a_brake_that_builds_up_takes_nothing_from_what_was_known(before: list[tuple[float, float | None]]) -> None:
+    """A part of it that the rail bears says nothing against the rail."""
+    ramp = [(0.5, share * 410e3) for share in (0.15, 0.3, 0.45, 0.6)]
+    _, estimates = drive(BANK, ride([*before, *ramp]))
+    known, *building_up = [min(each.ahead.mu) for each in estimates if each.ahead is not None][-5:]
+    assert len(building_up) == 4
+    assert min(building_up) >= known

@@ -112,8 +112,11 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         ahead = ahead.at_least(least)
     else:
         regime = _regime(config, memory, slides, rail.mu)
-        kept = _is_partial(config, memory.braking) and regime is not Regime.ADHESION_LIMITED
-        least = least if kept else 0.0
+        rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
+        if _is_partial(config, memory.braking) and rolls:
+            ahead = ahead.at_least(least)
+        else:
+            least = 0.0
     lower = max(rail.lower, least)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
