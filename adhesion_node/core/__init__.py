@@ -2,13 +2,14 @@
 
 """The estimator as pure functions of arrays: no ROS, no files, no clock, no logging.
 
-The names here are public: they stay when modules move.
+The names here are public: they stay when modules move. Those of the estimator itself are imported when they are first
+asked for, so that what needs a sample or a curve alone starts without scipy and numba.
 """
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 from .belief.regime import Regime
-from .config import Config
-from .estimate import Estimate
-from .estimator import advance, finish, init, step
 from .intake.outcome import Event, Outcome
 from .intake.samples import (
     DemandSample,
@@ -22,8 +23,13 @@ from .intake.samples import (
     WheelSample,
 )
 from .physics import braking
-from .prediction import Prediction, predict
-from .state import State
+
+if TYPE_CHECKING:
+    from .config import Config
+    from .estimate import Estimate
+    from .estimator import advance, finish, init, step
+    from .prediction import Prediction, predict
+    from .state import State
 
 __all__ = [
     "Config",
@@ -49,3 +55,16 @@ __all__ = [
     "predict",
     "step",
 ]
+
+_LATER = {
+    **{"Config": "config", "Estimate": "estimate", "State": "state"},
+    **dict.fromkeys(("Prediction", "predict"), "prediction"),
+    **dict.fromkeys(("advance", "finish", "init", "step"), "estimator"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = globals()[name] = getattr(import_module(f".{_LATER[name]}", __name__), name)
+    return value

@@ -28,7 +28,7 @@ from adhesion_node.core.physics.train import KMH
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import Line, Rejected
-from adhesion_node.wire.settings import ATP_SETTINGS, Watchdogs
+from adhesion_node.wire.shared_settings import ATP_SETTINGS, Watchdogs
 from adhesion_node.wire.topics import Topic
 
 from .ros import qos, runtime

@@ -4,22 +4,21 @@
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..core import Config
-from ..core.atp.config import SupervisionConfig
 from ..core.belief.rail_map import RailMap
 from ..core.creep.config import CreepConfig
 from ..core.creep.vehicle import Vehicle
 from ..core.intake.samples import MAX_POSITION_M
 from ..core.physics.track import Grade, Track, parse_track
 from ..core.physics.train import CRH3, Train
-from ..core.setting import Setting, check_settings, make, setting, settings_of
+from ..core.setting import Setting, make, settings_of
 from . import parameter_file, sensing
 from .codecs import Line
 from .rail_map_file import read_rail_map
+from .shared_settings import ATP_SETTINGS, OF_LINE, OF_NODES_ALONE
 from .telling import TELLING
 from .topics import ADHESION_INPUTS, CREEP_INPUTS
 from .train_file import read_train
@@ -70,30 +69,8 @@ RAIL_MAP = Setting(
 
 SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
 
-OF_LINE = settings_of(Line)
-FRAME_ID, AMBIENT, DIRECTION = (one for one in OF_LINE if one.name in ("frame", "ambient_pressure_pa", "direction"))
-
-AUTOSTART = Setting(
-    "autostart", True, "Configure and activate at start; if not, a manager of life cycles does", group="start"
-)
-
 _SILENCE = "Silence of the sensor after which /diagnostics says STALE"
 SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
-
-
-@dataclass(frozen=True, slots=True)
-class Watchdogs:
-    """How soon the ATP monitor notices silence. Raises ValueError naming what is out of range."""
-
-    check_rate_hz: float = setting(5.0, "Rate of the watchdogs", "Hz", 0.1, 100.0, group="watchdogs")
-    clock_timeout_s: float = setting(
-        *(2.0, "Time by the machine's clock for which the ROS clock may stand still", "s", 0.1, 3600.0),
-        group="watchdogs",
-    )
-
-    def __post_init__(self) -> None:
-        check_settings(self, "")
-
 
 CHANGING = frozenset(
     {
@@ -109,9 +86,6 @@ def _marked(*settings: Setting) -> tuple[Setting, ...]:
 
 
 _OF_TRAIN = settings_of(Train, "train.", "train")
-OF_NODES_ALONE = (AUTOSTART, *TELLING)
-"""What every node of the train has and no offline run asks for."""
-
 SETTINGS = _marked(
     *(SEED, *OF_LINE, SENSOR_TIMEOUT, *sensing.settings(ADHESION_INPUTS), *OF_NODES_ALONE),
     *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START, RAIL_MAP),
@@ -126,13 +100,6 @@ CREEP_SETTINGS = _marked(
     *settings_of(CreepConfig, group="identification"),
 )
 """All settings of the creep estimator."""
-
-ATP_SETTINGS = (
-    *(one._replace(changes=True) for one in settings_of(SupervisionConfig, group="supervision")),
-    *settings_of(Watchdogs),
-    *(FRAME_ID, DIRECTION, *OF_NODES_ALONE),
-)
-"""All settings of the ATP monitor."""
 
 OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
     {

@@ -89,6 +89,15 @@ def test_without_the_compiler_it_says_so() -> None:
 
 def test_the_estimator_drags_nothing_else_in() -> None:
     """An optional package that is there is not loaded either: the start is as quick as ROS itself allows."""
-    code = "import sys, adhesion_node.nodes.estimator; print(*{name.partition('.')[0] for name in sys.modules})"
-    loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
-    assert not set(loaded) & {*refused(), "pandas", "matplotlib"}
+    assert not loaded_with("adhesion_node.nodes.estimator") & {*refused(), "pandas", "matplotlib"}
+
+
+def test_what_needs_no_estimator_starts_without_its_libraries() -> None:
+    nodes = {f"adhesion_node.nodes.{name}" for name in ("atp_monitor", "recorder", "player")}
+    assert not loaded_with(*nodes, "adhesion_node.live.__main__") & {"scipy", "numba", "pandas", "matplotlib"}
+
+
+def loaded_with(*modules: str) -> set[str]:
+    """Names of all that is imported with some modules."""
+    code = f"import sys, {', '.join(modules)}; print(*{{name.partition('.')[0] for name in sys.modules}})"
+    return set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())

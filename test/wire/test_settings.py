@@ -16,7 +16,8 @@ from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.setting import Setting
 from adhesion_node.wire import sensing
 from adhesion_node.wire.codecs import Line
-from adhesion_node.wire.settings import OF_LINE, OF_NODES_ALONE, SETTINGS, Setup, parse_setting, setup_of
+from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
+from adhesion_node.wire.shared_settings import OF_LINE, OF_NODES_ALONE
 
 OF_FILES = {"track", "track_line", "track_start_m", "train_file", "rail_map"}
 """Settings that are no number or word of the configuration."""

@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from ...core.physics.train import CRH3
-from ...wire.settings import AMBIENT
+from ...wire.shared_settings import AMBIENT
 from ...wire.train_file import read_train
 from .format import (
     ACCELERATION_UNITS,
