@@ -201,5 +201,7 @@ def test_a_target_that_is_not_understood_is_an_emergency_until_one_is(
     assert status.message.startswith("no safe distance is known, emergency brake: target: refused: ")
     assert why in status.message
     assert levels(line) == ("EMERGENCY_BRAKE", "5000.000")
+    assert ask(line, f"{NAMESPACE}/atp_monitor", service_build_up_s=2.5).successful
+    assert levels(line)[0] == "EMERGENCY_BRAKE", "another parameter is no target"
     line.next_status(lambda: output.publish(topics.ATP_TARGET.build(new, 0, Target(5000.0, 0.0))))
     assert levels(line)[0] == "NORMAL"

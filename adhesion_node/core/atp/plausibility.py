@@ -15,8 +15,8 @@ from .config import SupervisionConfig
 from .received import NS_PER_S, StampedCurve, TrainState
 
 MAX_EXCESS_MPS = 20 * KMH
-"""How far the speed judged may lie above the curve's first: what a train gains while a curve is valid, and the
-standard deviations of a state that is just good enough."""
+"""How far the speed judged and the curve's first may be apart: what a train gains while a curve is valid, and the
+standard deviations of a state that is just good enough. A curve all in feet is consistent, but begins elsewhere."""
 
 SPEED_TOLERANCE_MPS = 0.01
 """A curve that ends so close to the target speed reaches it: km/h and m/s are rounded differently."""
@@ -104,7 +104,7 @@ def of_curve(config: SupervisionConfig, braking: StampedCurve, state: TrainState
             f"decelerates by {strongest:.3g} m/s^2, at most {config.max_deceleration_mps2:g} is believed "
             "(max_deceleration_mps2): give m/s^2"
         )
-    if speed_mps > max(first, target) + MAX_EXCESS_MPS:
+    if abs(max(first, target) - max(speed_mps, target)) > MAX_EXCESS_MPS:
         return (
             f"begins at {first / KMH:.1f} km/h but the train runs at {speed_mps / KMH:.1f} km/h at most: give speeds "
             "in m/s, from the train's own on"

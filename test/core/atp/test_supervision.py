@@ -46,6 +46,11 @@ NEEDED_M = 1000.0 + 80.0
 CURVE = StampedCurve(NOW_NS, 0.0, constant(40.0))
 
 
+def slow(position_m: float) -> StampedCurve:
+    """Return the curve of a train at 12 m/s."""
+    return StampedCurve(NOW_NS, position_m, constant(12.0))
+
+
 def at_margin(margin_m: float, previous: Level = Level.NORMAL) -> Decision:
     """Decide `margin_m` before the emergency intervention at 40 m/s."""
     position = 5000.0 - 10.0 - NEEDED_M - margin_m
@@ -157,7 +162,7 @@ def test_a_state_that_is_old_is_moved_on_at_its_speed() -> None:
 @pytest.mark.parametrize("position_m", [0.0, 4999.0, 5001.0, 9000.0])
 def test_at_the_target_speed_all_is_well_wherever_the_train_is(position_m: float) -> None:
     config = replace(CONFIG, target_speed_kmh=36.0)
-    decision = decide(config, NOW_NS, TrainState(NOW_NS, position_m, 10.0), CURVE._replace(position_m=position_m))
+    decision = decide(config, NOW_NS, TrainState(NOW_NS, position_m, 10.0), slow(position_m))
     assert decision.level is Level.NORMAL
     assert decision.reading is not None
     assert decision.reading.braking_distance_m == 0.0
@@ -175,7 +180,7 @@ def test_at_the_target_speed_all_is_well_wherever_the_train_is(position_m: float
 def test_beyond_the_target_its_speed_is_a_ceiling(speed_kmh: float, level: Level) -> None:
     config = replace(CONFIG, target_speed_kmh=36.0)
     state = TrainState(NOW_NS, 5100.0, speed_kmh * KMH)
-    assert decide(config, NOW_NS, state, CURVE._replace(position_m=5100.0)).level is level
+    assert decide(config, NOW_NS, state, slow(5100.0)).level is level
 
 
 def test_far_before_the_target_the_line_speed_is_a_ceiling() -> None:
