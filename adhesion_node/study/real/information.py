@@ -8,6 +8,7 @@ tell of themselves. J = sum D' C^-1 D over the sensors, with the derivatives D o
 of its errors, white and Gauss-Markov. The true train passes a border in seconds, which only takes longer.
 """
 
+from bisect import bisect_left
 from functools import lru_cache
 
 import numpy as np
@@ -29,11 +30,14 @@ LONGEST_S, STEP_S = 20.0, 0.1
 def soonest_s(fitted: str, used: float, share: float) -> float | None:
     """Time, s, after which the standard deviation of the adhesion `used` may be a `share` of it; None: above 20 s."""
     mounted = FITTED[fitted].sensors.values()
-    for after_s in np.arange(STEP_S, LONGEST_S, STEP_S):
+
+    def told(after_s: float) -> bool:
         parts = [part for one in mounted if (part := _information(one, after_s)) is not None]
-        if parts and deceleration_std(parts) <= share * used * GRAVITY:
-            return round(float(after_s), 1)
-    return None
+        return bool(parts) and deceleration_std(parts) <= share * used * GRAVITY
+
+    times = np.arange(STEP_S, LONGEST_S, STEP_S)
+    first = bisect_left(times, True, key=told)  # what is told once is not forgotten
+    return round(float(times[first]), 1) if first < times.size else None
 
 
 def deceleration_std(parts: list[Array]) -> float:

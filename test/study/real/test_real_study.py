@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tasks import computed_here
 
 from adhesion_node.command.running import Running
 from adhesion_node.study.__main__ import main
@@ -61,8 +62,9 @@ def test_the_point_mass_slides_all_the_way_to_its_standstill() -> None:
 
 def test_rows_and_pictures_of_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, figures = tmp_path / "real.json", tmp_path / "figures"
-    options = ["--runs", "1", "--only", "tram_leaves", "--workers", "1", "--cache", str(tmp_path / "cache")]
-    assert main(["real", *options, "--tune", "--json", str(file), "--figures", str(figures)]) == 0
+    options = ["--runs", "1", "--only", "tram_leaves", "--cache", str(tmp_path / "cache")]
+    with computed_here():
+        assert main(["real", *options, "--tune", "--json", str(file), "--figures", str(figures)]) == 0
     (row,) = json.loads(file.read_text())
     assert (row["case"], row["scenario"], row["first_seed"], row["runs"]) == (
         "tram_leaves gnss_wheels",

@@ -8,6 +8,7 @@ import json
 from pathlib import Path
 
 import pytest
+from tasks import computed_here
 
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.real import remembered
@@ -18,8 +19,9 @@ def test_rows_with_and_without_the_map(
 ) -> None:
     monkeypatch.setattr(remembered, "PAIRS", (("tram_wet", "tram_wet"),))
     file = tmp_path / "remembered.json"
-    options = ["--runs", "1", "--earlier", "3", "--workers", "1", "--cache", str(tmp_path / "cache")]
-    assert main(["remembered", *options, "--json", str(file)]) == 0
+    options = ["--runs", "1", "--earlier", "3", "--cache", str(tmp_path / "cache")]
+    with computed_here():
+        assert main(["remembered", *options, "--json", str(file)]) == 0
     without, with_map = json.loads(file.read_text(encoding="utf-8"))
     assert (without["rail_map"], with_map["rail_map"]) == (False, True)
     assert (without["before"], without["now"], without["runs"]) == ("tram_wet", "tram_wet", 1)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tasks import computed_here
 
 from adhesion_node.command.running import Arrays, Running, file_name, load, save
 from adhesion_node.core import Config
@@ -96,7 +97,9 @@ def test_numbers_do_not_depend_on_the_workers_or_the_tasks(tmp_path: Path) -> No
 def test_groups_hold_what_has_their_key(tmp_path: Path) -> None:
     trials = Trials(World("tunnel_exit"), Estimator(way="ekf"), seeds=2)
     other = trials._replace(world=World("tunnel_entry"))
-    groups = grouped([("a", trials), ("b", other), ("a", trials._replace(first_seed=7, seeds=1))], Running(tmp_path))
+    wanted = [("a", trials), ("b", other), ("a", trials._replace(first_seed=7, seeds=1))]
+    with computed_here():
+        groups = grouped(wanted, Running(tmp_path))
     assert list(groups) == ["a", "b"]
     assert sorted(set(groups["a"].rows["seed"])) == [7, 1000, 1001]
     assert sorted(groups["b"].runs["seed"]) == [1000, 1001]

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from tasks import computed_here
 
 from adhesion_node.command.running import save
 from adhesion_node.study.__main__ import main
@@ -77,9 +78,9 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, Any]
         quick = wanted._replace(estimator=wanted.estimator._replace(config=config))
         save(wanted, quick.compute(), folder / "cache")
     file, cache, figures = (str(folder / name) for name in ("t.json", "cache", "figures"))
-    assert (
-        main(["tables", "--runs", "1", "--json", file, "--cache", cache, "--figures", figures, "--format", "svg"]) == 0
-    )
+    options = ["--runs", "1", "--json", file, "--cache", cache, "--figures", figures, "--format", "svg"]
+    with computed_here():
+        assert main(["tables", *options]) == 0
     return json.loads(Path(file).read_text()), folder / "figures"
 
 
