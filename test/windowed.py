@@ -1,14 +1,34 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Settings of the methods that work in windows, in the paper's world."""
+"""The methods that work in windows: settings of the paper's world, and one whose numbers fail."""
 
 from dataclasses import replace
 from typing import Any
 
 from adhesion_node.core import Config
+from adhesion_node.core.methods.protocol import AnyMethod, Context, MethodWindow, Verdict
+from adhesion_node.core.methods.rail_condition.method import RailCondition
 from adhesion_node.study.trial.estimators import EXACT
 
 
 def windowed(**settings: Any) -> Config:
     """The method `rail_condition`, which knows train and track exactly, but for these settings."""
     return replace(EXACT, **settings)
+
+
+class Failing:
+    """The method `rail_condition`, whose numbers fail in its n-th window."""
+
+    def __init__(self, failure: Exception | float, at: int) -> None:
+        self.inner: AnyMethod = RailCondition()
+        self.summary, self.open, self.extend = "", self.inner.open, self.inner.extend
+        self.failure, self.left = failure, at
+
+    def evaluate(self, config: Config, window: MethodWindow, context: Context) -> Verdict:
+        self.left -= 1
+        verdict = self.inner.evaluate(config, window, context)
+        if self.left:
+            return verdict
+        if isinstance(self.failure, Exception):
+            raise self.failure
+        return verdict._replace(rail=verdict.rail._replace(mu=self.failure))

@@ -5,6 +5,8 @@
 import math
 from statistics import median
 
+import numpy as np
+
 from .belief import tracker
 from .belief.gaussian import Gaussian, coast
 from .belief.window import WindowSample
@@ -97,11 +99,24 @@ def _release(config: Config, state: State) -> tuple[State, Estimate | None]:
 
 
 def _estimate(config: Config, state: State) -> tuple[State, Verdict, Estimate]:
+    """Judge the window; one whose numbers fail is withheld, and the next one opens with the next measurement."""
+    try:
+        with np.errstate(invalid="raise", over="raise"):
+            return _judged(config, state)
+    except (ArithmeticError, ValueError) as error:
+        count = 0 if state.window is None else len(state.window.samples)
+        state = state._replace(window=None).told(Event(Outcome.FAILED, f"{count} measurements ({error})"))
+        return _judged(config, state)
+
+
+def _judged(config: Config, state: State) -> tuple[State, Verdict, Estimate]:
     newest, belief, knowledge = state.newest, state.belief, state.knowledge
     assert newest is not None  # an estimate follows an accepted measurement
     assert belief is not None
     verdict, knowledge = judge(config, _method(state), state.seed, newest, belief, state.window, knowledge)
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)
+    if not all(math.isfinite(value) for value in estimate if isinstance(value, float)):
+        raise FloatingPointError("not finite")
     state = state._replace(window=verdict.window, knowledge=knowledge, since_estimate=0, seen=estimate)
     return state, verdict, estimate
 

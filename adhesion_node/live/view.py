@@ -11,12 +11,13 @@ from itertools import islice
 from typing import Any, NamedTuple
 
 from ..core.atp.received import StampedCurve, TrainState
+from ..core.intake.outcome import text_of
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
 from ..report.run import IN_WORDS
 from ..web.creep import creep_part
-from ..web.fit import number, numbers, rounded, text_of
+from ..web.fit import number, numbers, rounded
 from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
 
 EXPECTED = {

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..core.creep.curve import adhesion
-from .fit import number, numbers, rounded, text_of
+from ..core.intake.outcome import text_of
+from .fit import number, numbers, rounded
 
 CREEP_END, POINTS = 0.3, 40
 """Creep up to which the curve is drawn, and its points."""

@@ -1,15 +1,12 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Whatever was received, made fit to be sent and shown: finite numbers of some digits, texts of bounded length."""
+"""Whatever was received, made fit to be sent and shown: finite numbers of some digits."""
 
 import math
 from collections.abc import Iterable, Mapping
 
 LARGEST = 1e9
 """Beyond it a number means nothing on this page."""
-
-LONGEST = 300
-"""Characters of a text that are shown."""
 
 
 def number(value: float | str | None, digits: int) -> float | None:
@@ -42,13 +39,3 @@ def rounded(values: Iterable[float], digits: int) -> list[float | int | None]:
     """
     fit = (number(value, digits) for value in values)
     return [value if value is None or digits else int(value) for value in fit]
-
-
-def text_of(said: str) -> str:
-    r"""A text without control characters, cut where it is too long.
-
-    >>> text_of("a\x1b[2J" + 300 * "b")[:5], len(text_of(1000 * "b"))
-    ('a [2J', 301)
-    """
-    printable = "".join(each if each.isprintable() else " " for each in said[: LONGEST + 1])
-    return printable if len(said) <= LONGEST else f"{printable[:LONGEST]}…"

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ..core.intake.outcome import text_of
 from ..core.intake.samples import (
     MAX_ACCELERATION_MPS2,
     MAX_POSITION_M,
@@ -50,6 +51,12 @@ MAX_AMBIENT_PA = 110e3
 
 MAX_WHEEL_RADPS = 1e3
 """No wheel of a train turns faster: 500 km/h on a wheel of 0.3 m are 463 rad/s."""
+
+MOST_AXLES = 400
+"""A train of 1500 m has no more: axles are kept for seconds, and nobody is to fill the memory with them."""
+
+MOST_POINTS = 2000
+"""Of a braking curve: one in 0.07 m/s from 500 km/h on."""
 
 MAX_FORCE_N = 1e7
 """No train pulls harder; the strongest locomotives reach 2 MN."""
@@ -168,12 +175,13 @@ class Reason(Enum):
         f"linear_acceleration.x is in m/s^2 along the track, not in g, within +-{MAX_ACCELERATION_MPS2:g}"
     )
     NO_AXLE = "give one velocity, rad/s, for every driven axle in name"
+    MANY_AXLES = f"give at most {MOST_AXLES}, of the axles that have a sensor"
     IMPLAUSIBLE_WHEEL_SPEED = f"velocity is in rad/s, not rpm, within +-{MAX_WHEEL_RADPS:g}"
     IMPLAUSIBLE_FORCE = f"force.x is in N, within +-{MAX_FORCE_N:g}"
     UNDECODABLE = "leave it out of the recording, as `recover --drop-undecodable` does"
     DISABLED = "call ~/set_enabled with true to go on"
     BAD_CURVE = (
-        f"give one joint '{TRAIN}', at least two points, each with one position, velocity and acceleration; "
+        f"give one joint '{TRAIN}', 2 to {MOST_POINTS} points, each with one position, velocity and acceleration; "
         "positions and times rise, speeds fall and are not negative, accelerations are below 0"
     )
     BAD_TARGET = f"give one joint '{TRAIN}' and one point with one position, m, and one velocity, m/s"
@@ -186,7 +194,7 @@ class Rejected(ValueError):
     """A message that must not be used: `reason` is the name of a `Reason`, the text says what = value: remedy."""
 
     def __init__(self, reason: Reason, what: str) -> None:
-        super().__init__(f"{what}: {reason.value}")
+        super().__init__(f"{text_of(what)}: {reason.value}")
         self.reason = reason.name
 
 

@@ -12,7 +12,21 @@ from ..core.atp.received import StampedCurve
 from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import Array
-from .codecs import FRAME, NS, TRAIN, Codec, Fields, Line, New, Reason, Rejected, header, plausible, stamp_ns
+from .codecs import (
+    FRAME,
+    MOST_POINTS,
+    NS,
+    TRAIN,
+    Codec,
+    Fields,
+    Line,
+    New,
+    Reason,
+    Rejected,
+    header,
+    plausible,
+    stamp_ns,
+)
 
 if TYPE_CHECKING:  # see results.py
     from ..core.estimate import Estimate
@@ -29,7 +43,7 @@ def read_curve(message: Any, line: Line) -> StampedCurve:
     Where the chainage falls along it, its velocities are below 0 and its accelerations above, on a standing train too.
     """
     points = message.points
-    if list(message.joint_names) != [TRAIN] or len(points) < 2:
+    if list(message.joint_names) != [TRAIN] or not 2 <= len(points) <= MOST_POINTS:
         raise Rejected(Reason.BAD_CURVE, f"braking curve joints = {list(message.joint_names)}, points = {len(points)}")
     if any(not len(p.positions) == len(p.velocities) == len(p.accelerations) == 1 for p in points):
         raise Rejected(Reason.BAD_CURVE, "braking curve: a point without exactly one value of each kind")

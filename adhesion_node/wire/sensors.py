@@ -50,6 +50,8 @@ def read_imu(message: Any, _line: Line) -> samples.ImuSample:
 
 def read_wheel_speed(message: Any, _line: Line) -> samples.WheelSample:
     """Read the speeds of the axles, rad/s, NaN where one has none, from a JointState; raises Rejected."""
+    if len(message.name) > codecs.MOST_AXLES:
+        raise Rejected(Reason.MANY_AXLES, f"wheel speed names = {len(message.name)}")
     names, velocities = list(message.name), list(message.velocity)
     if not names or len(names) != len(velocities):
         raise Rejected(Reason.NO_AXLE, f"wheel speed names = {names}, velocities = {len(velocities)}")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import messages
+import numpy as np
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -18,6 +19,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from windowed import Failing
 
 from adhesion_node.core import Config, predict
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, SpeedSample
@@ -223,6 +225,22 @@ def test_the_first_refusal_is_said_with_its_remedy(line: Line) -> None:
     (status,) = heard[-1].status
     assert status.level == DiagnosticStatus.WARN
     assert "header.frame_id = 'map', frame = 'track': set header.frame_id" in status.message
+
+
+def test_a_window_whose_numbers_fail_is_told(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    overrides = [Parameter("method", value="rail_condition")]
+    node = Estimator(context=context, parameter_overrides=overrides)
+    failing = Failing(np.linalg.LinAlgError("singular"), at=1)
+    node.pipeline.state = node.pipeline.state._replace(method=failing)
+    line = Line(executor, spin_until, node, Node("driver", context=context))
+    for _, reading in samples("tunnel_entry", 15.0, 21.5):
+        line.send_sample(reading)
+    line.hear_all()
+    told = [message.status[0] for message in line.heard[topics.DIAGNOSTICS]]
+    assert any("(singular): the numbers of a window failed" in status.message for status in told)
+    assert line.values()["dropped.FAILED"] == "1"
 
 
 def test_what_the_journey_teaches_is_told_with_its_standard_deviation(line: Line) -> None:

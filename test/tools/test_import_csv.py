@@ -244,8 +244,10 @@ def test_all_faults_together_are_told_five_of_a_kind_then_counted(importing: Imp
         ("time,position,time\n1,2,1\n", [], "FILE: column 'time' is there 2 times: rename one"),
         ("time,position\n", [], "FILE: no good row in 0: nothing was written"),
         ("time,position\n1,2\n", ["--delimiter", ";;"], "delimiter = ';;': give one character"),
-        ("time,position\n1,2\n", ["--position-std", "0"], "position-std = 0.0: give a standard deviation above 0"),
-        ("time,position\n1,2\n", ["--position-std", "nan"], "position-std = nan: give a standard deviation above 0"),
+        *(
+            ("time,position\n1,2\n", ["--position-std", std], f"position-std = {told}: give a standard deviation from")
+            for std, told in (("0", "0.0"), ("nan", "nan"), ("1e200", "1e+200"), ("1e-200", "1e-200"))
+        ),
     ],
 )
 def test_what_gives_no_recording_leaves_nothing(importing: Import, text: str, options: list[str], message: str) -> None:

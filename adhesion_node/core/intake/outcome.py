@@ -7,6 +7,19 @@ from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
+LONGEST = 300
+"""Characters of a text from outside that are told."""
+
+
+def text_of(said: str) -> str:
+    r"""A text from outside without control characters, cut where it is too long.
+
+    >>> text_of("a\x1b[2J" + 300 * "b")[:5], len(text_of(1000 * "b"))
+    ('a [2J', 301)
+    """
+    printable = "".join(each if each.isprintable() else " " for each in said[: LONGEST + 1])
+    return printable if len(said) <= LONGEST else f"{printable[:LONGEST]}…"
+
 
 class Outcome(Enum):
     """What an estimator did with a sample; the value says it in words, with the remedy."""
@@ -33,6 +46,7 @@ class Outcome(Enum):
     UNEQUAL = "the axles creep so differently that their common force belongs to no one creep: dropped"
     IDLE = "creep below min_creep: says nothing of the curve, nothing is forgotten"
     CHANGED = "the newest samples lie on one side of the curve: the surface changed, what was known is forgotten"
+    FAILED = "the numbers of a window failed, nothing is identified by it: is a setting far from what any train has?"
     RESET = "stamp or position jumped: the estimation starts anew"
 
 
@@ -54,7 +68,7 @@ class Event(NamedTuple):
 
     def __str__(self) -> str:
         """Say what = value: outcome, with the remedy."""
-        return f"{self.detail}: {self.outcome.value}" if self.detail else self.outcome.value
+        return f"{text_of(self.detail)}: {self.outcome.value}" if self.detail else self.outcome.value
 
     @property
     def is_told(self) -> bool:

@@ -47,8 +47,8 @@ class Train:
     pads: int = setting(96, "Number of brake pads, N", "", 1, 100_000)
     # Not printed either: those of the CRH3.
     resistance_c0: float = setting(0.79, "Rolling resistance, c0", "N/kN", 0.0, 100.0)
-    resistance_c1: float = setting(0.0064, "Mechanical resistance, c1", "N/kN per km/h", 0.0, 10.0)
-    resistance_c2: float = setting(0.000115, "Air resistance, c2", "N/kN per (km/h)^2", 0.0, 1.0)
+    resistance_c1: float = setting(0.0064, "Mechanical resistance, c1", "N/kN per km/h", 0.0, 1.0)
+    resistance_c2: float = setting(0.000115, "Air resistance, c2", "N/kN per (km/h)^2", 0.0, 0.01)
     rotating_mass_fraction: float = setting(
         0.0, "Inertia of the rotating parts as a fraction of the mass; the paper has none", "", 0.0, 1.0
     )

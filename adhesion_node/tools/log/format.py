@@ -121,8 +121,9 @@ class Format:
             _require(codecs.lookup, LookupError, "encoding", self.encoding, "such as utf-8, cp1252 or utf-16")
         _require(ZoneInfo, _NO_ZONE, "time-zone", self.time_zone, "such as UTC or Europe/Berlin")
         std = self.position_std_m
-        if std is not None and not MIN_VARIANCE_M2 <= std**2 <= MAX_VARIANCE_M2:
-            raise ValueError(f"position-std = {std!r}: give a standard deviation above 0, in m")
+        least, most = MIN_VARIANCE_M2**0.5, MAX_VARIANCE_M2**0.5
+        if std is not None and not least <= std <= most:
+            raise ValueError(f"position-std = {std!r}: give a standard deviation from {least:g} to {most:g}, in m")
         if not 0.01 <= self.wheel_radius_m <= 5.0:
             raise ValueError(f"wheel-radius = {self.wheel_radius_m!r}: give a radius of 0.01 to 5 m")
         if not 1e5 <= self.full_pressure_pa <= 1e6:

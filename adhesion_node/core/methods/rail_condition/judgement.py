@@ -53,7 +53,7 @@ def judge(
     limit_std = config.brake_error * limit if math.isfinite(limit) else 0.0
     spreads = np.sqrt(variances + np.where(mus < limit, 0.0, limit_std**2))
     bounds = lower_bound(np.minimum(mus, limit), spreads, known, config.confidence)
-    lower = min(max(float(np.min(bounds[weights >= config.plausible_probability])), 0.0), mu)
+    lower = min(max(float(np.min(bounds[weights >= min(config.plausible_probability, weights.max())])), 0.0), mu)
     if std > config.undecided_share * config.unknown_std:
         return Regime.COASTING, Rail(mu, std, lower) if known is None else before
     if mu + math.hypot(std, limit_std) < limit:
