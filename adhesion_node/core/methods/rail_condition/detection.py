@@ -61,7 +61,7 @@ def detect(config: Config, branches: Sequence[Branch], leading: Branch, stepped_
 def _stepped(config: Config, branch: Branch, lasts_s: float) -> Hypothesis:
     """The hypothesis behind a step; a speed wrong by size / `lasts_s` would have moved the positions as far."""
     step = _position_step(config, branch)
-    wrong_mps = config.position_step_speed_share * float(step.sizes[step.best]) / lasts_s
+    wrong_mps = config.position_step_speed_share * step.size / lasts_s
     return branch.before._replace(belief=widened(step.belief, 1, wrong_mps**2))
 
 

@@ -154,5 +154,5 @@ def _waits(config: Config, window: ConditionWindow, branches: Sequence[Branch]) 
     """Whether to leave nothing behind yet, as no step would tell of kappa: S measurements at 50 Hz are but a second."""
     lasts_s = (window.samples[-1].t_ns - window.samples[0].t_ns) * 1e-9
     return lasts_s < config.shortest_window_s and all(
-        np.max(each.smoothed.steps.headroom) < each.margin(config) for each in branches
+        np.max(each.smoothed.headroom) < each.margin(config) for each in branches
     )

@@ -9,10 +9,12 @@ hold next to nothing of 0.02 km/h per step, and EM would stay where it starts.
 
 from __future__ import annotations
 
+from functools import cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..kernels import equation
 from .problem import Model, Problem
 from .smoother import Smoothed
 
@@ -29,19 +31,15 @@ class Noise(NamedTuple):
 
 def learn_noise(config: Config, noise: Noise, problem: Problem, smoothed: Smoothed, spent: int) -> Noise:
     """Take in the first `spent` steps of a smoothed window, whose variances already have the factor of `noise`."""
-    trajectory = smoothed.trajectory
-    factor = problem.normal(smoothed.steps, trajectory, smoothed.kappa, smoothed.weights).factor
-    positions = np.zeros((factor.border.size, spent))
-    index = np.arange(spent)
-    positions[2 * index + 2, index] = 1.0
-    states, _ = factor.solve(positions, np.zeros(spent))
-    variances = np.sum(positions * states, axis=0) / problem.window.variance_m2[:spent]
-    squared = problem.squared(trajectory)[:spent] + variances
+    now = problem.solved(smoothed.trajectory, smoothed.kappa, smoothed.weights)
+    variances = equation.position_variances(now)[1 : spent + 1] / problem.window.variance_m2[:spent]
+    squared = problem.squared(smoothed.trajectory)[:spent] + variances
     found = float(np.mean(smoothed.weights[:spent] * squared)) / _expected(problem.model)
     share = spent / (config.noise_trust_steps + noise.steps + spent)
     return Noise(noise.factor * (1.0 + share * (found - 1.0)), min(noise.steps + spent, config.noise_memory_steps))
 
 
+@cache
 def _expected(model: Model) -> float:
     """Mean weighted square of Gaussian measurements whose variance is right."""
     points, weights = np.polynomial.hermite_e.hermegauss(40)

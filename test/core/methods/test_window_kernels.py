@@ -1,0 +1,126 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The compiled loops of a window under rail condition: against dense matrices of NumPy, to rounding."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy_window as by_numpy
+import pytest
+from oracles import Array
+
+from adhesion_node.core.belief.window import Window
+from adhesion_node.core.methods.kernels import equation, jumps
+from adhesion_node.core.methods.rail_condition.problem import Belief, Model, Problem
+from adhesion_node.core.methods.rail_condition.smoother import KappaSearch, Smoothed, posterior, smooth
+from adhesion_node.core.physics.adhesion import WET, SpeedLaw
+from adhesion_node.core.physics.motion import Motion
+from adhesion_node.core.physics.track import Grade, Track
+from adhesion_node.core.physics.train import Train
+
+PRIOR = Belief(np.array([100.0, 80.0, 0.9]), np.array([[0.25, 0.02, 0.01], [0.02, 0.02, -0.005], [0.01, -0.005, 0.04]]))
+SLOPED = Motion(
+    Train(rotating_mass_fraction=0.08), Track((Grade(150.0, 220.0, 1.0), Grade(190.0, 900.0, -3.0))), 4e-3, 3e-4
+)
+LEVEL = Motion(Train(), Track(), 4e-3, 3e-4)
+FULL, TIMID = 0.0952, np.linspace(0.02, 0.0952, 40)
+
+
+def _case(motion: Motion, brake: float | Array, dof: float, law: SpeedLaw = WET) -> tuple[Problem, Array]:
+    """A window with gaps, some measured speeds and an outlier, and a trajectory near it."""
+    rng, count = np.random.default_rng(4), 40
+    dt = np.where(np.arange(count) % 9 == 0, 0.3, 0.1)
+    speed = 80.0 - 0.9 * np.cumsum(dt)
+    position = 100.0 + np.cumsum(dt * (speed + 0.45 * dt))
+    radar = np.where(np.arange(count) % 5 == 0, 0.04, math.inf)
+    seen = position + 0.5 * rng.standard_normal(count) + 9.0 * (np.arange(count) == 11)
+    window = Window(
+        dt, np.full(count, brake) if np.isscalar(brake) else np.asarray(brake), seen, np.full(count, 0.25), speed, radar
+    )
+    near = np.column_stack((np.append(100.0, position), np.append(80.0, speed))) + 0.05 * rng.standard_normal((41, 2))
+    return Problem(Model(motion, law, dof), window, PRIOR), near
+
+
+CASES = [
+    pytest.param(_case(LEVEL, FULL, 4.0), id="level"),
+    pytest.param(_case(SLOPED, FULL, 0.0), id="profile and rotating mass"),
+    pytest.param(_case(SLOPED, TIMID, 4.0), id="building up"),
+    pytest.param(_case(LEVEL, TIMID, 1.0, SpeedLaw(0.08)), id="constant adhesion"),
+]
+
+
+@pytest.mark.parametrize("margin", [0.0, 0.3, -math.inf])
+@pytest.mark.parametrize("case", CASES)
+def test_a_normal_equation(case: tuple[Problem, Array], margin: float) -> None:
+    problem, near = case
+    weights = problem.model.weights(problem.squared(near))
+    ours, theirs = (
+        form(near, 0.9, weights, margin) for form in (problem.solved, lambda *at: by_numpy.equation(problem, *at))
+    )
+    steps, inverse = by_numpy.linearised(problem, near, 0.9), np.linalg.inv(theirs.matrix)
+    np.testing.assert_allclose(
+        ours.steps[:, :6], steps.moving.transpose(2, 0, 1).reshape(-1, 6), rtol=1e-12, atol=1e-13
+    )
+    np.testing.assert_allclose(ours.steps[:, equation.HEADROOM], steps.headroom, rtol=1e-12)
+    np.testing.assert_allclose([*ours.moved, ours.change], theirs.step, rtol=1e-9, atol=1e-11)
+    assert ours.information == pytest.approx(1.0 / inverse[-1, -1], rel=1e-10)
+    assert ours.decrease == pytest.approx(0.5 * theirs.right @ theirs.step, rel=1e-10)
+    assert ours.misfit == pytest.approx(theirs.misfit, rel=1e-11)
+    np.testing.assert_allclose(equation.covariance_at_end(ours), inverse[-3:, -3:], rtol=1e-9, atol=1e-14)
+    np.testing.assert_allclose(equation.position_variances(ours), np.diag(inverse)[:-1:2], rtol=1e-9)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_smoothed_window_and_what_it_leaves(case: tuple[Problem, Array]) -> None:
+    problem, near = case
+    search = KappaSearch(0.5, 0.0, 1e-9, 50)
+    ours, theirs = smooth(problem, search, near), by_numpy.smoothed(problem, search, near)
+    assert (ours.iterations, ours.converged) == (theirs.iterations, theirs.converged)
+    for one, other in zip(ours[:4], theirs[:4], strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
+    for margin in (0.0, -math.inf):
+        left, expected = posterior(problem, ours, margin), by_numpy.posterior(problem, ours, margin)
+        np.testing.assert_allclose(left.belief.mean, expected.belief.mean, rtol=1e-12)
+        np.testing.assert_allclose(left.belief.covariance, expected.belief.covariance, rtol=1e-8, atol=1e-14)
+        assert left.log_evidence == pytest.approx(expected.log_evidence, abs=1e-8)
+
+
+@pytest.mark.parametrize("of_rail", [True, False])
+@pytest.mark.parametrize("case", CASES)
+def test_a_jump_at_each_candidate(case: tuple[Problem, Array], of_rail: bool) -> None:
+    problem, near = case
+    weights = problem.model.weights(problem.squared(near))
+    found = Smoothed(near, 0.9, weights, np.zeros(40), 0, True)
+    now, candidates = problem.solved(near, 0.9, weights), np.arange(3, 38, dtype=np.intp)
+    off = problem.window.position_m - near[1:, 0]
+    parts = (
+        jumps.of_kappa(now, problem.certainty)
+        if of_rail
+        else jumps.of_positions(weights / problem.window.variance_m2, off)
+    )
+    ours = jumps.tried(now, parts, candidates, 0.6, False)
+    falls = jumps.tried(now, parts, candidates, 0.6, True)
+    for c, first in enumerate(candidates):
+        step, odds, variance = by_numpy.tried(problem, found, int(first), 0.6, of_rail=of_rail)
+        assert ours.sizes[c] == pytest.approx(step[-1], rel=1e-9, abs=1e-11)
+        assert 1.0 / ours.information[c] == pytest.approx(variance, rel=1e-9)
+        assert ours.odds[c] == pytest.approx(odds, rel=1e-9, abs=1e-9)
+        moved = jumps.moved(now, parts, int(first), float(step[-1]))
+        np.testing.assert_allclose(moved, step[:-2], rtol=1e-8, atol=1e-10)
+        end = [*moved[-2:] - now.moved[-2:], step[-2] - now.change]
+        np.testing.assert_allclose(ours.per_jump[:, c] * step[-1], end, rtol=1e-7, atol=1e-10)
+        hidden = step[-1] > 0.0 and now.steps[first, equation.HEADROOM] <= 0.0
+        assert falls.odds[c] == (-np.inf if hidden else ours.odds[c])
+
+
+def test_refuses_what_is_not_positive_definite() -> None:
+    """A measurement of negative information."""
+    problem, near = CASES[0].values[0]
+    with pytest.raises(np.linalg.LinAlgError, match=r"the window's system is not positive definite at 15 of 82"):
+        problem.solved(near, 0.9, np.where(np.arange(40) == 6, -1e9, 1.0))
+    wrong = replace(problem, prior=PRIOR._replace(covariance=-PRIOR.covariance))
+    with pytest.raises(np.linalg.LinAlgError, match=r"the prior's covariance"):
+        wrong.solved(near, 0.9, np.ones(40))
