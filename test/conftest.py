@@ -25,7 +25,9 @@ from rclpy.context import Context
 from rclpy.executors import Executor, SingleThreadedExecutor
 
 from adhesion_node.core import Config
+from adhesion_node.core.bank import BANK
 from adhesion_node.core.estimator import warm_up
+from adhesion_node.core.methods import METHODS
 
 DOMAINS = range(1, 101)
 ROOT = Path(__file__).resolve().parent.parent
@@ -64,7 +66,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the kernels once, before there are workers: in a fresh clone that takes longer than some tests wait."""
     if not hasattr(session.config, "workerinput"):
-        warm_up(Config())
+        for method in (BANK, *METHODS):
+            warm_up(Config(method=method, identify_noise=True))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:

@@ -9,6 +9,7 @@ number alone, so the same samples give the same bits whoever feeds them.
 
 import math
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 
 from .config import Config
 from .estimate import Estimate
@@ -91,13 +92,17 @@ def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
 
 
 def warm_up(config: Config) -> None:
-    """Brake once on made up measurements: what is compiled when first used is so before a train brakes."""
+    """Brake once on made up measurements: what is compiled when first used is so before a train brakes.
+
+    The windows of the configured method are short, so that they fill, and see the positions step.
+    """
+    config = replace(config, window=12, step=4, change_edge=2, shortest_window_s=0.0, particles=2, iterations=5)
     state, speed = init(config, seed=0), 30.0
     for k in range(40):
         t_ns, pressure = k * 100_000_000, 0.0 if k < 20 else config.train.full_pressure_pa
         wheels = WheelSample(t_ns, (speed / config.train.wheel_radius_m,))
         others = PressureSample(t_ns, pressure), SpeedSample(t_ns, speed, 0.01), ImuSample(t_ns, 0.0, 0.01), wheels
-        for sample in (*others, PositionSample(t_ns, 3.0 * k, 1.0)):
+        for sample in (*others, PositionSample(t_ns, 3.0 * k + (k > 33), 0.01)):
             state, _ = advance(config, state, sample)
     finish(config, state)
 

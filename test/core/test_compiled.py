@@ -4,16 +4,32 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import subprocess
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from pkgutil import iter_modules
 from typing import Any
 
 import pytest
 
 from adhesion_node.core import compiled
+from adhesion_node.core.bank import kernels as of_bank
+from adhesion_node.core.bank import kinds, layout
+from adhesion_node.core.methods import kernels as of_methods
+from adhesion_node.core.methods.kernels import equation
+from adhesion_node.core.physics.train import GRAVITY
+
+MODULES = {
+    package: [import_module(f"{package.__name__}.{each.name}") for each in iter_modules(package.__path__)]
+    for package in (of_bank, of_methods)
+}
+EACH = [(package, module) for package, modules in MODULES.items() for module in modules]
+NAMED = {of_bank: {**vars(kinds), **vars(layout)}, of_methods: vars(equation)}
+"""Where the constants stand that a kernel file repeats."""
 
 USE = """
 import numpy
@@ -45,3 +61,18 @@ def test_a_kernel_works_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(compiled, "njit", njit)
     assert compiled.kernel(abs)(-2) == 2
     assert asked == [{"cache": True, "error_model": "numpy"}, {"error_model": "numpy"}]
+
+
+@pytest.mark.parametrize(("package", "module"), EACH, ids=[module.__name__ for _, module in EACH])
+def test_a_kernel_file_stands_alone(package: Any, module: Any) -> None:
+    """What is kept of it is thrown away when its own file changes: nothing of another file may be compiled in."""
+    with open(module.__file__, encoding="utf-8") as file:
+        tree = ast.parse(file.read())
+    found = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    names = {alias.name for node in found for alias in node.names}
+    numbers = {**NAMED[package], "GRAVITY": GRAVITY}.items()
+    constants = {name: value for name, value in numbers if isinstance(value, int | float)}
+    for name, value in vars(module).items():
+        if isinstance(value, int | float) and name in constants:
+            assert value == constants[name], name
+    assert names <= {"annotations", "math", "numpy", "NDArray", "kernel", "TYPE_CHECKING", "NamedTuple"}

@@ -4,19 +4,17 @@
 
 from __future__ import annotations
 
-import ast
 from dataclasses import replace
 from importlib import import_module
 from itertools import product
 from pkgutil import iter_modules
-from typing import Any
 
 import numpy as np
 import numpy_bank as by_numpy
 import pytest
 from banks import FULL, bank_of
 
-from adhesion_node.core.bank import branching, kernels, kinds, layout, motion, seeing
+from adhesion_node.core.bank import branching, kernels, motion, seeing
 from adhesion_node.core.bank.kinds import KINDS, NOISES
 from adhesion_node.core.bank.layout import Bank
 from adhesion_node.core.bank.motion import Braking
@@ -24,7 +22,7 @@ from adhesion_node.core.bank.verdict import quantiles
 from adhesion_node.core.config import Config
 from adhesion_node.core.estimator import warm_up
 from adhesion_node.core.physics.track import Grade, Track, Tunnel
-from adhesion_node.core.physics.train import CRH3, GRAVITY
+from adhesion_node.core.physics.train import CRH3
 
 LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
 KIND, LAW, NOISE = ([label[part] for label in LABELS] for part in range(3))
@@ -110,21 +108,6 @@ def test_quantiles(shape: tuple[int, ...]) -> None:
         ours = quantiles(weights, means, stds, wanted)
         assert ours.shape == (*shape[:-1], 4)
         np.testing.assert_allclose(ours, by_numpy.quantiles(weights, means, stds, wanted), rtol=0.0, atol=1e-10)
-
-
-@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.__name__.rsplit(".", maxsplit=1)[-1])
-def test_a_kernel_file_stands_alone(module: Any) -> None:
-    """What is kept of it is thrown away when its own file changes: nothing of another file may be compiled in."""
-    with open(module.__file__, encoding="utf-8") as file:
-        tree = ast.parse(file.read())
-    found = [node for node in tree.body if isinstance(node, ast.Import | ast.ImportFrom)]
-    names = {alias.name for node in found for alias in node.names}
-    numbers = {**vars(kinds), **vars(layout), "GRAVITY": GRAVITY}.items()
-    constants = {name: value for name, value in numbers if isinstance(value, int | float)}
-    for name, value in vars(module).items():
-        if isinstance(value, int | float) and name in constants:
-            assert value == constants[name], name
-    assert names <= {"annotations", "math", "numpy", "NDArray", "kernel", "TYPE_CHECKING", "NamedTuple"}
 
 
 def test_all_is_compiled_before_a_train_brakes() -> None:

@@ -33,7 +33,7 @@ class Equation(NamedTuple):
     @property
     def step(self) -> Array:
         """Of the states and kappa, shape (2K + 3,)."""
-        return np.linalg.solve(self.matrix, self.right)
+        return np.asarray(np.linalg.solve(self.matrix, self.right), dtype=np.float64)
 
 
 def linearised(problem: Problem, trajectory: Array, kappa: float) -> Steps:
@@ -113,8 +113,8 @@ def posterior(problem: Problem, found: Smoothed, margin: float) -> Posterior:
     misfit = at.misfit + 0.5 * (np.sum((dof + 1.0) * np.log1p(squared / dof)) if dof else squared.sum())
     misfit += 0.5 * np.sum((window.speed_mps - found.trajectory[1:, 1]) ** 2 / window.speed_variance)
     spread = np.linalg.slogdet(at.matrix)[1] + np.linalg.slogdet(problem.prior.covariance)[1]
-    mean = np.array([*found.trajectory[-1], found.kappa]) + step[-3:]
-    belief = Belief(mean, np.linalg.inv(at.matrix)[-3:, -3:])
+    mean = step[-3:] + np.array([*found.trajectory[-1], found.kappa])
+    belief = Belief(mean, np.asarray(np.linalg.inv(at.matrix)[-3:, -3:], dtype=np.float64))
     return Posterior(belief, float(0.5 * at.right @ step - misfit - 0.5 * spread))
 
 

@@ -230,9 +230,9 @@ def _eliminated(rows: Array) -> int:
 
 
 @kernel
-def back(rows: Array, half: Array) -> Array:
+def _back(rows: Array, half: Array) -> Array:
     """A^-1 b of L^-1 b, shape (2K + 2,)."""
-    found = half * rows[PIVOT]
+    found: Array = half * rows[PIVOT]
     for i in range(found.size - 2, -1, -1):
         found[i] -= rows[NEAR, i + 1] * found[i + 1]
         if i + 2 < found.size:
@@ -255,7 +255,7 @@ def solved(given: Given, trajectory: Array, kappa: float, weights: Array, margin
         gain -= rows[BORDER, i] * rows[RIGHT, i] * by_pivot
         drop += rows[RIGHT, i] ** 2 * by_pivot
     change = gain / information
-    moved = back(rows, rows[RIGHT] - change * rows[BORDER])
+    moved = _back(rows, rows[RIGHT] - change * rows[BORDER])
     return Solved(steps, rows, moved, change, information, 0.5 * (drop + gain * change), misfit, failed)
 
 
@@ -370,7 +370,7 @@ def posterior(
 def position_variances(now: Solved) -> Array:
     """Variances of the K + 1 smoothed positions, from the last one back: the diagonal of the inverse."""
     near, far, size = now.rows[NEAR], now.rows[FAR], now.moved.size
-    along = back(now.rows, now.rows[BORDER])
+    along = _back(now.rows, now.rows[BORDER])
     found = np.empty(size // 2)
     one, one_next, next_one = 0.0, 0.0, 0.0  # of the inverse: (i+1, i+1), (i+1, i+2), (i+2, i+2)
     for i in range(size - 1, -1, -1):

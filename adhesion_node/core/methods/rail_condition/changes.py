@@ -102,7 +102,7 @@ def _likeliest(problem: Problem, smoothed: Smoothed, candidates: Indices, std: f
         found = Change(candidates, smoothed, now, tried, of_rail, float(np.logaddexp.reduce(tried.odds)))
         if again and found.log_odds > 0.0:
             moved = jumps.moved(now, parts, found.step, found.size).reshape(-1, 2)
-            shift = 0.0 if of_rail else found.size * (np.arange(window.steps) >= found.step)
+            shift = np.where(np.arange(window.steps) < found.step, 0.0, 0.0 if of_rail else found.size)
             weights = problem.model.weights(problem.squared(trajectory + moved, shift))
         else:
             break

@@ -57,9 +57,9 @@ def smooth(problem: Problem, search: KappaSearch, near: Array | None = None) -> 
     numpy.linalg.LinAlgError where a covariance is not positive definite.
     """
     start = problem.prior.mean[None, :2] if near is None else near
-    *found, failed = equation.smoothed(problem.given, search, np.ascontiguousarray(start), near is None)
-    problem.check(failed)
-    return Smoothed(*found)
+    found = equation.smoothed(problem.given, search, np.ascontiguousarray(start), near is None)
+    problem.check(found[-1])
+    return Smoothed(*found[:-1])
 
 
 def posterior(problem: Problem, smoothed: Smoothed, margin: float) -> Posterior:
