@@ -19,6 +19,16 @@ FLAGS = (
 )
 """Runs as any user, draws without a graphics card and calls nobody on its own."""
 
+LOOKS: dict[str, dict[str, Any]] = {
+    "light": {},
+    "dark": {"color_scheme": "dark"},
+    "phone": {"viewport": {"width": 390, "height": 844}},
+    "print": {"viewport": {"width": 700, "height": 1000}},
+    "forced colours": {"forced_colors": "active"},
+    "dark forced colours": {"forced_colors": "active", "color_scheme": "dark"},
+}
+"""How a page may be looked at: what `open_page` and then `turn` are given."""
+
 TIMEOUT_MS = 20_000.0
 
 
@@ -56,6 +66,13 @@ def open_page(**context: Any) -> Iterator[tuple[Page, list[str]]]:
         page.on("requestfailed", lambda request: troubles.append(f"{request.url}: {request.failure}"))
         page.on("console", lambda said: troubles.append(said.text) if said.type in ("error", "warning") else None)
         yield page, troubles
+
+
+def turn(page: Page, look: str) -> None:
+    """Bring an open page of `LOOKS` into its look: a printer tells the page first."""
+    if look == "print":
+        page.emulate_media(media="print")
+        page.evaluate("dispatchEvent(new Event('beforeprint'))")
 
 
 def assert_accessible(page: Page) -> None:

@@ -113,7 +113,8 @@ function chart(host, { view = shared(), onPick = null } = {}) {
       ctx.arc(x, y, 5 * px, 0, 7);
       ctx.fill();
       ctx.textAlign = right ? "right" : "left";
-      ctx.fillText(mark.label, x + (right ? -9 : 9) * px, y - 8 * px);
+      [ctx.strokeStyle, ctx.lineWidth, ctx.lineJoin] = [ink("paper"), 4 * px, "round"];
+      for (const write of ["strokeText", "fillText"]) ctx[write](mark.label, x + (right ? -9 : 9) * px, y - 8 * px);
     }
     ctx.restore();
     place();
@@ -137,7 +138,9 @@ function chart(host, { view = shared(), onPick = null } = {}) {
   }
 
   function make() {
-    const value = (_, number) => (number == null ? "–" : Number(number.toPrecision(4)).toString());
+    // Without a pointer the legend has no values: a dash would say that there is none.
+    const value = (_, number, _series, i) => (i == null ? "" : number == null ? "–" : Number(number.toPrecision(4)).toString());
+    const wide = (_, labels) => Math.max(52, 7 * Math.max(...(labels ?? []).map((label) => label.length)) + 18);
     // Along the run places count upwards; they are told as they stand on the line.
     const told = (x) => Number((x * (spec.x.sign ?? 1)).toPrecision(10)).toString();
     const axis = (more) => ({ stroke: () => ink("soft"), font: FONT, labelFont: FONT, grid: { stroke: () => ink("rule"), width: 1 }, ticks: { stroke: () => ink("rule"), width: 1 }, ...more });
@@ -145,12 +148,12 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     plot = new uPlot({
       width: area.clientWidth || 640, height: area.clientHeight || 240, padding: [12, 12, 0, 0],
       scales: { x: { time: false, range }, y: { range: () => spec.y.range } },
-      axes: [axis({ label: spec.x.label, labelSize: 18, size: 28, space: 70, values: (_, splits) => splits.map(told) }), axis({ size: 52, space: 30 })],
-      series: [{ label: spec.x.label, value: (_, x) => (x == null ? "–" : told(Number(x.toPrecision(6)))) }, ...spec.lines.map((line) => {
+      axes: [axis({ label: spec.x.label, labelSize: 18, size: 28, space: 70, values: (_, splits) => splits.map(told) }), axis({ size: wide, space: 30 })],
+      series: [{ label: spec.x.label, value: (_, x, _series, i) => (i == null ? "" : told(Number(x.toPrecision(6)))) }, ...spec.lines.map((line) => {
         const look = LOOKS[line.kind];
         return { label: line.label, value, stroke: () => ink(line.kind), width: look.width ?? 1.6, dash: look.dash, points: { show: look.points !== undefined, size: look.points, fill: () => ink(line.kind) } };
       })],
-      legend: { markers: { width: 3, dash: (u, i) => (LOOKS[spec.lines[i - 1]?.kind]?.dash ? "dashed" : "solid") } },
+      legend: { mount: (_, legend) => area.after(legend), markers: { width: 3, dash: (u, i) => (LOOKS[spec.lines[i - 1]?.kind]?.dash ? "dashed" : "solid") } },
       cursor: { sync: { key: spec.x.label, scales: ["x", null] }, drag: { x: true, y: false, setScale: false }, points: { size: 6 },
                 bind: { dblclick: () => () => view.show(null),
                         mousedown: (u, _, handler) => (event) => (event.shiftKey ? drag(event) : handler(event)) } },

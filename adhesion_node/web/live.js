@@ -48,7 +48,7 @@ function drawCab() {
   say("level", text);
   const soon = limits?.level === "NORMAL" && limits.to_indication_s > 0 ? limits.to_indication_s : null;
   rows(byId("limits"), [
-    ["target", `${number(limits?.target_kmh, 0, " km/h")}${left !== null && left < 0 ? ", passed" : ` in ${number(left, 0, " m")}`}`],
+    ["target", number(limits?.target_kmh, 0, " km/h") + (left === null ? "" : left < 0 ? ", passed" : ` in ${left.toFixed(0)} m`)],
     ["indication in", number(soon, 0, " s")], ["permitted speed", number(limits?.permitted, 0, " km/h")],
     ["warning from", number(limits?.warning, 0, " km/h")], ["service brake from", number(limits?.sbi, 0, " km/h")],
     ["emergency brake from", number(limits?.ebi, 0, " km/h")], ["emergency brake in", number(limits?.margin_m, 0, " m")]]);
@@ -135,7 +135,8 @@ function drawHealth() {
     return [input.name, element("td", { class: "wide" }, topic), element("td", { class: kind }, kind), kind === "late" || silent() ? "–" : number(input.hz, 1, " Hz"),
             old === Infinity ? "–" : `${number(old, 1)} s ago${input.why ? `: ${input.why}` : ""}`];
   }));
-  say("estimator", estimator == null ? "" : `Estimator: ${estimator.message}. ${estimator.accepted ?? 0} of ${estimator.measurements ?? 0} positions used; ` +
+  const told = fresh(STATE, estimator) === null ? `silent ${forFor(STATE)}` : estimator.message;
+  say("estimator", estimator == null ? "" : `Estimator: ${told}. ${estimator.accepted ?? 0} of ${estimator.measurements ?? 0} positions used; ` +
     `not used: ${Object.entries(estimator.dropped).map(([why, count]) => `${count} ${why}`).join(", ") || "none"}.`);
   const key = JSON.stringify(events.slice(-EVENTS_SHOWN));
   if (byId("events").dataset.key === key) return;
@@ -155,7 +156,7 @@ function drawState() {
   const gone = silent(), gone_s = ((Date.now() - heardAt) / 1000).toFixed(0);
   document.body.classList.toggle("silent", gone);
   byId("nodata").hidden = !gone;
-  if (gone) say("nodata", `NO DATA since ${heardAt.toLocaleTimeString("en-GB")} (${gone_s} s): is the program still running?`);
+  if (gone) say("nodata", `NO DATA since ${heardAt.toLocaleTimeString("en-GB")} (${gone_s} s): is the program running?`);
   const at = state.train == null ? "waiting for the estimator" : fresh(STATE, state.train) === null ? `estimator silent ${forFor(STATE)}` : `${state.train.t.toFixed(0)} s`;
   say("state", gone ? "no data" : state.ended ? `${number(state.train?.t, 0)} s, the run has ended` : at);
   say("announce", gone ? "No data" : `${byId("level").textContent.replace(/ for \d+ s$/, "")}. ${byId("regime").textContent}`);
@@ -183,6 +184,7 @@ function connect() {
   socket.addEventListener("close", () => setTimeout(connect, RETRY_MS));
 }
 
+addEventListener("beforeprint", () => say("printed", `printed ${new Date().toLocaleString("sv-SE")}`));
 connect();
 // Ages grow without any message; a frame that never comes, in a hidden tab, does not stop them.
 setInterval(draw, 250);

@@ -5,11 +5,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pandas as pd
 import pytest
+import seen
 from test_fleet import BRAKINGS, DATES, rail
 
 from adhesion_node.report.__main__ import main
@@ -23,9 +23,10 @@ def chromium() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def report(tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return the address of a report of three brakings and a map."""
+    tmp_path = tmp_path_factory.mktemp("report")
     table = tmp_path / "brakings.parquet"
     pd.DataFrame(BRAKINGS).to_parquet(table, index=False)
     assert main([str(table), str(rail(tmp_path / "rail.csv")), "--output", str(tmp_path / "report")]) == 0
@@ -114,10 +115,21 @@ def test_the_chart_has_the_date_and_place_that_were_chosen(report: str) -> None:
         assert troubles == []
 
 
-@pytest.mark.parametrize("context", [{}, {"color_scheme": "dark"}, {"viewport": {"width": 360, "height": 740}}])
-def test_the_page_can_be_used_by_everybody(report: str, context: dict[str, Any]) -> None:
-    with browser.open_page(**context) as (page, troubles):
+def test_paper_has_the_places_and_dates_that_are_buttons_on_the_screen(report: str) -> None:
+    with browser.open_page(**browser.LOOKS["print"]) as (page, _):
         page.goto(report)
+        browser.turn(page, "print")
+        picture = seen.look(page)
+        for told in ("1.00 to 1.20 km", *DATES, "2023-11-14 22:13:20"):
+            assert picture.has(told), told
+
+
+@pytest.mark.parametrize("look", browser.LOOKS)
+def test_the_page_can_be_used_by_everybody(report: str, look: str) -> None:
+    with browser.open_page(**browser.LOOKS[look], device_scale_factor=2) as (page, troubles):
+        page.goto(report)
+        browser.turn(page, look)
         browser.assert_accessible(page)
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "columns are cut off"
+        seen.assert_readable(seen.look(page))
         assert troubles == []

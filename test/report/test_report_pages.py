@@ -5,10 +5,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import pytest
+import seen
 from test_picture import TRUTH, record
 from test_report_brakings import journey
 
@@ -23,9 +23,10 @@ def chromium() -> Iterator[None]:
         yield
 
 
-@pytest.fixture
-def report(tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return the address of a report of two runs, the second without truth: 80 m/s, 2 m/s^2 slower each second."""
+    tmp_path = tmp_path_factory.mktemp("report")
     bags = [str(record(tmp_path / "with")), str(record(tmp_path / "without", *TRUTH))]
     assert main([*bags, "--output", str(tmp_path / "report"), "--target", "180"]) == 0
     return (tmp_path / "report" / "report.html").as_uri()
@@ -68,9 +69,10 @@ def test_the_report_needs_nothing_but_itself(report: str) -> None:
     assert asked == [report]
 
 
-@pytest.fixture
-def hour(tmp_path: Path) -> str:
+@pytest.fixture(scope="module")
+def hour(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Return the address of a report of seven brakings in an hour; in the second one the rail gets worse."""
+    tmp_path = tmp_path_factory.mktemp("hour")
     bag = str(journey(tmp_path / "hour", 7))
     assert main([bag, "--output", str(tmp_path / "report"), "--target", "60"]) == 0
     return (tmp_path / "report" / "report.html").as_uri()
@@ -163,6 +165,32 @@ def test_the_slider_stays_in_sight_and_the_address_is_the_moment(hour: str) -> N
         page.wait_for_function("document.getElementById('time').textContent === '1210.0 s'")
 
 
+def test_a_legend_has_values_under_the_pointer_alone(hour: str) -> None:
+    """Before: "permitted: –" beside a permitted speed, as the pointer was elsewhere."""
+    with browser.open_page() as (page, _):
+        page.goto(f"{hour}#t=610")
+        legend = page.locator("figure.chart").nth(1).locator(".u-legend")
+        resting = legend.inner_text()
+        assert "identified" in resting
+        assert "–" not in resting
+        assert "time" not in resting
+        page.locator(".u-over").nth(1).hover()
+        page.wait_for_function("(was) => document.querySelectorAll('.u-legend')[1].innerText !== was", arg=resting)
+        assert "time, s" in legend.inner_text()
+
+
+def test_the_numbers_of_an_axis_are_whole(hour: str) -> None:
+    """Before: of 10,000 m the first figure was cut off."""
+    with browser.open_page() as (page, _):
+        page.goto(hour)
+        for size, longest in page.evaluate(
+            "[...drawn].filter((made) => made.plot).map(({ plot }) => [plot.axes[1]._size,"
+            " Math.max(...plot.axes[1]._values.map((text) => {"
+            " plot.ctx.font = plot.axes[1].font[0]; return plot.ctx.measureText(text).width / uPlot.pxRatio; }))])"
+        ):
+            assert size >= longest + 15.0, "ticks and their gap take 15 pixels"
+
+
 def test_gaps_are_gaps(hour: str) -> None:
     with browser.open_page() as (page, _):
         page.goto(hour)
@@ -173,12 +201,14 @@ def test_gaps_are_gaps(hour: str) -> None:
         assert between == 6
 
 
-@pytest.mark.parametrize("context", [{}, {"color_scheme": "dark"}, {"viewport": {"width": 360, "height": 740}}])
-def test_the_report_can_be_used_by_everybody(hour: str, context: dict[str, Any]) -> None:
-    with browser.open_page(**context) as (page, troubles):
+@pytest.mark.parametrize("look", browser.LOOKS)
+def test_the_report_can_be_used_by_everybody(hour: str, look: str) -> None:
+    with browser.open_page(**browser.LOOKS[look], device_scale_factor=2) as (page, troubles):
         page.goto(hour)
+        browser.turn(page, look)
         browser.assert_accessible(page)
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "columns are cut off"
+        seen.assert_readable(seen.look(page))
         assert troubles == []
 
 
@@ -186,8 +216,7 @@ def test_paper_has_both_runs_one_below_the_other_in_readable_letters(report: str
     """Before: the second run was cut off, and the letters of the axes were 3 to 5 points high."""
     with browser.open_page() as (page, troubles):
         page.goto(f"{report}#t=12")
-        page.evaluate("dispatchEvent(new Event('beforeprint'))")
-        page.emulate_media(media="print")
+        browser.turn(page, "print")
         boxes = [run.bounding_box() for run in page.locator("section.run").all()]
         assert boxes[1]["y"] >= boxes[0]["y"] + boxes[0]["height"]
         for canvas in page.locator("figure.chart canvas").all():
@@ -195,6 +224,9 @@ def test_paper_has_both_runs_one_below_the_other_in_readable_letters(report: str
             assert box["x"] + box["width"] <= 690.0
             assert box["width"] > 300.0
         assert page.locator("#time").inner_text() == "12.0 s"
-        assert page.locator("h1").inner_text() == "with, without"
+        picture = seen.look(page)
+        for told in ("with, without", "CRH3 of Xie et al. 2019", "2023-11-14 22:13:20 UTC"):
+            assert picture.has(told), told
+        assert all(button.is_visible() for button in page.locator("td button").all()), "when each braking began"
         page.evaluate("dispatchEvent(new Event('afterprint'))")
         assert troubles == []
