@@ -6,7 +6,7 @@ A dataclass declares its settings as fields made by `setting`; `settings_of` lis
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, field, fields
 from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeVar
@@ -14,6 +14,10 @@ from typing import Any, NamedTuple, TypeVar
 Value = bool | int | float | str
 
 Made = TypeVar("Made")
+Settings = TypeVar("Settings")
+
+MOST_KEPT = 64
+"""Settings of which something is kept at most."""
 
 
 class Setting(NamedTuple):
@@ -120,3 +124,18 @@ def by_group(settings: Iterable[Setting]) -> dict[str, list[Setting]]:
     for one in settings:
         groups.setdefault(one.group, []).append(one)
     return groups
+
+
+def once(make: Callable[[Settings], Made]) -> Callable[[Settings], Made]:
+    """Make once what belongs to settings, by their identity: to compare all of them may take longer than to make it."""
+    kept: dict[int, tuple[Settings, Made]] = {}
+
+    def made(settings: Settings) -> Made:
+        found = kept.get(id(settings))
+        if found is None:
+            if len(kept) >= MOST_KEPT:
+                kept.clear()
+            kept[id(settings)] = found = settings, make(settings)  # as long as they are kept no others have their id
+        return found[1]
+
+    return made

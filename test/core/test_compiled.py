@@ -34,7 +34,7 @@ NAMED = {of_bank: {**vars(kinds), **vars(layout)}, of_methods: vars(equation)}
 USE = """
 import numpy
 from adhesion_node.core.bank.kernels.weighing import normalised
-print(normalised(numpy.zeros(4))[0])
+print(normalised(numpy.zeros(4), -numpy.inf)[0])
 """
 
 

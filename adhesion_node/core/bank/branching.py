@@ -9,16 +9,16 @@ have changed is a new hypothesis beside the old one (multiple hypotheses, as in 
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..belief.rail import Rail
 from ..physics.train import Array
-from .kernels import springing, weighing
+from ..setting import once
+from .kernels import springing, uniting
 from .kernels.springing import Rule
-from .kernels.weighing import Pruning
+from .kernels.uniting import Pruning
 from .kinds import FREE, FREE_STD, HELD, KINDS, PASSING, SLIDING
 from .layout import MU, ROUGH, Bank, joined
 from .motion import Braking, laws_of, rolling_use
@@ -61,6 +61,8 @@ brake no longer reaches lets them roll."""
 ALIKE, ALIKE_STD = 0.3, 1.4
 """Hypotheses of one label say the same where speed and adhesion differ by less than this part of their standard
 deviations, and these by less than this factor."""
+
+PRUNING = Pruning(math.log(LEAST), MOST, ALIKE, ALIKE_STD)
 
 
 def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
@@ -127,7 +129,7 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
     return Bank(*springing.branched(bank, rolling_use(config, bank, braking), rule)).normalised()
 
 
-@lru_cache(maxsize=16)
+@once
 def _likely(config: Config) -> tuple[Array, Array]:
     """Probabilities of the laws; roughness and prior of each kind, 0 of those that do not slide."""
     kinds = [(kind.roughness, kind.prior if kind.slides else 0.0) for kind in KINDS]
@@ -136,11 +138,9 @@ def _likely(config: Config) -> tuple[Array, Array]:
 
 def pruned(bank: Bank) -> Bank:
     """Without the unlikely, and with what says the same said once: it is united, the likelier one first."""
-    kept, mean, covariance, log_weight = weighing.pruned(bank, Pruning(math.log(LEAST), MOST, ALIKE, ALIKE_STD))
-    return bank.part(kept)._replace(mean=mean, covariance=covariance, log_weight=log_weight)
+    return Bank(*uniting.pruned(bank, PRUNING))
 
 
 def unlikely_kept(bank: Bank, least: float) -> Bank:
     """With no hypothesis so unlikely that it could not come back."""
-    floor: Array = np.maximum(bank.normalised().log_weight, math.log(least))
-    return bank._replace(log_weight=floor).normalised()
+    return bank.normalised(math.log(least))

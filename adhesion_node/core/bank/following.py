@@ -15,6 +15,7 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import Array
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
+from .kernels import weighing
 from .kinds import FREE, FREE_STD, HELD, NOISES, PASSING, SLIDES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
 from .motion import Braking, moved, open_variance, resistance, slow_variance, use, white_variance
@@ -80,8 +81,8 @@ class Memory(NamedTuple):
     """When a change of the rail was told last; it is later ones that are told."""
     changes: int = 0
     """Changes of the rail told."""
-    steady: float = 0.0
-    """Adhesion used when none was in doubt, ..."""
+    steady: tuple[Bank, Braking] | None = None
+    """What was believed when none was in doubt, ..."""
     slid: bool = False
     """... and whether axles slid then."""
     course: Course = Course()
@@ -109,9 +110,11 @@ class Memory(NamedTuple):
     def told(self, seen: Observation, fixes: int = 0) -> Memory:
         """Take in an observation."""
         bank = corrected(self.bank, seen)
-        evidence = float(np.logaddexp.reduce(bank.log_weight)) - 0.5 * math.log(2.0 * math.pi)
+        total = weighing.total(bank.log_weight)
         return self._replace(
-            bank=bank.normalised(), fixes=self.fixes + fixes, log_likelihood=self.log_likelihood + evidence
+            bank=bank._replace(log_weight=bank.log_weight - total),
+            fixes=self.fixes + fixes,
+            log_likelihood=self.log_likelihood + total - 0.5 * math.log(2.0 * math.pi),
         )
 
 
@@ -206,12 +209,8 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
     if not (measurement.has_position and memory.is_placed):
         return Off(0.0, 1.0, 0.0)
     moved_on = _moved(config, memory, measurement.t_ns)
-    bank = moved_on.bank
-    seen = position_seen(bank, measurement.position_m, math.sqrt(measurement.variance_m2))
-    sigmas = seen.apart(bank)
-    metres = float(bank.weight @ seen.innovation)
-    each = np.square(seen.innovation / np.maximum(sigmas, 1e-9)) + np.square(seen.innovation - metres)
-    return Off(metres, math.sqrt(bank.weight @ each), float(sigmas.min()), moved_on)
+    seen = position_seen(moved_on.bank, measurement.position_m, math.sqrt(measurement.variance_m2))
+    return Off(*seen.off(moved_on.bank), moved_on)
 
 
 def _steps(from_ns: int, to_ns: int, stamps: Iterable[int]) -> Iterator[int]:
@@ -282,11 +281,10 @@ def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Me
 def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     """Open or close a braking, ask what has changed, weigh what wheels and slide protection tell."""
     bank, now_s = memory.bank, memory.t_ns / S
-    speed = float(bank.weight @ bank.mean[:, SPEED])
     pressed = _is_pressed(config, memory)
     if memory.misled:
         return memory if pressed else _led_again(memory)
-    braked = pressed and speed >= config.slowest_mps
+    braked = pressed and bank.mean_of(SPEED) >= config.slowest_mps
     if braked and not memory.braked:
         likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
         known = rail()
@@ -329,16 +327,21 @@ def _with_changes(config: Config, memory: Memory) -> Memory:
 
     That axles roll, where they slid before, is one, too. While the brake may still build up none is told.
     """
-    bank, now_s = memory.bank, memory.t_ns / S
-    passing = bank.kind == PASSING
-    later = passing | (bank.changed_s > memory.told_s + 1e-6) | (memory.slid & (bank.kind == HELD))
-    probability = float(bank.weight @ later)
+    bank, now_s, held = memory.bank, memory.t_ns / S, HELD if memory.slid else PASSING
+    changed, passing, sliding = weighing.changing(
+        bank.log_weight, bank.changed_s, bank.kind, SLIDES, memory.told_s + 1e-6, PASSING, held
+    )
     settling = now_s < memory.told_s
-    if not settling and (DOUBTED <= probability < CERTAIN or float(bank.weight @ passing) > PASSED):
+    if not settling and (DOUBTED <= changed < CERTAIN or passing > PASSED):
         return memory
-    used = use(config, bank, memory.braking, resistance(config, bank))
-    steady, slid = float(bank.weight @ used.value), bool(bank.weight @ SLIDES[bank.kind] > SLID)
-    if settling or probability < DOUBTED:
+    steady, slid = (bank, memory.braking), sliding > SLID
+    if settling or changed < DOUBTED:
         return memory._replace(steady=steady, slid=slid)
-    changes = memory.changes + (abs(steady - memory.steady) > CHANGED * memory.steady)
+    before = 0.0 if memory.steady is None else _used(config, *memory.steady)
+    changes = memory.changes + (abs(_used(config, *steady) - before) > CHANGED * before)
     return memory._replace(told_s=now_s, changes=changes, steady=steady, slid=slid)
+
+
+def _used(config: Config, bank: Bank, braking: Braking) -> float:
+    """Adhesion that is used, over all hypotheses."""
+    return float(bank.weight @ use(config, bank, braking, resistance(config, bank)).value)

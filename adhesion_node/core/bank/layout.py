@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.train import Array
-from .kernels import weighing
+from .kernels import uniting, weighing
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -55,9 +56,9 @@ class Bank(NamedTuple):
         """Whether every number is finite and no variance below 0."""
         return weighing.is_sound(self.mean, self.covariance, self.log_weight)
 
-    def normalised(self) -> Bank:
-        """With probabilities that sum to 1."""
-        return self._replace(log_weight=weighing.normalised(self.log_weight))
+    def normalised(self, least: float = -math.inf) -> Bank:
+        """With probabilities that sum to 1, the logarithm of each no less than `least`."""
+        return self._replace(log_weight=weighing.normalised(self.log_weight, least))
 
     def part(self, chosen: Mask | Indices) -> Bank:
         """A copy of the chosen hypotheses, with the weights that they have."""
@@ -65,7 +66,11 @@ class Bank(NamedTuple):
 
     def moments(self) -> tuple[Array, Array]:
         """Mean and covariance over all hypotheses, shapes (SIZE,) and (SIZE, SIZE)."""
-        return weighing.moments(self.log_weight, self.mean, self.covariance)
+        return uniting.moments(self.log_weight, self.mean, self.covariance)
+
+    def mean_of(self, component: int) -> float:
+        """Mean of one component over all hypotheses."""
+        return uniting.mean_of(self.log_weight, self.mean, component)
 
     def with_fresh(self, component: int, mean: float | Array, std: float | Array) -> Bank:
         """With a component that is known anew, apart from all others."""

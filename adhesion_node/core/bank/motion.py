@@ -18,6 +18,7 @@ import numpy as np
 
 from ..physics.adhesion import SpeedLaw
 from ..physics.train import Array
+from ..setting import once
 from . import kinds
 from .kernels import moving
 from .kernels.weighing import variances
@@ -100,7 +101,7 @@ def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.Step:
     return moving.Step(float(dt_s), applied, share, bool(braking.rising), told, float(declared_m))
 
 
-@lru_cache(maxsize=16)
+@once
 def model_of(config: Config) -> moving.Model:
     """What the kernels need to know of train, track and labels."""
     train = config.train
@@ -130,7 +131,12 @@ def open_variance(config: Config, bank: Bank) -> Array:
 
 def white_variance(bank: Bank, declared_m: float) -> Array:
     """Variance of the positions' white part, m^2, shape (H,)."""
-    return np.asarray(np.square(np.maximum(kinds.WHITE[:, 0] * declared_m, kinds.WHITE[:, 1]))[bank.noise])
+    return _white_variances(declared_m)[bank.noise]
+
+
+@lru_cache(maxsize=64)  # a receiver mostly declares the same
+def _white_variances(declared_m: float) -> Array:
+    return np.asarray(np.square(np.maximum(kinds.WHITE[:, 0] * declared_m, kinds.WHITE[:, 1])))
 
 
 def slow_variance(bank: Bank, declared_m: float) -> Array:

@@ -41,11 +41,15 @@ class Observation(NamedTuple):
     slope: Array
     variance: Array | float
 
-    def apart(self, bank: Bank) -> Array:
-        """Innovations in standard deviations, shape (H,)."""
-        foreseen = weighing.variances(self.slope, bank.covariance)
-        result: Array = np.abs(self.innovation) / np.sqrt(foreseen + self.variance)
-        return result
+    @property
+    def variances(self) -> Array:
+        """Of each hypothesis."""
+        same = isinstance(self.variance, float)
+        return np.full(self.innovation.size, self.variance) if same else np.asarray(self.variance)
+
+    def off(self, bank: Bank) -> tuple[float, float, float]:
+        """Mean innovation, its standard deviation over all hypotheses, and the least one in standard deviations."""
+        return weighing.off(bank.log_weight, bank.covariance, self.innovation, self.slope, self.variances)
 
 
 def position_seen(bank: Bank, position_m: float, declared_m: float) -> Observation:
@@ -80,8 +84,9 @@ def acceleration_seen(
 
 def corrected(bank: Bank, seen: Observation) -> Bank:
     """Take an observation in; the weights are not normalised."""
-    variance = seen.variance + np.zeros(seen.innovation.size)
-    mean, covariance, log_weight = weighing.corrected(bank, seen.innovation, seen.slope, variance, CLIPPED)
+    mean, covariance, log_weight = weighing.corrected(
+        bank.mean, bank.covariance, bank.log_weight, seen.innovation, seen.slope, seen.variances, CLIPPED
+    )
     return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight)
 
 

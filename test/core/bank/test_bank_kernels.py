@@ -15,7 +15,8 @@ import pytest
 from banks import FULL, bank_of
 
 from adhesion_node.core.bank import branching, kernels, motion, seeing
-from adhesion_node.core.bank.kinds import KINDS, NOISES
+from adhesion_node.core.bank.kernels import weighing
+from adhesion_node.core.bank.kinds import HELD, KINDS, NOISES, PASSING, SLIDES
 from adhesion_node.core.bank.layout import Bank
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.bank.verdict import quantiles
@@ -70,6 +71,32 @@ def test_a_correction(position_m: float) -> None:
     check(seeing.corrected(BANK, seen), by_numpy.corrected(BANK, seen))
     one = seen._replace(variance=0.4)
     check(seeing.corrected(BANK, one), by_numpy.corrected(BANK, one))
+
+
+@pytest.mark.parametrize("position_m", [500.0, 540.0])
+def test_how_far_a_position_is_off(position_m: float) -> None:
+    seen, bank = seeing.position_seen(BANK, position_m, 1.3), BANK.normalised()
+    variance = np.einsum("hi,hij,hj->h", seen.slope, bank.covariance, seen.slope) + seen.variance
+    mean = float(bank.weight @ seen.innovation)
+    spread = float(bank.weight @ (variance + np.square(seen.innovation - mean)))
+    nearest = float((np.abs(seen.innovation) / np.sqrt(variance)).min())
+    assert seen.off(bank) == pytest.approx((mean, np.sqrt(spread), nearest), rel=1e-12)
+
+
+@pytest.mark.parametrize("held", [HELD, PASSING])
+def test_whether_the_rail_has_changed(held: int) -> None:
+    bank = BANK._replace(changed_s=np.resize(np.linspace(0.0, 9.0, 10), BANK.kind.size)).normalised()
+    found = weighing.changing(bank.log_weight, bank.changed_s, bank.kind, SLIDES, 6.5, PASSING, held)
+    passing = bank.kind == PASSING
+    each = (bank.changed_s > 6.5) | passing | (bank.kind == held), passing, SLIDES[bank.kind]
+    assert found == pytest.approx([float(bank.weight @ one) for one in each], rel=1e-12)
+
+
+def test_weights_that_may_come_back() -> None:
+    weight = np.exp(weighing.normalised(np.array([0.0, -30.0, -1.0]), -5.0))
+    before = np.array([1.0, 0.0, np.exp(-1.0)]) / (1.0 + np.exp(-30.0) + np.exp(-1.0))
+    before[1] = np.exp(-5.0)
+    np.testing.assert_allclose(weight, before / before.sum(), rtol=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))

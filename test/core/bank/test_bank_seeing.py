@@ -10,6 +10,7 @@ from banks import FULL, bank_of
 from oracles import specific_resistance
 from scipy.stats import norm
 
+from adhesion_node.core.bank.kernels.weighing import variances
 from adhesion_node.core.bank.layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSITION, ROUGH, SCALE, SIZE, SPEED, Bank
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.bank.seeing import (
@@ -105,7 +106,7 @@ def test_the_order_of_positions_does_not_matter() -> None:
 
 def test_far_observations_pull_no_harder_than_the_limit() -> None:
     seen = position_seen(BANK, 500.0, 1.0)
-    spread = np.abs(seen.innovation) / seen.apart(BANK)
+    spread = np.sqrt(variances(seen.slope, BANK.covariance) + seen.variances)
     at = {}
     for sigma in (CLIPPED, 10.0, 1e3, 1e6):
         after = corrected(BANK, seen._replace(innovation=sigma * spread))
@@ -121,7 +122,7 @@ def test_far_observations_pull_no_harder_than_the_limit() -> None:
 
 def test_evidence_and_pull_are_continuous_at_the_limit() -> None:
     seen = position_seen(BANK, 500.0, 1.0)
-    spread = np.abs(seen.innovation) / seen.apart(BANK)
+    spread = np.sqrt(variances(seen.slope, BANK.covariance) + seen.variances)
     below = corrected(BANK, seen._replace(innovation=(CLIPPED - 1e-9) * spread))
     above = corrected(BANK, seen._replace(innovation=(CLIPPED + 1e-9) * spread))
     assert below.mean == pytest.approx(above.mean, abs=1e-7)

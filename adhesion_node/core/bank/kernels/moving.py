@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -117,8 +118,8 @@ def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
     dt, mean, covariance = step.dt_s, bank.mean, bank.covariance
     means, covariances = np.empty_like(mean), np.empty_like(covariance)
     lasting, added = np.ones(SIZE), np.zeros(SIZE)
-    fall, way, by_fall, by_way = np.zeros(SIZE), np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
-    free = np.exp(-dt / model.free[1])
+    fall, by_fall, by_way = np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
+    free = math.exp(-dt / model.free[1])
     added[POSITION], added[BRAKE], added[BIAS] = dt * model.rates[0], dt * model.rates[1], dt * model.rates[2]
     for h in range(bank.kind.size):
         x, p, k = mean[h], covariance[h], bank.kind[h]
@@ -133,8 +134,8 @@ def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
             bent = _law(model, bank.law[h], slower) / _law(model, bank.law[h], v)
             lasting[MU] = bent if model.kinds[k, 0] > 0.0 else 1.0
             added[MU] = (model.kinds[k, 1] * x[MU]) ** 2 * dt
-        lasting[ROUGH], lasting[GRADE] = np.exp(-way_m / model.lengths[0]), np.exp(-way_m / model.lengths[1])
-        lasting[OFFSET] = np.exp(-dt / n[4])
+        lasting[ROUGH], lasting[GRADE] = math.exp(-way_m / model.lengths[0]), math.exp(-way_m / model.lengths[1])
+        lasting[OFFSET] = math.exp(-dt / n[4])
         added[SPEED] = model.kinds[k, 3] ** 2 * dt
         if step.rising:
             added[SPEED] += (model.building_up * GRAVITY * u) ** 2 * dt
@@ -147,23 +148,22 @@ def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
         means[h, SPEED], means[h, POSITION] = slower, x[POSITION] + 0.5 * dt * (v + slower)
         # rows of F: v' = v - dt g (u + r + gamma), s' = s + dt (v + v')/2
         by_speed += model.resistance[1] + 2.0 * model.resistance[2] * v
-        fall[MU], fall[ROUGH], fall[BRAKE], fall[GRADE] = by_mu, by_rough, by_brake, 1.0
-        fall[SPEED] = by_speed
-        for i in range(SIZE):
-            way[i], fall[i] = -0.5 * dt**2 * GRAVITY * fall[i], -dt * GRAVITY * fall[i]
-        fall[SPEED] += 1.0
-        way[SPEED] += dt
-        way[POSITION] = 1.0
+        pull = -dt * GRAVITY
+        fall[MU], fall[ROUGH], fall[BRAKE], fall[GRADE] = pull * by_mu, pull * by_rough, pull * by_brake, pull
+        fall[SPEED] = 1.0 + pull * by_speed
+        by_fall[:] = 0.0
+        for j in range(SPEED, GRADE + 1):
+            for i in range(SIZE):
+                by_fall[i] += p[j, i] * fall[j]
         fall_fall, way_fall, way_way = 0.0, 0.0, 0.0
         for i in range(SIZE):
-            by_fall[i], by_way[i] = 0.0, 0.0
-            for j in range(SIZE):
-                by_fall[i] += p[i, j] * fall[j]
-                by_way[i] += p[i, j] * way[j]
-                covariances[h, i, j] = lasting[i] * lasting[j] * p[i, j]
+            by_way[i] = p[POSITION, i] + 0.5 * dt * (p[SPEED, i] + by_fall[i])
             fall_fall += fall[i] * by_fall[i]
-            way_fall += way[i] * by_fall[i]
-            way_way += way[i] * by_way[i]
+            way_fall += fall[i] * by_way[i]
+        way_way = by_way[POSITION] + 0.5 * dt * (by_way[SPEED] + way_fall)
+        for i in range(SIZE):
+            for j in range(SIZE):
+                covariances[h, i, j] = lasting[i] * lasting[j] * p[i, j]
         for i in range(SIZE):
             covariances[h, SPEED, i] = covariances[h, i, SPEED] = lasting[i] * by_fall[i]
             covariances[h, POSITION, i] = covariances[h, i, POSITION] = lasting[i] * by_way[i]

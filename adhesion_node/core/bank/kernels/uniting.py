@@ -1,0 +1,134 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Many hypotheses as one Gaussian, and as fewer: the unlikely end, and what says the same is united."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import kernel
+
+if TYPE_CHECKING:
+    from ..layout import Bank
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.intp]
+Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
+
+SPEED, MU, SIZE = 1, 2, 10
+
+EQUAL = 1e-9
+"""Logarithms of weights that differ by less are equal: rounding shall not choose between twins of another law."""
+
+
+class Pruning(NamedTuple):
+    """What hypotheses are left."""
+
+    least: float
+    """ln of the weight below which one ends."""
+    most: int
+    near: float
+    """Part of the standard deviations by which those that say the same may differ."""
+    factor: float
+    """By which their standard deviations may."""
+
+
+@kernel
+def _united(weight: Array, mean: Array, covariance: Array, group: Labels, centre: Array, spread: Array) -> float:
+    """Write mean and covariance of a mixture of some hypotheses; return their weight."""
+    whole = 0.0
+    for h in group:
+        whole += weight[h]
+    centre[:] = 0.0
+    spread[:] = 0.0
+    for h in group:
+        share = weight[h] / whole
+        for i in range(SIZE):
+            centre[i] += share * mean[h, i]
+    for h in group:
+        share = weight[h] / whole
+        for i in range(SIZE):
+            off = mean[h, i] - centre[i]
+            for j in range(SIZE):
+                spread[i, j] += share * (covariance[h, i, j] + off * (mean[h, j] - centre[j]))
+    return whole
+
+
+@kernel
+def moments(log_weight: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
+    """Mean and covariance of the mixture."""
+    centre, spread = np.empty(SIZE), np.empty((SIZE, SIZE))
+    weight = np.exp(log_weight - log_weight.max())
+    _united(weight, mean, covariance, np.arange(weight.size), centre, spread)
+    return centre, spread
+
+
+@kernel
+def mean_of(log_weight: Array, mean: Array, component: int) -> float:
+    """Mean of one component over the mixture; the weights sum to 1."""
+    result = 0.0
+    for h in range(log_weight.size):
+        result += math.exp(log_weight[h]) * mean[h, component]
+    return result
+
+
+@kernel
+def _order(log_weight: Array) -> Labels:
+    """Indices by falling weight; of those that are equal but for rounding the first first."""
+    order = np.empty(log_weight.size, dtype=np.intp)
+    for h in range(order.size):
+        place = h
+        while place > 0 and log_weight[order[place - 1]] < log_weight[h] - EQUAL:
+            order[place] = order[place - 1]
+            place -= 1
+        order[place] = h
+    return order
+
+
+@kernel
+def pruned(bank: Bank, rule: Pruning) -> Columns:
+    """The hypotheses that are left, their weights normalised."""
+    mean, covariance, log_weight = bank.mean, bank.covariance, bank.log_weight
+    count = log_weight.size
+    order, label = _order(log_weight), (bank.noise * 64 + bank.law) * 64 + bank.kind
+    std, weight = np.empty((count, 2)), np.empty(count)
+    for h in range(count):
+        weight[h] = math.exp(log_weight[h]) if log_weight[h] > rule.least else 0.0
+        std[h, 0], std[h, 1] = math.sqrt(covariance[h, MU, MU]), math.sqrt(covariance[h, SPEED, SPEED])
+    left, group = 0, np.empty(count, dtype=np.intp)
+    kept, means, sums = np.empty(count, dtype=np.intp), np.empty((count, SIZE)), np.empty(count)
+    covariances = np.empty((count, SIZE, SIZE))
+    gone = weight == 0.0
+    for first in range(count):
+        one = order[first]
+        if gone[one]:
+            continue
+        size = 0
+        for index in range(first, count):
+            h = order[index]
+            if gone[h] or label[h] != label[one]:
+                continue
+            alike = True
+            for part, i in enumerate((MU, SPEED)):
+                ratio = std[h, part] / std[one, part]
+                near = abs(mean[h, i] - mean[one, i]) < rule.near * std[one, part] + 1e-9
+                alike = alike and near and 1.0 / rule.factor < ratio < rule.factor
+            if alike or h == one:
+                group[size], gone[h] = h, True
+                size += 1
+        kept[left], means[left], covariances[left], sums[left] = one, mean[one], covariance[one], weight[one]
+        if size > 1:
+            sums[left] = _united(weight, mean, covariance, group[:size], means[left], covariances[left])
+        left += 1
+    if left > rule.most:
+        chosen = np.sort(_order(np.log(sums[:left]))[: rule.most])
+        kept, means, covariances, sums, left = kept[chosen], means[chosen], covariances[chosen], sums[chosen], rule.most
+    kept, weights = kept[:left], np.log(sums[:left] / sums[:left].sum())
+    return (
+        *(means[:left].copy(), covariances[:left].copy(), weights),
+        *(bank.noise[kept], bank.law[kept], bank.kind[kept], bank.born_s[kept], bank.changed_s[kept]),
+    )
