@@ -70,6 +70,14 @@ def remap_option(add: Callable[..., Any]) -> None:
     add("--remap", metavar="FROM:=TO", action="extend", nargs="+", default=[], help=shown)
 
 
+def out_option(add: Callable[..., Any]) -> None:
+    """Add --out by a parser's `add_argument`."""
+    rows = (
+        "every estimate as a row: time, place, speed, adhesion, bound, regime, distances, what was learnt of the train"
+    )
+    add("--out", metavar="FILE.csv|.parquet", help=rows)
+
+
 def setting_options(add: Callable[..., Any]) -> None:
     """Add the options that set an estimator up, by the `add_argument` of a parser or a group."""
     add("--seed", type=int, help="seed of the estimator")

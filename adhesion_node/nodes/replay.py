@@ -8,7 +8,17 @@ from collections.abc import Sequence
 from functools import partial
 
 from ..bag import BagReader, select_from
-from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
+from ..command.options import (
+    DONE,
+    FAILED,
+    help_texts,
+    json_option,
+    out_option,
+    remap_option,
+    report,
+    run_tool,
+    setting_options,
+)
 from ..wire.topics import POSITIONS, TRACTION_FORCE
 
 EXAMPLES = (
@@ -101,9 +111,6 @@ def _parser() -> argparse.ArgumentParser:
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
     either = "the adhesion under the brake, or the creep curve (default: by whether there is a position or no force)"
     straight("--estimator", choices=(ADHESION, CREEP), help=either)
-    rows = (
-        "every estimate as a row: time, place, speed, adhesion, bound, regime, distances, what was learnt of the train"
-    )
-    straight("--out", metavar="FILE.csv|.parquet", help=rows)
+    out_option(straight)
     setting_options(straight)
     return parser

@@ -9,20 +9,32 @@ wrote, with its map or without: a row for each braking, the rail over place and 
 
 import argparse
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..bag import BagReader, select_from
-from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
+from ..command.options import (
+    DONE,
+    FAILED,
+    help_texts,
+    json_option,
+    out_option,
+    remap_option,
+    report,
+    run_tool,
+    setting_options,
+)
 from ..run.offline import parameters_of
+from ..run.results import rows_to
 from ..wire.settings import Setup, setup_of
 from .curves import Subject
 from .estimated import estimate_run
 from .findings import findings
-from .fleet.command import is_table, report_fleet
+from .fleet import is_table
 from .page import report_page
 from .picture import draw
+from .rows import KEYS, rows_of
 from .run import FIXED_MU, RESULTS, read_run
 from .table import table
 
@@ -42,9 +54,13 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _work(options: argparse.Namespace) -> int:
     if any(map(is_table, options.bags)):
+        from .fleet.command import report_fleet  # only here: a recording needs no pandas
+
         return report_fleet(options.bags, options)
     if not 0.0 <= options.target <= 500.0:
         raise ValueError(f"target = {options.target}: give a speed from 0 to 500 km/h")
+    if options.out and len(options.bags) > 1:
+        raise ValueError(f"out = {options.out}: holds the estimates of one recording, {len(options.bags)} are given")
     given = parameters_of(options)
     setup, output = setup_of(given), Path(options.output)
     subjects = [_subject(path, name, options, setup) for path, name in _named(options.bags)]
@@ -55,27 +71,34 @@ def _work(options: argparse.Namespace) -> int:
     result: dict[str, Any] = {"page": str(page), "train": setup.train, "runs": []}
     texts, identified = [f"train: {setup.train}"], False
     for subject in subjects:
-        pictures = list(_pictures(subject, output, options.target))
+        pictures = [output / f"{subject.name}{ending}" for ending in PICTURES]
+        draw(subject.run, pictures, subject.name, options.target, subject.config.train)
         found = findings(subject.run, setup.config, options.target)
-        result["runs"].append({"name": subject.name, "source": subject.source, "pictures": pictures, **found})
+        result["runs"].append(
+            {"name": subject.name, "source": subject.source, "pictures": list(map(str, pictures)), **found}
+        )
         if found["why"] is not None:
             print(f"report: {subject.name}: nothing is identified: {found['why']}", file=sys.stderr)
         identified |= found["why"] is None
         texts.append(f"{subject.name}, {subject.source}\n{table(subject.run, options.target, subject.config.train)}")
-    report(options.json, result, "\n\n".join([*texts, str(page)]))
+    written = filter(None, (str(page), options.out))
+    report(options.json, result, "\n\n".join([*texts, "\n".join(written)]))
     return DONE if identified else FAILED
 
 
 def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:
-    with BagReader(path) as reader:
+    with BagReader(path) as reader, rows_to(options.out) as write:
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
-            run, source = read_run(reader, setup.line), "as recorded"
+            run, source = read_run(reader, setup.line, KEYS if options.out else ()), "as recorded"
+            lost: Mapping[str, int] = reader.undecodable
+            for row in rows_of(run, setup.line.sign) if options.out else ():
+                write(row)
         else:
-            run = estimate_run(reader, select_from(reader, options.remap), setup)
+            run, lost = estimate_run(reader, select_from(reader, options.remap), setup, write)
             source = "estimated from the recorded sensors"
-        for topic, count in reader.undecodable.items():
+        for topic, count in lost.items():
             print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)
         return Subject(name, source, run, setup.config, setup.train)
 
@@ -89,13 +112,6 @@ def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:
         yield path, name if taken.count(name) == 1 else f"{name} ({taken.count(name)})"
 
 
-def _pictures(subject: Subject, output: Path, target_kmh: float) -> Iterator[str]:
-    for ending in PICTURES:
-        path = output / f"{subject.name}{ending}"
-        draw(subject.run, path, subject.name, target_kmh, subject.config.train)
-        yield str(path)
-
-
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser("report", parents=[json_option()], **help_texts(__doc__, *EXAMPLES))
     add = parser.add_argument
@@ -105,6 +121,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--estimate", action="store_true", help="estimate anew, whatever results the recording holds")
     low = "of tables: an adhesion below it is a low spot (default: %(default)g)"
     add("--low", metavar="MU", type=float, default=FIXED_MU, help=low)
+    out_option(add)
     remap_option(add)
     setting_options(add)
     return parser

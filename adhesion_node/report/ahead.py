@@ -20,6 +20,12 @@ from ..core.physics.train import KMH, Array
 SHOWN = ("permitted", "warning", "sbi", "ebi")
 """Limits over the way, from the lowest speed to the highest."""
 
+TOLD = (
+    *("target_position_m", "target_speed_mps", "distance_to_target_m", "margin_m", "supervised_mps"),
+    *(f"{name}_mps" for name in SHOWN),
+)
+"""Numbers of a status by which they are found."""
+
 PLACES = 24
 BEYOND_M = 200.0
 """Places at which they are told, and how far beyond the target."""

@@ -2,29 +2,29 @@
 
 """A run split into its brakings, and what each of them shows: one row for each, as a report lists them."""
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..core import Regime
-from ..core.physics.train import KMH, Array
+from ..core.physics.train import KMH
+from ..run.brakings import split
 from ..run.score import CONVERGED_AFTER_MPS
+from ..run.seen import BRAKED_PA
 from .run import Distances, Run
-from .series import Series, Times
+from .series import Series
 
-BRAKED_PA, RELEASED_NS = 20e3, 3_000_000_000
-"""From this pressure on the brake works; it is released once it does not for so long, longer than a dump lasts."""
-
-LEAST_LOST_MPS = 3.0 * KMH
-"""What slows down less is no braking of which anything could be told."""
+RELEASED_NS = 3_000_000_000
+"""The brake is released once it has not worked for so long, longer than a dump lasts."""
 
 SLOWS_NS, SLOWS_MPS = 3_000_000_000, 0.6
 """Without a recorded pressure a train brakes that has lost so much speed in so long: no resistance does that."""
 
 
 class Braking(NamedTuple):
-    """From when to when the brake worked, and which estimates are of it: indices from `first` to `last`."""
+    """A braking from when to when, and which estimates are of it: indices from `first` to `last`."""
 
     start_ns: int
     end_ns: int
@@ -32,37 +32,26 @@ class Braking(NamedTuple):
     last: int
 
 
+@lru_cache
 def brakings(run: Run) -> list[Braking]:
     """Return the brakings in their order."""
-    times, found = run.speed.t_ns, []
-    braked_ns = _braked(run)
-    parts = np.split(braked_ns, np.flatnonzero(np.diff(braked_ns) > RELEASED_NS) + 1)
-    for part in parts if braked_ns.size else ():
-        own = np.flatnonzero((times >= part[0]) & (times <= part[-1]))
-        if own.size > 1 and np.ptp(np.abs(run.speed.values[own])) > LEAST_LOST_MPS:
-            found.append(Braking(int(part[0]), int(part[-1]), int(own[0]), int(own[-1])))
-    return found
+    under_brake = _under_brake(run).tolist()
+    told = list(zip(run.speed.t_ns.tolist(), run.speed.values.tolist(), strict=True))
+    parts = split(range(len(told)), under_brake.__getitem__, told.__getitem__)
+    return [Braking(told[part[0]][0], told[part[-1]][0], part[0], part[-1]) for part in parts]
 
 
-def _braked(run: Run) -> Times:
-    """The times at which the brake worked."""
-    if run.pressure.t_ns.size:
-        return np.asarray(run.pressure.t_ns[run.pressure.values >= BRAKED_PA])
-    speed = run.speed.map(np.abs)
-    slows = speed.at(speed.t_ns - SLOWS_NS) - speed.values > SLOWS_MPS
-    return np.asarray(speed.t_ns[slows])
-
-
-def exactly(series: Series, t_ns: Times) -> Array:
-    """Values at those very times; NaN where there is none."""
-    known = series.by_time()
-    return np.array([float(known.get(t, np.nan)) for t in t_ns.tolist()])
-
-
-def regimes_at(run: Run, t_ns: Times) -> NDArray[np.str_]:
-    """Regimes of the estimates of those times by name; "" where none is recorded."""
-    known = run.regime.by_time()
-    return np.array([str(known.get(t, "")) for t in t_ns.tolist()])
+def _under_brake(run: Run) -> NDArray[np.bool_]:
+    """Whether the brake works at the estimates, a dump by the slide protection included; shape (n,)."""
+    times = run.speed.t_ns
+    if not run.pressure.t_ns.size:
+        speed = run.speed.map(np.abs)
+        return np.asarray(speed.at(times - SLOWS_NS) - speed.values > SLOWS_MPS)
+    braked_ns = run.pressure.t_ns[run.pressure.values >= BRAKED_PA]
+    never = np.iinfo(np.int64).max // 4
+    around = np.concatenate([[-never], braked_ns, [never]])
+    after = np.searchsorted(around, times)
+    return np.asarray((around[after] == times) | (around[after] - around[after - 1] <= RELEASED_NS))
 
 
 def bound_kept(run: Run, first: int, last: int) -> NDArray[np.bool_]:
@@ -70,16 +59,17 @@ def bound_kept(run: Run, first: int, last: int) -> NDArray[np.bool_]:
     times = run.speed.t_ns[first : last + 1]
     if not run.true_mu.t_ns.size:
         return np.array([], dtype=bool)
-    lower, true = exactly(run.mu_lower, times), run.true_mu.at(times)
+    lower, true = run.mu_lower.exactly(times), run.true_mu.at(times)
     known = np.isfinite(lower) & np.isfinite(true)
     return np.asarray(lower[known] <= true[known] + 1e-9)
 
 
 def rises(series: Series, start_ns: int, end_ns: int) -> list[int]:
     """Times within which a counter has risen."""
-    counts = np.array([int(value) if str(value).isdigit() else 0 for value in series.values])
-    times = series.t_ns[1:][np.diff(counts) > 0]
-    return [int(t) for t in times if start_ns <= t <= end_ns]
+    first, end = np.searchsorted(series.t_ns, [start_ns, end_ns + 1])
+    part = slice(max(first - 1, 0), end)
+    counts = np.array([int(value) if value.isdigit() else 0 for value in series.values[part].tolist()])
+    return [int(t) for t in series.t_ns[part][1:][np.diff(counts) > 0]]
 
 
 def row_of(run: Run, braking: Braking, planned: Distances, true_m: Series, target_mps: float) -> dict[str, Any]:
@@ -90,11 +80,11 @@ def row_of(run: Run, braking: Braking, planned: Distances, true_m: Series, targe
     """
     own = slice(braking.first, braking.last + 1)
     times, speeds = run.speed.t_ns[own], np.abs(run.speed.values[own])
-    regime, mu = regimes_at(run, times), exactly(run.mu, times)
+    regime, mu = run.regimes_at(times), run.mu.exactly(times)
     adhesion, brake = (
         (regime == each.name) & np.isfinite(mu) for each in (Regime.ADHESION_LIMITED, Regime.BRAKE_LIMITED)
     )
-    kept, lower = bound_kept(run, braking.first, braking.last), exactly(run.mu_lower, times)
+    kept, lower = bound_kept(run, braking.first, braking.last), run.mu_lower.exactly(times)
     row: dict[str, Any] = {
         "start_s": float(run.seconds(times)[0]),
         "end_s": float(run.seconds(times)[-1]),
@@ -116,7 +106,7 @@ def row_of(run: Run, braking: Braking, planned: Distances, true_m: Series, targe
         first = int(shown[0])
         place = np.abs(run.position.values[own] - run.position.values[own][first])
         needed = (place + planned.longest[own])[first:][speeds[first:] > target_mps]
-        true_way = exactly(true_m, times[first : first + 1])[0]
+        true_way = true_m.exactly(times[first : first + 1])[0]
         row |= {
             "identified_at_kmh": float(speeds[first] / KMH),
             "fixed_m": float(planned.fixed[own][first]),

@@ -2,13 +2,13 @@
 
 """The charts of a run over time, the same in its picture and on its page: lines and ranges."""
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core import Regime
 from ..core.physics.train import KMH, Train
-from .brakings import regimes_at
 from .findings import distances, true_way
 from .run import FIXED_MU, Run
 from .series import NONE, Series
@@ -42,6 +42,7 @@ class Chart(NamedTuple):
         return 1.08 * float(np.nanmin(values)), 1.08 * float(np.nanmax(values))
 
 
+@lru_cache
 def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
     """Return the charts: adhesion, speed, forces, braking distance, and what is saved of it while the train brakes."""
     planned = distances(run, target_kmh * KMH, train)
@@ -90,7 +91,7 @@ def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
 
 def _told(run: Run, prior: str, at_least: str, identified: str) -> list[Line]:
     """μ̂ as three lines by what it is: each a gap where another one holds, none where it never does."""
-    regimes, lines = regimes_at(run, run.mu.t_ns), []
+    regimes, lines = run.regimes_at(run.mu.t_ns), []
     limits = (regimes == Regime.BRAKE_LIMITED.name, regimes == Regime.ADHESION_LIMITED.name)
     kinds = ((prior, "prior", ~(limits[0] | limits[1])), (at_least, "atleast", limits[0]))
     for label, kind, holds in (*kinds, (identified, "identified", limits[1])):

@@ -6,26 +6,37 @@ from collections.abc import Sequence
 from operator import itemgetter
 from typing import Any
 
-from ..bag import BagReader
 from ..web.creep import creep_part
-from ..wire.topics import DIAGNOSTICS
-from .series import statuses
+from ..wire.results import Status
+from .series import with_key
 from .thinning import evenly, number
 
 MOST_CURVES = 200
 """Curves of a run at most, evenly spread over its time."""
 
-Curves = tuple[tuple[int, dict[str, Any]], ...]
+CreepCurves = tuple[tuple[int, dict[str, Any]], ...]
 """Curves as the pages draw them, at their times, ns."""
 
 
-def read_creep(reader: BagReader) -> Curves:
-    """Read all curves; none where no creep estimator was recorded."""
-    told = ((t_ns, creep_part(each.values, each.message)) for t_ns, each in statuses(reader, DIAGNOSTICS, "lambda_m"))
-    return tuple(sorted(((t_ns, part) for t_ns, part in told if part is not None), key=itemgetter(0)))
+class CreepTaken:
+    """The curves while the diagnostics are read; none where no creep estimator was recorded."""
+
+    def __init__(self) -> None:
+        self._told: list[tuple[int, dict[str, Any]]] = []
+        self.take = with_key("lambda_m", self._note)
+
+    def _note(self, t_ns: int, status: Status) -> None:
+        part = creep_part(status.values, status.message)
+        if part is not None:
+            self._told.append((t_ns, part))
+
+    @property
+    def curves(self) -> CreepCurves:
+        """All of them by their times."""
+        return tuple(sorted(self._told, key=itemgetter(0)))
 
 
-def creep_data(curves: Curves, origin_ns: int) -> list[dict[str, Any]]:
+def creep_data(curves: CreepCurves, origin_ns: int) -> list[dict[str, Any]]:
     """What the script of the report draws; `t` in s from the start of the run."""
     kept = [curves[i] for i in evenly(len(curves), MOST_CURVES)]
     return [{"t": number((t_ns - origin_ns) * 1e-9, 2), **part} for t_ns, part in kept]

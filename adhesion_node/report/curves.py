@@ -2,7 +2,6 @@
 
 """A run as plain numbers for the charts of a page: series over time and the braking curves of every moment."""
 
-from bisect import bisect_left
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,12 +10,13 @@ from ..core import Config
 from ..core.physics import braking
 from ..core.physics.train import KMH
 from .ahead import SHOWN, ahead
-from .brakings import Braking, brakings, exactly, regimes_at
+from .brakings import Braking, brakings
 from .charts import Chart, charts
 from .creep import creep_data
 from .events import events
 from .findings import distances, first_identified
-from .run import FIXED_MU, IN_WORDS, Curve, Distances, Run, bands
+from .predicted import Curve
+from .run import FIXED_MU, IN_WORDS, Distances, Run, bands
 from .series import Times
 from .thinning import evenly, number, peaks, rounded, with_gaps
 
@@ -88,12 +88,12 @@ def _kept(run: Run, parts: list[Braking]) -> Times:
 
 def _moments(run: Run, config: Config, planned: Distances, parts: list[Braking]) -> list[dict[str, Any]]:
     """What is known at every estimate that has a place on the slider, with the braking curves from there."""
-    safe, nominal = ({curve.t_ns: curve for curve in curves} for curves in (run.safe, run.nominal))
     kept = _kept(run, parts)
     times = run.speed.t_ns[kept]
-    found = (exactly(series, times).tolist() for series in (run.mu, run.mu_lower))
+    safe, nominal = (curves.by_time(times) for curves in (run.safe, run.nominal))
+    found = (series.exactly(times).tolist() for series in (run.mu, run.mu_lower))
     columns = (np.abs(run.speed.values[kept]).tolist(), run.position.values[kept].tolist(), *found)
-    seconds, regimes, start_m = run.seconds(times), regimes_at(run, times), float(run.way[0].values[0])
+    seconds, regimes, start_m = run.seconds(times), run.regimes_at(times), float(run.way[0].values[0])
     rows = zip(kept.tolist(), times.tolist(), *columns, strict=True)
     return [
         {
@@ -117,10 +117,12 @@ def _moments(run: Run, config: Config, planned: Distances, parts: list[Braking])
 
 def _limits(run: Run, curve: Curve) -> dict[str, Any] | None:
     """The supervision limits ahead, as the ATP monitor had them by this curve."""
-    at = bisect_left(run.said, curve.t_ns, key=lambda row: row[0])
-    if at == len(run.said) or run.said[at][0] - curve.t_ns > SAID_NS:
+    times = run.levels.t_ns
+    at = int(np.searchsorted(times, curve.t_ns))
+    if at == times.size or times[at] - curve.t_ns > SAID_NS:
         return None
-    numbers = dict(run.said[at][1])
+    told = {key: float(series.values[at]) for key, series in run.said.items()}
+    numbers = {key: value for key, value in told.items() if np.isfinite(value)}
     if "target_position_m" in numbers:
         numbers["target_position_m"] *= run.sign
     found = ahead(curve.braking, numbers)

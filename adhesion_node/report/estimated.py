@@ -2,49 +2,62 @@
 
 """The run of a recording that holds sensor messages alone: what the estimator makes of them, offline."""
 
-from collections.abc import Callable, Mapping
-from typing import Any
-
-import numpy as np
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping
 
 from ..bag import BagReader
 from ..command.options import progress
-from ..core import Estimate
-from ..core.physics.braking import BrakingCurve
+from ..core import Prediction
+from ..core.intake.samples import DemandSample, PressureSample
 from ..run import offline
+from ..run.offline import Recorded
 from ..run.pipeline import Pipeline
-from ..run.score import Truth
+from ..run.results import Write, row_of
+from ..wire.codecs import Line, Rejected
 from ..wire.settings import Setup
+from ..wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH, Frame
 from .findings import listed
-from .run import Curve, Run, read_inputs
-from .series import Series
+from .predicted import Curves
+from .run import Inputs, Run
+from .series import Numbers, Texts, read_topics, sample_of
 
 
-def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) -> Run:
-    """Run the recorded topics of `selection` (recorded name to ours) through the estimator.
+def estimate_run(
+    reader: BagReader, selection: Mapping[str, str], setup: Setup, write: Write
+) -> tuple[Run, Mapping[str, int]]:
+    """Run the recorded topics of `selection` (recorded name to ours) through the estimator; write each estimate.
 
-    Raises ValueError when nothing could be estimated.
+    Return the run, and by recorded topic how many messages do not decode. Raises ValueError when nothing could be
+    estimated.
     """
-    pipeline = Pipeline(setup.config, setup.seed)
+    pipeline, inputs, lost = Pipeline(setup.config, setup.seed), Inputs(), Counter[str]()
+    mu, mu_lower, position, speed = (Numbers() for _ in range(4))
+    regime, changes, safe, nominal = Texts(), Texts(), Curves(), Curves()
     recorded = progress(offline.messages(reader, selection), "messages")
-    predictions = offline.replay(pipeline, Truth(), recorded, setup.line).predictions
-    if not predictions:
+    for made in _predictions(pipeline, inputs, _noting(inputs, lost, recorded, setup.line), setup.line):
+        write(row_of(pipeline, made, setup.line.sign))
+        e = made.estimate
+        values = e.mu, e.mu_lower, e.position_m, e.speed_mps
+        for numbers, value in zip((mu, mu_lower, position, speed), values, strict=True):
+            numbers.add(e.t_ns, value)
+        regime.add(e.t_ns, e.regime.name)
+        changes.add(e.t_ns, str(e.changes))
+        for curves, curve in ((safe, made.safe), (nominal, made.nominal)):
+            if curve is not None:
+                curves.add(e.t_ns, e.position_m + curve.distance_m, curve.speed_mps)
+    if pipeline.last is None:
         dropped = listed(pipeline.dropped) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")
-    t_ns = np.array([prediction.estimate.t_ns for prediction in predictions], dtype=np.int64)
-
-    def column(value: Callable[[Estimate], Any]) -> Series:
-        return Series(t_ns, np.array([value(prediction.estimate) for prediction in predictions]))
-
-    return read_inputs(reader, {ours: recorded for recorded, ours in selection.items()}, setup.line)._replace(
-        mu=column(lambda estimate: estimate.mu),
-        mu_lower=column(lambda estimate: estimate.mu_lower),
-        position=column(lambda estimate: estimate.position_m),
-        speed=column(lambda estimate: estimate.speed_mps),
-        regime=column(lambda estimate: estimate.regime.name),
-        safe=tuple(_curve(made.estimate, made.safe) for made in predictions if made.safe is not None),
-        nominal=tuple(_curve(made.estimate, made.nominal) for made in predictions if made.nominal is not None),
-        changes=column(lambda estimate: str(estimate.changes)),
+    read_topics(reader, [(DIAGNOSTICS, inputs.creep.take)])
+    run = inputs.run._replace(
+        mu=mu.series,
+        mu_lower=mu_lower.series,
+        position=position.series,
+        speed=speed.series,
+        regime=regime.series,
+        safe=safe,
+        nominal=nominal,
+        changes=changes.series,
         counts={  # under the keys that they have in the diagnostics
             "measurements": str(pipeline.measurements),
             "accepted": str(pipeline.accepted),
@@ -54,7 +67,28 @@ def estimate_run(reader: BagReader, selection: Mapping[str, str], setup: Setup) 
             "digest": pipeline.digest,
         },
     )
+    return run, {theirs: lost[ours] for theirs, ours in selection.items() if ours in lost}
 
 
-def _curve(estimate: Estimate, curve: BrakingCurve) -> Curve:
-    return Curve(estimate.t_ns, estimate.position_m + curve.distance_m, curve.speed_mps)
+def _predictions(pipeline: Pipeline, inputs: Inputs, recorded: Iterable[Recorded], line: Line) -> Iterator[Prediction]:
+    """Yield what the messages give as soon as it is there, and note the pressures that were used."""
+    for sample, made, _ in offline.feed(pipeline, recorded, ADHESION_INPUTS, line):
+        if isinstance(sample, PressureSample):
+            inputs.pressure.add(sample.t_ns, sample.pressure_pa)
+        elif isinstance(sample, DemandSample):
+            inputs.demand.add(sample.t_ns, sample.pressure_pa)
+        yield from made
+    yield from pipeline.finish()
+
+
+def _noting(inputs: Inputs, lost: Counter[str], recorded: Iterable[Recorded], line: Line) -> Iterator[Recorded]:
+    """Pass the messages on; note the truth, and what does not decode."""
+    truth = {topic.name: topic._replace(frame=Frame.ANY) for topic in TRUTH}
+    for name, message, log_ns in recorded:
+        if isinstance(message, Rejected):
+            lost[name] += 1
+        elif name in truth:
+            sample = sample_of(truth[name], message, log_ns, line)
+            for take in (take for topic, take in inputs.truth if topic.name == name):
+                take(sample)
+        yield name, message, log_ns

@@ -2,7 +2,9 @@
 
 """What a run shows, in numbers: how the adhesion was identified and what braking distance that saves."""
 
+import math
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -23,6 +25,7 @@ AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_
 """Findings at the first estimate that counts as identified: speed, adhesion, braking distances."""
 
 
+@lru_cache
 def distances(run: Run, target_mps: float, train: Train) -> Distances:
     """Braking distances from the speed at each estimate to the target speed."""
     times = run.speed.t_ns
@@ -33,6 +36,7 @@ def distances(run: Run, target_mps: float, train: Train) -> Distances:
     )
 
 
+@lru_cache
 def true_way(run: Run, target_mps: float) -> Series:
     """Way, m, that the train truly went from each moment of a braking until it had the target speed.
 
@@ -54,13 +58,13 @@ def true_way(run: Run, target_mps: float) -> Series:
 
 def first_identified(run: Run) -> int | None:
     """Index of the first estimate of an adhesion that limits, after 30 km/h of braking; None where there is none."""
-    regimes = run.regime.by_time()
     speeds = np.abs(run.speed.values)
     slow = speeds < np.maximum.accumulate(speeds) - CONVERGED_AFTER_MPS
-    shown = (i for i in np.flatnonzero(slow) if regimes.get(int(run.speed.t_ns[i])) == Regime.ADHESION_LIMITED.name)
-    return next((int(i) for i in shown), None)
+    shown = np.flatnonzero(slow & (run.regimes_at(run.speed.t_ns) == Regime.ADHESION_LIMITED.name))
+    return int(shown[0]) if shown.size else None
 
 
+@lru_cache
 def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
     """Return the findings by name; None where the run cannot tell.
 
@@ -99,14 +103,14 @@ def findings(run: Run, config: Config, target_kmh: float) -> dict[str, Any]:
     return found
 
 
+@lru_cache
 def why_not(run: Run) -> str | None:
     """Why nothing is identified; None where something is."""
-    seen, regimes, times = Seen(), run.regime.by_time(), run.speed.t_ns
+    seen, times = Seen(), run.speed.t_ns
     pressure = run.pressure.at(times) if run.pressure.t_ns.size else np.full(times.shape, np.nan)
-    columns = times, run.mu.at(times), run.mu_lower.at(times), run.speed.values, pressure
-    for t_ns, mu, bound, speed, pressure_pa in zip(*(column.tolist() for column in columns), strict=True):
-        known_pa = None if np.isnan(pressure_pa) else pressure_pa
-        seen.note(t_ns, regimes.get(t_ns, ""), mu, bound, speed, known_pa)
+    columns = times, run.regimes_at(times), run.mu.at(times), run.mu_lower.at(times), run.speed.values, pressure
+    for t_ns, regime, mu, bound, speed, pressure_pa in zip(*(column.tolist() for column in columns), strict=True):
+        seen.note(t_ns, regime, mu, bound, speed, None if math.isnan(pressure_pa) else pressure_pa)
     return seen.why_not()
 
 

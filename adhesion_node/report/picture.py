@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from ..core.physics.train import CRH3, KMH, Train
 from .charts import charts
 from .run import Band, Run, bands
+from .thinning import evenly, peaks, with_gaps
 
 SHADES = {"COASTING": "0.85", "BRAKE_LIMITED": "#d3e5f7", "ADHESION_LIMITED": "#fff1dc"}
 TRUE_SHADES = {"COASTING": "0.6", "BRAKE_LIMITED": "#5b9bd5", "ADHESION_LIMITED": "#e69f00"}
@@ -33,12 +34,17 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 """How a line of a kind is drawn."""
 
+MOST_POINTS = 2000
+"""Points of a line: more than the picture is wide."""
+
 CURVES = 8
 """Braking curves drawn, evenly spread over the run."""
 
 
-def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH3, truth: Sequence[Band] = ()) -> None:
-    """Draw the run into a PNG or a PDF, as the file's ending says, readable in black and white.
+def draw(
+    run: Run, paths: Sequence[Path], title: str, target_kmh: float, train: Train = CRH3, truth: Sequence[Band] = ()
+) -> None:
+    """Draw the run into PNG and PDF files, as their endings say, readable in black and white.
 
     Behind the lines stands what the estimator said that limits the motion, above it what truly did.
     """
@@ -48,13 +54,17 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
     parts: Any = figure.subfigures(2, 1, height_ratios=(20.0, 1.0))
     upper, foot = parts
     *axes, last = upper.subplots(3, 2).flat
+    said = bands(run)
     for axis, chart in zip(axes, charts(run, target_kmh, train), strict=True):
         for line in chart.lines:
-            axis.plot(run.seconds(line.series.t_ns), line.series.values, label=line.label, **STYLES[line.kind])
-        for known, shades, part in ((bands(run), SHADES, (0.0, 1.0)), (truth, TRUE_SHADES, (1.0 - STRIP, 1.0))):
-            for band in known:
-                if band.regime in shades:
-                    axis.axvspan(band.start_s, band.end_s, *part, color=shades[band.regime], lw=0, zorder=0)
+            whole = with_gaps(line.series)
+            kept = peaks(whole.values, MOST_POINTS)
+            axis.plot(run.seconds(whole.t_ns[kept]), whole.values[kept], label=line.label, **STYLES[line.kind])
+        upright = axis.get_xaxis_transform()
+        for known, shades, part in ((said, SHADES, (0.0, 1.0)), (truth, TRUE_SHADES, (1.0 - STRIP, STRIP))):
+            for regime, shade in shades.items():
+                spans = [(band.start_s, band.end_s - band.start_s) for band in known if band.regime == regime]
+                axis.broken_barh(spans, part, color=shade, lw=0, zorder=0, transform=upright)
         axis.sharex(axes[0])
         axis.set(xlabel="time, s", ylabel=chart.title, ylim=chart.range)
     _draw_curves(last, run)
@@ -66,7 +76,8 @@ def draw(run: Run, path: Path, title: str, target_kmh: float, train: Train = CRH
     patches = list(zip(told, true, strict=True)) if truth else told
     meaning = "what limits the motion" + (": as the estimator said, and in truth (the strip above)" if truth else "")
     foot.legend(patches, names, loc="center", ncols=len(names), title=meaning, handler_map={tuple: HandlerTuple(None)})
-    figure.savefig(path, dpi=110)
+    for path in paths:
+        figure.savefig(path, dpi=110)
 
 
 def _draw_curves(axis: Any, run: Run) -> None:
@@ -78,7 +89,8 @@ def _draw_curves(axis: Any, run: Run) -> None:
             depth = 0.3 + 0.7 * (i + 1) / len(chosen)
             axis.plot(curve.position_m, curve.speed_mps / KMH, color=color, ls=style, lw=0.8, alpha=depth, label=name)
     place, speed = run.way
-    axis.plot(place.values, speed.values / KMH, color=BLACK, lw=2, label="what the train did")
+    kept = evenly(place.t_ns.size, MOST_POINTS)
+    axis.plot(place.values[kept], speed.values[kept] / KMH, color=BLACK, lw=2, label="what the train did")
     start_m, length_m = place.values[0], max(float(place.values[-1] - place.values[0]), 1.0)
     axis.set(xlabel="position, m", ylabel="braking curves, km/h", xlim=(start_m, start_m + 2.0 * length_m))
     axis.set_ylim(bottom=0.0)

@@ -2,11 +2,11 @@
 
 """A recorded run as series over time: what its pictures, tables and pages are made from."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 from operator import attrgetter
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,24 +14,15 @@ from numpy.typing import NDArray
 from ..bag import BagReader
 from ..core import Regime
 from ..core.physics import braking
-from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import GRAVITY, Array, Train
 from ..wire import topics
 from ..wire.codecs import NOMINAL, Line
+from ..wire.results import Status
 from ..wire.topics import Topic
-from .creep import Curves, read_creep
-from .series import (
-    NONE,
-    Series,
-    Times,
-    read_last_status,
-    read_numbers,
-    read_remarks,
-    read_series,
-    read_status,
-    read_topic,
-    read_unstamped,
-)
+from .ahead import TOLD
+from .creep import CreepCurves, CreepTaken
+from .predicted import Curves
+from .series import NONE, Keyed, Numbers, Sample, Series, Take, Texts, Times, read_topics, with_key
 
 FIXED_MU = 0.0726
 """The worst case by which trains brake where the adhesion is not known (Xie et al. 2019)."""
@@ -39,6 +30,8 @@ FIXED_MU = 0.0726
 RESULTS = (topics.MU, topics.MU_LOWER, topics.STATE)
 """Without these a recording holds no results."""
 
+MOST_CURVES = 2000
+"""Curves on one adhesion are integrated at so many speeds at most, and interpolated between: to 1 mm at 100 m/s."""
 
 IN_WORDS = {
     Regime.COASTING.name: "nothing is claimed",
@@ -46,26 +39,6 @@ IN_WORDS = {
     Regime.ADHESION_LIMITED.name: "the adhesion limits",
 }
 """What limits the motion, by the names of the regimes."""
-
-
-class Curve(NamedTuple):
-    """A predicted braking: at which places, m along the track, the train has which speeds, m/s; arrays of (n,)."""
-
-    t_ns: int
-    position_m: Array
-    speed_mps: Array
-
-    def distance_to(self, target_mps: float) -> float:
-        """Distance, m, from the start of the curve to where the train has the target speed; 0 where it is slower."""
-        return abs(float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0]))
-
-    @property
-    def braking(self) -> BrakingCurve:
-        """The curve from its first place, constant in its deceleration from point to point."""
-        way, speed = np.abs(self.position_m - self.position_m[0]), self.speed_mps
-        slowing = (speed[:-1] ** 2 - speed[1:] ** 2) / (2.0 * np.maximum(np.diff(way), 1e-6))
-        times = np.concatenate(([0.0], np.cumsum(2.0 * np.diff(way) / np.maximum(speed[:-1] + speed[1:], 1e-6))))
-        return BrakingCurve(way, speed, np.append(slowing, slowing[-1]), times)
 
 
 class Band(NamedTuple):
@@ -89,9 +62,9 @@ class Run(NamedTuple):
     position: Series = NONE
     speed: Series = NONE
     regime: Series = NONE
-    safe: tuple[Curve, ...] = ()
+    safe: Curves = Curves()
     """On mu_lower, a weaker brake and the least resistance of the track; at most one for each estimate."""
-    nominal: tuple[Curve, ...] = ()
+    nominal: Curves = Curves()
     """On mu and the identified law over speed."""
     remarks: Series = NONE
     """What the estimator said while all was not well."""
@@ -99,12 +72,14 @@ class Run(NamedTuple):
     """Of the ATP monitor."""
     changes: Series = NONE
     """Changes of the rail found so far, counted."""
-    said: tuple[tuple[int, Mapping[str, float]], ...] = ()
-    """Numbers of the ATP monitor by key, at their times."""
-    creep: Curves = ()
+    said: Mapping[str, Series] = MappingProxyType({})
+    """Numbers of the ATP monitor by key, NaN where it does not tell one; all at the same times."""
+    creep: CreepCurves = ()
     """Of the creep estimator."""
     counts: Mapping[str, str] = MappingProxyType({})
     """Last diagnostics by key."""
+    told: Mapping[str, Series] = MappingProxyType({})
+    """Further numbers of the estimates, where they were asked for."""
 
     @property
     def confidence(self) -> float | None:
@@ -114,8 +89,19 @@ class Run(NamedTuple):
     @property
     def learnt(self) -> NDArray[np.bool_]:
         """At which estimates the train braked and its adhesion could be seen, or that it is enough; shape (n,)."""
-        nothing = set(self.regime.t_ns[self.regime.values == Regime.COASTING.name].tolist())
-        return np.array([t_ns not in nothing for t_ns in self.speed.t_ns.tolist()])
+        return np.asarray(self.regimes_at(self.speed.t_ns) != Regime.COASTING.name)
+
+    def regimes_at(self, t_ns: Times) -> NDArray[np.str_]:
+        """Regimes of the estimates of those times by name; "" where none is recorded."""
+        return self.regime.exactly(t_ns, "").astype(np.str_)
+
+    def __eq__(self, other: object) -> bool:
+        """A run is itself alone, so that what follows from it can be kept."""
+        return self is other
+
+    def __hash__(self) -> int:
+        """By identity, as well."""
+        return id(self)
 
     @property
     def origin_ns(self) -> int:
@@ -139,23 +125,52 @@ class Run(NamedTuple):
         return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
 
 
-def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
-    """Read the series. Raises ValueError when the recording holds no estimates."""
+def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = ()) -> Run:
+    """Read the series in one pass, and what is told of estimates by `keys`, with the standard deviations of the state.
+
+    Raises ValueError when the recording holds no estimates.
+    """
+    position, speed = Numbers(attrgetter("position_m")), Numbers(attrgetter("speed_mps"))
     # mu stands in its stamped form, the deceleration -mu g, where that was recorded.
-    stamped = read_series(reader, topics.DECELERATION, lambda read: -read.acceleration_mps2 / GRAVITY)
-    run = read_inputs(reader, {}, line)._replace(
-        mu=stamped if stamped.t_ns.size else read_unstamped(reader, topics.MU, (topics.STATE,)),
-        mu_lower=read_unstamped(reader, topics.MU_LOWER, (topics.STATE, topics.DECELERATION)),
-        position=read_series(reader, topics.STATE, attrgetter("position_m"), line),
-        speed=read_series(reader, topics.STATE, attrgetter("speed_mps")),
-        regime=read_status(reader, topics.DIAGNOSTICS, "regime"),
-        safe=_read_curves(reader, topics.BRAKING_CURVE, line),
-        nominal=_read_curves(reader, topics.BRAKING_CURVE_NOMINAL, line),
-        remarks=read_remarks(reader, topics.DIAGNOSTICS, "regime"),
-        levels=read_status(reader, topics.ATP_STATUS, "level"),
-        changes=read_status(reader, topics.DIAGNOSTICS, "changes"),
-        said=read_numbers(reader, topics.ATP_STATUS, "level"),
-        counts=read_last_status(reader, topics.DIAGNOSTICS, "regime"),
+    stamped = Numbers(lambda read: -read.acceleration_mps2 / GRAVITY)
+    mu, mu_lower, told, inputs, levels = Numbers(), Numbers(), _Told(), Inputs(), Texts()
+    position_std, speed_std = Numbers(attrgetter("position_std_m")), Numbers(attrgetter("speed_std_mps"))
+    values, said = Keyed(keys), Keyed(TOLD)
+    curves = {topic: Curves() for topic in (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)}
+    read_topics(
+        reader,
+        [
+            *inputs.takes,
+            *((topic, _curve_taker(each)) for topic, each in curves.items()),
+            (topics.MU, mu.take),
+            (topics.MU_LOWER, mu_lower.take),
+            (topics.STATE, position.take),
+            (topics.STATE, speed.take),
+            *((topics.STATE, each.take) for each in (position_std, speed_std) if keys),
+            (topics.DECELERATION, stamped.take),
+            (topics.DIAGNOSTICS, told.take),
+            (topics.DIAGNOSTICS, with_key("regime", told.note)),
+            (topics.DIAGNOSTICS, with_key("regime", values.note)),
+            (topics.ATP_STATUS, with_key("level", said.note)),
+            (topics.ATP_STATUS, with_key("level", lambda t_ns, status: levels.add(t_ns, status.values["level"]))),
+        ],
+        line,
+    )
+    deceleration = stamped.series
+    run = inputs.run._replace(
+        mu=deceleration if deceleration.t_ns.size else mu.stamped_by(speed),
+        mu_lower=mu_lower.stamped_by(speed, stamped),
+        position=position.series,
+        speed=speed.series,
+        regime=told.regime.series,
+        safe=curves[topics.BRAKING_CURVE],
+        nominal=curves[topics.BRAKING_CURVE_NOMINAL],
+        remarks=told.remarks.series,
+        levels=levels.series,
+        changes=told.changes.series,
+        said=said.series,
+        counts=told.counts,
+        told={**values.series, "position_std_m": position_std.series, "speed_std_mps": speed_std.series},
     )
     for topic, series in zip(RESULTS, (run.mu, run.mu_lower, run.speed), strict=True):
         if not series.t_ns.size:
@@ -163,23 +178,64 @@ def read_run(reader: BagReader, line: Line = NOMINAL) -> Run:
     return run
 
 
-def read_inputs(reader: BagReader, recorded: Mapping[str, str], line: Line) -> Run:
-    """Read truth, creep curves and the brake pressure above the air of `line`, or the demand without a pressure.
+class Inputs:
+    """Truth, creep curves and the brake pressure above the air, or the demand without a pressure, while read."""
 
-    `recorded` has their names in the recording where these differ.
-    """
+    def __init__(self) -> None:
+        self.pressure, self.demand = (Numbers(attrgetter("pressure_pa")) for _ in range(2))
+        self.creep, self._mu = CreepTaken(), Numbers()
+        self._position, self._speed = Numbers(attrgetter("position_m")), Numbers(attrgetter("speed_mps"))
+        self.truth: tuple[tuple[Topic, Take], ...] = (
+            (topics.TRUTH_MU, self._mu.take),
+            (topics.TRUTH_STATE, self._position.take),
+            (topics.TRUTH_STATE, self._speed.take),
+        )
+        """Who takes what of the truth."""
 
-    def series(topic: Topic, value: Callable[[Any], Any]) -> Series:
-        return read_series(reader, topic._replace(name=recorded.get(topic.name, topic.name)), value, line)
+    @property
+    def takes(self) -> tuple[tuple[Topic, Take], ...]:
+        """Who takes what."""
+        pressures = (topics.BRAKE_PRESSURE, self.pressure.take), (topics.BRAKE_DEMAND, self.demand.take)
+        return (*self.truth, *pressures, (topics.DIAGNOSTICS, self.creep.take))
 
-    pressure = series(topics.BRAKE_PRESSURE, attrgetter("pressure_pa"))
-    return Run(
-        creep=read_creep(reader),
-        true_mu=series(topics.TRUTH_MU, float),
-        true_position=series(topics.TRUTH_STATE, attrgetter("position_m")),
-        true_speed=series(topics.TRUTH_STATE, attrgetter("speed_mps")),
-        pressure=pressure if pressure.t_ns.size else series(topics.BRAKE_DEMAND, attrgetter("pressure_pa")),
-    )
+    @property
+    def run(self) -> Run:
+        """What was read."""
+        pressure = self.pressure.series
+        return Run(
+            creep=self.creep.curves,
+            true_mu=self._mu.series,
+            true_position=self._position.series,
+            true_speed=self._speed.series,
+            pressure=pressure if pressure.t_ns.size else self.demand.series,
+        )
+
+
+class _Told:
+    """What the diagnostics of the estimator tell, while read."""
+
+    def __init__(self) -> None:
+        self.regime, self.remarks, self.changes = Texts(), Texts(), Texts()
+        self.counts: Mapping[str, str] = {}
+
+    def take(self, sample: Sample) -> None:
+        """Take the last values, of no estimate too."""
+        self.counts = next((each.values for each in sample.read.entries if "regime" in each.values), self.counts)
+
+    def note(self, t_ns: int, status: Status) -> None:
+        """Take what is told of an estimate."""
+        self.regime.add(t_ns, status.values["regime"])
+        self.remarks.add(t_ns, status.message if status.level else "")
+        if "changes" in status.values:
+            self.changes.add(t_ns, status.values["changes"])
+
+
+def _curve_taker(curves: Curves) -> Take:
+    def take(sample: Sample) -> None:
+        if sample.read is not None:
+            curves.add(sample.read.t_ns, sample.read.places_m, sample.read.curve.speed_mps)
+
+    return take
 
 
 def bands(run: Run) -> list[Band]:
@@ -213,27 +269,22 @@ class Distances(NamedTuple):
 
 
 def distance_to_target(
-    run: Run, mu: Array | float, target_mps: float, train: Train, curves: Iterable[Curve] = ()
+    run: Run, mu: Array | float, target_mps: float, train: Train, curves: Curves | None = None
 ) -> Array:
     """Braking distance, m, from the speed at each estimate to the target speed; 0 below it.
 
     By the one of `curves` that has the estimate's stamp. Where there is none, adhesion stays at its present value `mu`
     on a level track; a bound below 0 counts as no adhesion.
     """
-    recorded = {curve.t_ns: curve.distance_to(target_mps) for curve in curves}
-    estimates = zip(
-        *(a.tolist() for a in (run.speed.t_ns, *np.broadcast_arrays(np.abs(run.speed.values), mu))), strict=True
-    )
-    return np.array(
-        [
-            recorded[t_ns]
-            if t_ns in recorded
-            else braking.curve(train, abs(v), max(held, 0.0), target_mps).distance_m[-1]
-            for t_ns, v, held in estimates
-        ]
-    )
-
-
-def _read_curves(reader: BagReader, topic: Topic, line: Line) -> tuple[Curve, ...]:
-    placed = (sample.read for sample in read_topic(reader, topic, line) if sample.read is not None)
-    return tuple(Curve(one.t_ns, one.places_m, one.curve.speed_mps) for one in placed)
+    found = (curves or Curves()).lengths(target_mps).exactly(run.speed.t_ns)
+    speeds, (held, _) = np.abs(run.speed.values), np.broadcast_arrays(np.maximum(mu, 0.0), found)
+    without = np.isnan(found)
+    if np.ndim(mu) == 0 and without.sum() > MOST_CURVES:
+        grid = np.linspace(0.0, speeds.max(), MOST_CURVES)
+        lengths = [braking.curve(train, v, float(held[0]), target_mps).distance_m[-1] for v in grid.tolist()]
+        return np.where(without, np.interp(speeds, grid, lengths), found)
+    found[without] = [
+        braking.curve(train, v, one, target_mps).distance_m[-1]
+        for v, one in zip(speeds[without].tolist(), held[without].tolist(), strict=True)
+    ]
+    return found

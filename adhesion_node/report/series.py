@@ -1,12 +1,14 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Series over time out of a recording: what pictures and tables are made from."""
+"""Series over time out of a recording, whose messages are decoded once: what pictures and tables are made from."""
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+import math
+import sys
+from array import array
+from collections.abc import Callable, Iterable
+from itertools import chain
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +17,7 @@ from numpy.typing import NDArray
 from ..bag import BagReader
 from ..core.physics.train import Array
 from ..wire.codecs import NOMINAL, Line, Rejected, stamp_ns
-from ..wire.results import Status, Statuses
+from ..wire.results import Status
 from ..wire.topics import Frame, Topic
 
 Times = NDArray[np.int64]
@@ -30,6 +32,13 @@ class Series(NamedTuple):
     def at(self, t_ns: Times) -> Array:
         """Values interpolated at other times; held constant before the first and after the last."""
         return np.asarray(np.interp(t_ns, self.t_ns, self.values), dtype=np.float64)
+
+    def exactly(self, t_ns: Times, absent: Any = np.nan) -> NDArray[Any]:
+        """Values at those very times, the last of several; `absent` where there is none."""
+        if not self.t_ns.size:
+            return np.full(t_ns.shape, absent)
+        found = np.searchsorted(self.t_ns, t_ns, side="right") - 1
+        return np.where((found >= 0) & (self.t_ns[found] == t_ns), self.values[found], absent)
 
     def map(self, change: Callable[[Array], Any]) -> Series:
         """What `change` makes of the values, at the same times."""
@@ -52,89 +61,149 @@ class Sample(NamedTuple):
     read: Any
 
 
-def read_topic(reader: BagReader, topic: Topic, line: Line = NOMINAL) -> Iterator[Sample]:
-    """Yield what is read of every message of a topic, whatever its frame; one that does not decode is left out."""
-    read = topic._replace(frame=Frame.ANY).read
-    for record, message in reader.decoded([topic.name]):
-        header = getattr(message, "header", None)
-        t_ns = record.log_ns if header is None else stamp_ns(header)
-        try:
-            yield Sample(record.log_ns, t_ns, read(message, line))
-        except Rejected:
-            yield Sample(record.log_ns, t_ns, None)
+Take = Callable[[Sample], None]
+"""Takes what is read of a topic's messages, one after the other."""
 
 
-def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any], line: Line = NOMINAL) -> Series:
-    """Take `value` of all that is read of a topic, by its stamp or log time; NaN where a message is refused.
+def read_topics(reader: BagReader, takes: Iterable[tuple[Topic, Take]], line: Line = NOMINAL) -> None:
+    """Hand over what is read of every message, whatever its frame, in one pass; one that does not decode is left out.
 
-    Empty when the recording lacks the topic.
+    A topic may be taken several times; one that the recording lacks is not.
     """
-    samples = read_topic(reader, topic, line)
-    rows = [(sample.t_ns, np.nan if sample.read is None else value(sample.read)) for sample in samples]
-    rows.sort(key=lambda row: row[0])  # stamps may come late; log times do not tell
-    return Series(np.array([t for t, _ in rows], dtype=np.int64), np.array([v for _, v in rows]))
+    taken: dict[str, tuple[Topic, list[Take]]] = {}
+    for topic, take in takes:
+        if (name := reader.resolve(topic.name)) is not None:
+            taken.setdefault(name, (topic._replace(frame=Frame.ANY), []))[1].append(take)
+    for record, message in reader.decoded(taken):
+        topic, each = taken[record.topic]
+        sample = sample_of(topic, message, record.log_ns, line)
+        for take in each:
+            take(sample)
 
 
-def read_unstamped(reader: BagReader, topic: Topic, beside: Sequence[Topic]) -> Series:
-    """Read a topic of Float64: each message takes the stamp of the message of `beside` that was logged nearest to it.
+def sample_of(topic: Topic, message: Any, log_ns: int, line: Line) -> Sample:
+    """Read a message."""
+    header = getattr(message, "header", None)
+    t_ns = log_ns if header is None else stamp_ns(header)
+    try:
+        return Sample(log_ns, t_ns, topic.read(message, line))
+    except Rejected:
+        return Sample(log_ns, t_ns, None)
 
-    What is published together is logged together, so a lost message leaves a gap and moves no other one. Of several
-    that would take one stamp the nearest in log time does. Empty when either is missing.
-    """
-    anchors = sorted((sample.log_ns, sample.t_ns) for name in beside for sample in read_topic(reader, name))
-    rows = [(sample.log_ns, sample.read) for sample in read_topic(reader, topic) if anchors and sample.read is not None]
-    nearest: dict[int, tuple[int, Any]] = {}
-    for log_ns, value in rows:
-        after = bisect_left(anchors, (log_ns,))
-        distance, stamp = min((abs(log - log_ns), stamp) for log, stamp in anchors[max(after - 1, 0) : after + 1])
-        nearest[stamp] = min(nearest.get(stamp, (distance, value)), (distance, value), key=lambda row: row[0])
-    stamps = sorted(nearest)
-    return Series(np.array(stamps, dtype=np.int64), np.array([nearest[stamp][1] for stamp in stamps]))
+
+class Numbers:
+    """`value` of all that is read of a topic, NaN where a message was refused."""
+
+    def __init__(self, value: Callable[[Any], float] = float) -> None:
+        self._value = value
+        self._t_ns, self._log_ns, self._values = array("q"), array("q"), array("d")
+
+    def take(self, sample: Sample) -> None:
+        """Take a sample."""
+        self.add(sample.t_ns, math.nan if sample.read is None else self._value(sample.read), sample.log_ns)
+
+    def add(self, t_ns: int, value: float, log_ns: int = 0) -> None:
+        """Take a value."""
+        self._t_ns.append(t_ns)
+        self._log_ns.append(log_ns)
+        self._values.append(value)
+
+    @property
+    def series(self) -> Series:
+        """The values by their stamps, which may have come late: log times do not tell."""
+        t_ns = np.array(self._t_ns, dtype=np.int64)
+        order = np.argsort(t_ns, kind="stable")
+        return Series(t_ns[order], np.array(self._values)[order])
+
+    def stamped_by(self, *beside: Numbers) -> Series:
+        """The values of messages without a stamp: each takes that of the message of `beside` logged nearest to it.
+
+        What is published together is logged together, so a lost message leaves a gap and moves no other one. Of several
+        that would take one stamp the nearest in log time does. Empty when either is missing.
+        """
+        anchors = sorted(chain.from_iterable(zip(one._log_ns, one._t_ns, strict=True) for one in beside))
+        values, log_ns = np.array(self._values), np.array(self._log_ns, dtype=np.int64)
+        known = np.isfinite(values)
+        if not (anchors and known.any()):
+            return NONE
+        values, log_ns = values[known], log_ns[known]
+        logged, stamps = np.array(anchors, dtype=np.int64).T
+        after = np.searchsorted(logged, log_ns)
+        candidates = np.clip([after - 1, after], 0, logged.size - 1)
+        distances = np.abs(logged[candidates] - log_ns)
+        nearer = (distances[1] < distances[0]) | (
+            (distances[1] == distances[0]) & (stamps[candidates[1]] < stamps[candidates[0]])
+        )
+        chosen, distance = np.where(nearer, candidates[1], candidates[0]), np.where(nearer, distances[1], distances[0])
+        order = np.lexsort((distance, stamps[chosen]))
+        t_ns, first = np.unique(stamps[chosen][order], return_index=True)
+        return Series(t_ns, values[order][first])
+
+
+class Keyed:
+    """The numbers that statuses tell by their keys; NaN where one tells none."""
+
+    def __init__(self, keys: Iterable[str]) -> None:
+        self._numbers = {key: Numbers() for key in keys}
+
+    def note(self, t_ns: int, status: Status) -> None:
+        """Take a status."""
+        for key, numbers in self._numbers.items():
+            numbers.add(t_ns, _number(status.values.get(key, "")))
+
+    @property
+    def series(self) -> dict[str, Series]:
+        """The numbers by key."""
+        return {key: numbers.series for key, numbers in self._numbers.items()}
+
+
+def _number(text: str) -> float:
+    """A finite number; NaN for what is none."""
+    try:
+        value = float(text)
+    except ValueError:
+        return math.nan
+    return value if math.isfinite(value) else math.nan
+
+
+class Texts:
+    """Texts at their times."""
+
+    def __init__(self) -> None:
+        self._rows: list[tuple[int, str]] = []
+
+    def add(self, t_ns: int, text: str) -> None:
+        """Take a text; most are said again and again."""
+        self._rows.append((t_ns, sys.intern(text)))
+
+    @property
+    def series(self) -> Series:
+        """The texts by their times."""
+        ordered = sorted(self._rows, key=lambda row: row[0])
+        return Series(np.array([t for t, _ in ordered], dtype=np.int64), np.array([text for _, text in ordered]))
+
+
+def with_key(key: str, take: Callable[[int, Status], None]) -> Take:
+    """Hand over the statuses that have `key`, at the stamp of the estimate of which they tell, else at their own."""
+
+    def taken(sample: Sample) -> None:
+        for status in sample.read.entries:
+            stamp = status.values.get("stamp_ns", sample.t_ns)
+            if key in status.values and stamp != "none":  # of no estimate
+                take(int(stamp), status)
+
+    return taken
+
+
+def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], float], line: Line = NOMINAL) -> Series:
+    """Take `value` of all that is read of a topic, by its stamp or log time. Empty when the recording lacks it."""
+    numbers = Numbers(value)
+    read_topics(reader, [(topic, numbers.take)], line)
+    return numbers.series
 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:
     """Read the value of `key` in a topic of diagnostics, as texts."""
-    return _texts((t_ns, status.values[key]) for t_ns, status in statuses(reader, topic, key))
-
-
-def read_remarks(reader: BagReader, topic: Topic, key: str) -> Series:
-    """Read what the statuses that have `key` say while they are not OK; "" while they are."""
-    return _texts((t_ns, status.message if status.level else "") for t_ns, status in statuses(reader, topic, key))
-
-
-def read_numbers(reader: BagReader, topic: Topic, key: str) -> tuple[tuple[int, dict[str, float]], ...]:
-    """Read the numbers of the statuses that have `key`, at their times."""
-    rows = ((t_ns, _numbers(status.values)) for t_ns, status in statuses(reader, topic, key))
-    return tuple(sorted(rows, key=lambda row: row[0]))
-
-
-def _numbers(values: Mapping[str, str]) -> dict[str, float]:
-    found = {}
-    for key, text in values.items():
-        with suppress(ValueError):
-            found[key] = float(text)
-    return {key: value for key, value in found.items() if np.isfinite(value)}
-
-
-def read_last_status(reader: BagReader, topic: Topic, key: str) -> dict[str, str]:
-    """Read the last values, by their keys, of the status that has `key`; {} where there is none."""
-    found = [status.values for sample in read_topic(reader, topic) for status in _with_key(sample.read, key)]
-    return dict(found[-1]) if found else {}
-
-
-def statuses(reader: BagReader, topic: Topic, key: str) -> Iterator[tuple[int, Status]]:
-    """Yield the statuses that have `key`, at the stamp of the estimate of which they tell, else at their own."""
-    for sample in read_topic(reader, topic):
-        for status in _with_key(sample.read, key):
-            stamp = status.values.get("stamp_ns", str(sample.t_ns))
-            if stamp != "none":  # of no estimate
-                yield int(stamp), status
-
-
-def _texts(rows: Iterable[tuple[int, str]]) -> Series:
-    ordered = sorted(rows, key=lambda row: row[0])
-    return Series(np.array([t for t, _ in ordered], dtype=np.int64), np.array([text for _, text in ordered]))
-
-
-def _with_key(read: Statuses, key: str) -> list[Status]:
-    return [status for status in read.entries if key in status.values]
+    texts = Texts()
+    read_topics(reader, [(topic, with_key(key, lambda t_ns, status: texts.add(t_ns, status.values[key])))])
+    return texts.series

@@ -2,8 +2,9 @@
 
 """A braking as one row, and what it showed of the rail by place: what many recordings are brought down to."""
 
-from collections.abc import Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from itertools import chain
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +50,9 @@ CELL_M = 100.0
 """Length of a piece of track."""
 
 
+Item = TypeVar("Item")
+
+
 class Braking(NamedTuple):
     """A row of `BRAKING`, and those of `CELL`."""
 
@@ -61,28 +65,39 @@ def brakings(made: Iterable[Prediction], cell_m: float = CELL_M, sign: int = 1) 
 
     `sign` is -1 where the chainage, by which places are told, falls along the run.
     """
-    braking: list[Prediction] = []
-    for prediction in made:
-        e = prediction.estimate
-        if braking and (e.window == 0 or e.t_ns - braking[-1].estimate.t_ns > GAP_NS):
-            yield from _told(braking, cell_m, sign)
+    told = (one for one in made if one.estimate.window == 0 or not one.estimate.withheld)
+    for braking in split(told, lambda one: one.estimate.window > 0, _stamp_and_speed):
+        yield _told(braking, cell_m, sign)
+
+
+def split(
+    items: Iterable[Item], under_brake: Callable[[Item], bool], stamp_and_speed: Callable[[Item], tuple[int, float]]
+) -> Iterator[list[Item]]:
+    """Yield those of each braking, whatever tells of the train and its brake, as soon as it is over."""
+    braking: list[Item] = []
+    for item in chain(items, [None]):
+        if braking and (
+            item is None or not under_brake(item) or stamp_and_speed(item)[0] - stamp_and_speed(braking[-1])[0] > GAP_NS
+        ):
+            (_, first_mps), (_, last_mps) = (stamp_and_speed(braking[at]) for at in (0, -1))
+            if abs(first_mps) - abs(last_mps) >= LEAST_LOST_MPS:
+                yield braking
             braking = []
-        if e.window > 0 and not e.withheld:
-            braking.append(prediction)
-    yield from _told(braking, cell_m, sign)
+        if item is not None and under_brake(item):
+            braking.append(item)
 
 
-def _told(braking: list[Prediction], cell_m: float, sign: int) -> Iterator[Braking]:
-    """The braking of some predictions, if it was one."""
-    if len(braking) < 2:
-        return
+def _stamp_and_speed(made: Prediction) -> tuple[int, float]:
+    return made.estimate.t_ns, made.estimate.speed_mps
+
+
+def _told(braking: list[Prediction], cell_m: float, sign: int) -> Braking:
+    """What the predictions of a braking showed."""
     estimates = [made.estimate for made in braking]
     t_ns = np.array([e.t_ns for e in estimates])
     place, speed, mu, std, lower = np.array(
         [(sign * e.position_m, abs(e.speed_mps), e.mu, e.mu_std, e.mu_lower) for e in estimates]
     ).T
-    if speed[0] - speed[-1] < LEAST_LOST_MPS:
-        return
     adhesion, brake = (
         np.array([e.regime is regime for e in estimates]) for regime in (Regime.ADHESION_LIMITED, Regime.BRAKE_LIMITED)
     )
@@ -120,7 +135,7 @@ def _told(braking: list[Prediction], cell_m: float, sign: int) -> Iterator[Braki
         for number in np.unique(cell[shown])
         for here in ((cell == number) & shown,)
     ]
-    yield Braking(row, np.array(cells, CELL))
+    return Braking(row, np.array(cells, CELL))
 
 
 def _mean(values: NDArray[np.float64], which: NDArray[np.bool_]) -> float:

@@ -160,7 +160,7 @@ def _run(
         copytree(folder, output, dirs_exist_ok=True)
     truth = _true_bands(played.regimes, run)
     fitted = f", {options.sensors}" if options.scenario in REAL else ""
-    draw(run, output / "run.png", f"{options.scenario}{fitted}, seed {options.seed}", target_kmh, train, truth)
+    draw(run, [output / "run.png"], f"{options.scenario}{fitted}, seed {options.seed}", target_kmh, train, truth)
     if options.scenario in REAL:
         result |= _found(truth, run)
     result |= {"live_digest": played.digest, "live_equals_offline": played.digest == result["digest"]}

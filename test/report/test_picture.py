@@ -115,7 +115,7 @@ def test_the_series_are_those_of_the_recording(recorded: Run) -> None:
 @pytest.mark.parametrize("left_out", [(), TRUTH, (BRAKE_PRESSURE,), (DIAGNOSTICS,), (*TRUTH, DIAGNOSTICS)])
 def test_a_picture_is_drawn_of_what_there_is(left_out: tuple[Topic, ...], tmp_path: Path) -> None:
     path = tmp_path / "run.png"
-    picture.draw(read(record(tmp_path / "bag", *left_out)), path, "a run", 100.0)
+    picture.draw(read(record(tmp_path / "bag", *left_out)), [path], "a run", 100.0)
     assert png_size(path) == (1210, 1320)
     told = DIAGNOSTICS not in left_out  # without regimes nothing is known to be identified
     assert pixels_of(path, picture.ORANGE) > (1000 if told else 500), "the curves by mu are missing"
@@ -125,7 +125,7 @@ def test_a_picture_is_drawn_of_what_there_is(left_out: tuple[Topic, ...], tmp_pa
 
 
 def test_a_name_is_no_formula(recorded: Run, tmp_path: Path) -> None:
-    picture.draw(recorded, tmp_path / "run.png", r"a$\frac$^{b", 0.0)
+    picture.draw(recorded, [tmp_path / "run.png"], r"a$\frac$^{b", 0.0)
     assert png_size(tmp_path / "run.png") > (600, 600)
 
 
@@ -133,14 +133,14 @@ def test_the_truth_is_drawn_where_there_is_one(tmp_path: Path) -> None:
     black = []
     for name, left_out in (("with", ()), ("without", TRUTH)):
         path = tmp_path / f"{name}.png"
-        picture.draw(read(record(tmp_path / name, *left_out)), path, "a run", 100.0)
+        picture.draw(read(record(tmp_path / name, *left_out)), [path], "a run", 100.0)
         black.append(pixels_of(path, picture.BLACK))
     assert black[0] > black[1] + 500
 
 
 def test_what_truly_limited_stands_above_what_the_estimator_said(recorded: Run, tmp_path: Path) -> None:
     path, truth = tmp_path / "run.png", [Band(0.0, 3.0, "BRAKE_LIMITED"), Band(3.0, 19.0, "ADHESION_LIMITED")]
-    picture.draw(recorded, path, "a run", 100.0, truth=truth)
+    picture.draw(recorded, [path], "a run", 100.0, truth=truth)
     strips = [pixels_of(path, picture.TRUE_SHADES[regime]) for regime in ("BRAKE_LIMITED", "ADHESION_LIMITED")]
     assert strips[0] > 1000
     assert strips[1] / strips[0] == pytest.approx(16.0 / 3.0, rel=0.3)
@@ -163,7 +163,7 @@ def read_only_fast(run: Run) -> Run:
 
 
 def test_a_single_estimate_is_drawn(tmp_path: Path) -> None:
-    picture.draw(read(record(tmp_path / "bag", seconds=1)), tmp_path / "run.png", "short", 0.0)
+    picture.draw(read(record(tmp_path / "bag", seconds=1)), [tmp_path / "run.png"], "short", 0.0)
     assert png_size(tmp_path / "run.png") == (1210, 1320)
 
 

@@ -14,17 +14,24 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
 from std_msgs.msg import Float64
+from test_offline import samples, write_run
 from test_picture import FREE, START_NS, S, read
 
-from adhesion_node.bag import BagWriter
+from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.core import Config
 from adhesion_node.report.brakings import brakings
 from adhesion_node.report.curves import MOST_MOMENTS, Subject, chart_data
+from adhesion_node.report.estimated import estimate_run
 from adhesion_node.report.events import events
 from adhesion_node.report.findings import findings
 from adhesion_node.report.run import Run
 from adhesion_node.report.series import NONE, Series
 from adhesion_node.report.thinning import peaks, with_gaps
+from adhesion_node.run import offline
+from adhesion_node.run.brakings import brakings as of_predictions
+from adhesion_node.run.pipeline import Pipeline
+from adhesion_node.run.score import Truth
+from adhesion_node.wire.settings import setup_of
 from adhesion_node.wire.topics import (
     ATP_STATUS,
     BRAKE_PRESSURE,
@@ -83,6 +90,20 @@ def test_a_run_is_split_into_its_brakings(run: Run) -> None:
     assert [(part.first, part.last) for part in found] == [(0, 29), (30, 59), (60, 89)]
     assert brakings(run._replace(pressure=NONE))[0].last == 29, "by the speed, where no pressure is recorded"
     assert brakings(run._replace(speed=run.speed.map(np.ones_like))) == []
+
+
+def test_a_table_of_brakings_has_those_of_the_report(tmp_path: Path) -> None:
+    """One brakes by what is recorded of the pressure, the other by what the estimator says: it is one braking."""
+    write_run(tmp_path / "bag", samples())
+    with BagReader(tmp_path / "bag") as reader:
+        selection = select_from(reader, [])
+        made = offline.replay(Pipeline(Config(), 1), Truth(), offline.messages(reader, selection)).predictions
+        run, _ = estimate_run(reader, selection, setup_of({"seed": 1}), lambda _: None)
+    (row,) = (one.row for one in of_predictions(made))
+    (part,) = brakings(run)
+    assert abs(part.start_ns - int(row["t_ns"][0])) <= S
+    assert float(row["from_kmh"][0]) == pytest.approx(3.6 * float(run.speed.values[part.first]), abs=5.0)
+    assert float(row["to_kmh"][0]) == pytest.approx(3.6 * float(run.speed.values[part.last]), abs=5.0)
 
 
 def test_each_braking_has_its_row(run: Run) -> None:

@@ -10,15 +10,9 @@ from typing import Any
 
 from ...command.options import DONE, FAILED, report
 from ...run.offline import parameters_of
+from . import is_table
 from .page import fleet_page
 from .rail import low_spots, read_fleet
-
-ENDINGS = (".csv", ".parquet")
-
-
-def is_table(path: str) -> bool:
-    """Whether it is a table rather than a recording."""
-    return Path(path).suffix.lower() in ENDINGS
 
 
 def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
@@ -28,7 +22,7 @@ def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
     recordings = [path for path in paths if not is_table(path)]
     if recordings:
         raise ValueError(f"bags = {', '.join(recordings)}: give recordings, or tables of brakings, not both")
-    if parameters_of(options) or options.estimate or options.remap or options.target:
+    if parameters_of(options) or options.estimate or options.remap or options.target or options.out:
         raise ValueError(f"tables = {', '.join(paths)}: are shown as written, give settings to `brakings`")
     fleet = read_fleet([Path(path) for path in paths])
     html, spots = fleet_page(fleet, options.low), low_spots(fleet.rail, options.low)

@@ -1,0 +1,37 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The estimates of a recording as rows of the columns that an offline replay writes."""
+
+import math
+from collections.abc import Iterator
+
+from ..run.results import COLUMNS, LEARNT, Row
+from .run import Run
+
+KEYS = ("mu_std", "window", *LEARNT)
+"""What the diagnostics are asked for; they tell five digits."""
+
+
+def rows_of(run: Run, sign: int) -> Iterator[Row]:
+    """Yield a row for each estimate; None for what was not recorded, or was withheld.
+
+    `sign` is -1 where the chainage, which the rows have, falls along the run.
+    """
+    times = run.speed.t_ns
+    series = {
+        **run.told,
+        "braking": run.told["window"],
+        "position_m": run.position.map(lambda place: sign * place),
+        "speed_mps": run.speed,
+        "mu": run.mu,
+        "mu_lower": run.mu_lower,
+        "safe_m": run.safe.lengths(0.0),
+        "nominal_m": run.nominal.lengths(0.0),
+    }
+    numbers = {name: series[name].exactly(times) for name in COLUMNS if name in series}
+    columns = {"t_ns": times, **numbers, "regime": run.regimes_at(times)}
+    for values in zip(*(columns[name].tolist() for name in COLUMNS), strict=True):
+        known = (None if value == "" or (isinstance(value, float) and math.isnan(value)) else value for value in values)
+        row = dict(zip(COLUMNS, known, strict=True))
+        braking = row["braking"]
+        yield row | {"braking": None if braking is None else int(braking)}
