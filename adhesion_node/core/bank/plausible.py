@@ -4,12 +4,15 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.train import GRAVITY, Array
+from ..physics.train import GRAVITY
 from . import kinds
+from .kernels import parabola
 from .layout import SPEED, Bank
 from .motion import white_variance
 
@@ -43,43 +46,39 @@ class Course(NamedTuple):
 
     def after(self, t_ns: int, position_m: float, braked: bool) -> Course:
         """With the next position."""
-        recent = (*(each for each in self.recent if t_ns - SPAN_NS <= each[0] < t_ns), (t_ns, position_m))
+        first, end = bisect_left(self.recent, (t_ns - SPAN_NS,)), bisect_left(self.recent, (t_ns,))
+        recent = (*self.recent[first:end], (t_ns, position_m))
         since = self.braked_ns if braked and self.braked_ns is not None else t_ns
         return Course(recent, since if braked else None)
 
     def is_impossible(self, config: Config, bank: Bank, declared_m: float) -> bool:
         """Whether no train moves so, by a parabola through the positions, in spite of their errors."""
-        stamps, places = np.array([each[0] for each in self.recent]), np.array([each[1] for each in self.recent])
-        if self.braked_ns is None or stamps.size < LEAST:
+        if self.braked_ns is None or len(self.recent) < LEAST:
             return False
-        speed = max(float(bank.weight @ bank.mean[:, SPEED]), 0.0)
+        speed = max(bank.mean_of(SPEED), 0.0)
         brake = config.train.specific_brake(config.train.full_pressure_pa)
-        resistance, grade = float(config.train.specific_resistance(np.array(speed))), 2.0 * config.grade_error
-        most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * resistance + grade)
-        time = (stamps - stamps[-1]) / S
+        c0, c1, c2 = config.train.resistance_si
+        grade = 2.0 * config.grade_error
+        most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * (c0 + speed * (c1 + c2 * speed)) + grade)
+        newest_ns, newest_m = self.recent[-1]
+        time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
+        places = np.array([place_m - newest_m for _, place_m in self.recent])
         for span_s, sigma in LOOKS:
-            seen = time >= -span_s
-            if np.count_nonzero(seen) < LEAST or time[seen][0] > -0.8 * span_s:
+            first = int(time.searchsorted(-span_s))
+            count = time.size - first
+            if count < LEAST or time[first] > -0.8 * span_s:
                 continue
-            slowing = -2.0 * _curvature(time[seen], places[seen] - places[-1])
-            error = sigma * _error(bank, declared_m, span_s, int(np.count_nonzero(seen)))
-            long = stamps[seen][0] - self.braked_ns >= BRAKED_NS
+            slowing = -2.0 * parabola.curvature(time[first:], places[first:])
+            error = sigma * _error(bank, declared_m, span_s, count)
+            long = self.recent[first][0] - self.braked_ns >= BRAKED_NS
             if slowing > most + error or (long and slowing < -GAIN_MPS2 - GRAVITY * grade - error):
                 return True
         return False
 
 
-def _curvature(time: Array, places: Array) -> float:
-    """Coefficient of t^2 of the parabola through places, by the polynomial that is orthogonal to 1 and t."""
-    centred = time - time.mean()
-    square = np.square(centred)
-    bend = square - (square @ centred) / square.sum() * centred - square.mean()
-    return float(bend @ places / (bend @ bend))
-
-
 def _error(bank: Bank, declared_m: float, span_s: float, count: int) -> float:
     """Standard deviation of the parabola's deceleration, m/s^2, by white errors and by the worst that wander."""
     white = 720.0 * float(bank.weight @ white_variance(bank, declared_m)) / (count * span_s**4)
-    slow = np.maximum(kinds.SLOW[:, 0] * declared_m, kinds.SLOW[:, 1]) ** 2 / kinds.LASTS
-    wander = 17.0 * 2.0 * float(max(slow[RECEIVER], slow[bank.noise].max())) / span_s**3
-    return float(np.sqrt(white + wander))
+    slow = [max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in kinds.NOISES]
+    wander = 17.0 * 2.0 * max(slow[noise] for noise in {RECEIVER, *bank.noise.tolist()}) / span_s**3
+    return math.sqrt(white + wander)

@@ -12,13 +12,13 @@ import numpy as np
 from ..belief.gaussian import Gaussian
 from ..belief.rail import Rail
 from ..belief.regime import Regime
-from ..physics.train import GRAVITY, Array
+from ..physics.train import Array
+from ..setting import once
 from . import kinds
 from .following import SPEED_ERROR_MPS, Memory, S
 from .kernels import mixture
-from .kernels.weighing import variances
-from .layout import GRADE, MU, ROUGH, SPEED, Bank
-from .motion import Braking, laws_of, open_variance, resistance, use
+from .layout import SPEED, Bank
+from .motion import Braking, model_of, resistance, use
 from .seeing import ROLLED
 
 if TYPE_CHECKING:
@@ -51,6 +51,8 @@ LIKELY = 0.5
 
 BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
 """Shares of sliding axles that leave no doubt, and the probability from which something is claimed without them."""
+
+SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 BORNE_OUT_S, BORNE_OUT = 2.0, 0.1
 """A change of the rail counts for the way ahead after so long, or once it is so probable."""
@@ -93,17 +95,20 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     """Judge the bank; `before` is the rail as it was known, aged to now, `nothing` what is known of any rail."""
     bank = memory.bank
     mean, covariance = bank.moments()
-    belief = Gaussian(mean[:2], covariance[:2, :2] + np.diag([0.0, SPEED_ERROR_MPS**2]))
+    belief = Gaussian(mean[:2], covariance[:2, :2] + SPEED_ERROR)
     if memory.misled:
         return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower), nothing)
+    if not memory.braked and memory.brake.known:
+        return Findings(Regime.COASTING, before, belief, constant(before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     std = np.hypot(used.std(bank), config.used_ripple * used.value)
     wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
     rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
     if not memory.braked:
-        slows = not memory.brake.known and rail.mu > SLOWING
-        free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu))) if slows else before
+        free = before
+        if rail.mu > SLOWING:
+            free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
         return Findings(Regime.COASTING, free, belief, constant(before.lower), free)
     ahead = counted_on(config, _borne_out(memory), 1.0 - config.curve_confidence, memory.braking, memory.known)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
@@ -148,53 +153,38 @@ def _borne_out(memory: Memory) -> Bank:
     """Without what has only just come to mind: that the rail may have changed this moment is always possible."""
     bank = memory.bank
     old = (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) | (bank.weight > BORNE_OUT)
-    return bank.part(old).normalised() if old.any() else bank
+    return bank._replace(log_weight=np.where(old, bank.log_weight, -np.inf)).normalised() if old.any() else bank
 
 
 def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, known: Rail) -> Ahead:
     """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill.
 
     What is known of roughness and grade here fades along the way, and the way takes the mean of them. Axles that roll
-    under a weak brake leave the bound as it was `known` when the braking began.
+    under a weak brake leave the bound as it was `known` when the braking began: the whole brake may make them slide.
     """
-    mean, used = bank.mean, use(config, bank, braking, resistance(config, bank))
-    sliding = used.slides
-    speed, resisting = np.maximum(mean[:, SPEED], 1.0), resistance(config, bank)
-    slowing = GRAVITY * np.maximum(used.value + resisting + mean[:, GRADE], 0.005)
-    way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
-    rough_kept, rough_added = _mean_ahead(way_m, kinds.ROUGHNESS_M)
-    grade_kept, grade_added = _mean_ahead(way_m, kinds.GRADE_M)
-    slope = used.slope.copy()
-    slope[:, ROUGH] *= rough_kept
-    slope[:, GRADE] = grade_kept
-    adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
-    roughness = (
-        kinds.ROUGHNESS[bank.kind] ** 2 * rough_added
-        + np.minimum(kinds.DRIFT[bank.kind], DRIFT_AHEAD) ** 2 * time_s / 3.0
+    resisting = resistance(config, bank)
+    used, weight = use(config, bank, braking, resisting), bank.weight
+    speeds = float(weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD
+    borne = ROLLED[0] / ROLLED[1] if _is_partial(config, braking) else 1.0
+    asked = mixture.Asked(float(missed), borne, float(known.lower))
+    low = mixture.counted_on(_ahead_of(config), bank, weight, used, resisting, speeds, asked)
+    return Ahead(tuple(speeds.tolist()), tuple(low.tolist()))
+
+
+@once
+def _ahead_of(config: Config) -> mixture.Ahead:
+    return mixture.Ahead(
+        lengths=np.array([kinds.ROUGHNESS_M, kinds.GRADE_M]),
+        rough=np.square(kinds.ROUGHNESS),
+        drift=np.square(np.minimum(kinds.DRIFT, DRIFT_AHEAD)),
+        resistance=np.array(config.train.resistance_si),
+        grade_error=float(config.grade_error),
+        resistance_error=float(config.resistance_std),
+        error=float(config.ahead_std),
+        laws=model_of(config).laws,
+        rise=COUNTED_RISE,
+        least=LEAST_AHEAD,
     )
-    variance = variances(slope, bank.covariance) + open_variance(config, bank) * grade_added
-    variance += np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
-    speeds = float(bank.weight @ speed) * SPEEDS_AHEAD
-    by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
-    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** COUNTED_RISE
-    foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
-    std = np.sqrt(np.maximum(variance, 1e-12)) * rising
-    # the whole brake may make axles slide that roll under a part of it
-    borne = used.value * (ROLLED[0] / ROLLED[1] if _is_partial(config, braking) else 1.0)
-    foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < known.lower)
-    foreseen, std = np.where(more, known.lower, foreseen), np.where(more, 1e-6, std)
-    middle = np.maximum(foreseen, LEAST_AHEAD)
-    variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
-    low = np.exp(quantiles(bank.weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
-    return Ahead(tuple(speeds.tolist()), tuple(np.maximum(low, 0.0).tolist()))
-
-
-def _mean_ahead(way_m: Array, length_m: float) -> tuple[Array, Array]:
-    """Of what fades over a length: what stays of it in the mean over a way, and what share of its variance is added."""
-    relative = way_m / length_m
-    kept = -np.expm1(-relative) / relative
-    spread = 2.0 / relative * (1.0 - kept)
-    return kept, np.maximum(spread - kept**2, 0.0)
 
 
 def quantiles(weights: Array, means: Array, stds: Array, probabilities: Sequence[float]) -> Array:

@@ -10,11 +10,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtr
 
-from adhesion_node.core.bank import branching, kinds, motion
+from adhesion_node.core.bank import branching, kinds, motion, verdict
 from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance
-from adhesion_node.core.bank.seeing import CLIPPED, Observation
+from adhesion_node.core.bank.seeing import CLIPPED, ROLLED, Observation
+from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.train import GRAVITY, Array
 
@@ -234,3 +235,46 @@ def quantiles(weights: Array, means: Array, stds: Array, probabilities: Sequence
         below = ndtr((middle[..., None] - means[..., None, :]) / stds[..., None, :]) @ weights < wanted
         low, high = np.where(below, middle, low), np.where(below, high, middle)
     return np.asarray(0.5 * (low + high))
+
+
+def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, known: Rail) -> tuple[Array, Array]:
+    """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill, behind these speeds."""
+    mean, used = bank.mean, use(config, bank, braking, resistance(config, bank))
+    sliding = used.slides
+    speed, resisting = np.maximum(mean[:, SPEED], 1.0), resistance(config, bank)
+    slowing = GRAVITY * np.maximum(used.value + resisting + mean[:, GRADE], 0.005)
+    way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
+    rough_kept, rough_added = _mean_ahead(way_m, kinds.ROUGHNESS_M)
+    grade_kept, grade_added = _mean_ahead(way_m, kinds.GRADE_M)
+    slope = used.slope.copy()
+    slope[:, ROUGH] *= rough_kept
+    slope[:, GRADE] = grade_kept
+    adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
+    roughness = (
+        kinds.ROUGHNESS[bank.kind] ** 2 * rough_added
+        + np.minimum(kinds.DRIFT[bank.kind], verdict.DRIFT_AHEAD) ** 2 * time_s / 3.0
+    )
+    variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added
+    variance += np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
+    speeds = float(bank.weight @ speed) * verdict.SPEEDS_AHEAD
+    by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
+    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** verdict.COUNTED_RISE
+    foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
+    std = np.sqrt(np.maximum(variance, 1e-12)) * rising
+    # the whole brake may make axles slide that roll under a part of it
+    partial = braking.applied < verdict.PARTIAL * config.train.specific_brake(config.train.full_pressure_pa)
+    borne = used.value * (ROLLED[0] / ROLLED[1] if partial else 1.0)
+    foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < known.lower)
+    foreseen, std = np.where(more, known.lower, foreseen), np.where(more, 1e-6, std)
+    middle = np.maximum(foreseen, verdict.LEAST_AHEAD)
+    variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
+    low = np.exp(quantiles(bank.weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
+    return speeds, low
+
+
+def _mean_ahead(way_m: Array, length_m: float) -> tuple[Array, Array]:
+    """Of what fades over a length: what stays of it in the mean over a way, and what share of its variance is added."""
+    relative = way_m / length_m
+    kept = -np.expm1(-relative) / relative
+    spread = 2.0 / relative * (1.0 - kept)
+    return kept, np.maximum(spread - kept**2, 0.0)

@@ -14,12 +14,13 @@ import numpy_bank as by_numpy
 import pytest
 from banks import FULL, bank_of
 
-from adhesion_node.core.bank import branching, kernels, motion, seeing
-from adhesion_node.core.bank.kernels import weighing
+from adhesion_node.core.bank import branching, kernels, motion, seeing, verdict
+from adhesion_node.core.bank.kernels import parabola, weighing
 from adhesion_node.core.bank.kinds import HELD, KINDS, NOISES, PASSING, SLIDES
 from adhesion_node.core.bank.layout import Bank
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.bank.verdict import quantiles
+from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.estimator import warm_up
 from adhesion_node.core.physics.track import Grade, Track, Tunnel
@@ -135,6 +136,23 @@ def test_quantiles(shape: tuple[int, ...]) -> None:
         ours = quantiles(weights, means, stds, wanted)
         assert ours.shape == (*shape[:-1], 4)
         np.testing.assert_allclose(ours, by_numpy.quantiles(weights, means, stds, wanted), rtol=0.0, atol=1e-10)
+
+
+@pytest.mark.parametrize("braking", BRAKINGS)
+@pytest.mark.parametrize("config", CONFIGS, ids=["level", "profile and rotating mass"])
+def test_what_is_counted_on_ahead(config: Config, braking: Braking) -> None:
+    for known in (0.0, 0.06):
+        rail = Rail(0.07, 0.02, known)
+        ours = verdict.counted_on(config, BANK, 0.02, braking, rail)
+        speeds, mu = by_numpy.counted_on(config, BANK, 0.02, braking, rail)
+        np.testing.assert_allclose(ours.speed_mps, speeds, rtol=1e-12)
+        np.testing.assert_allclose(ours.mu, mu, rtol=1e-9)
+
+
+def test_the_curvature_of_a_parabola_through_places() -> None:
+    time = np.sort(np.random.default_rng(4).uniform(-3.0, 0.0, 30))
+    places = 3.0 - 40.0 * time - 0.7 * time**2 + np.sin(20.0 * time)
+    assert parabola.curvature(time, places) == pytest.approx(np.polyfit(time, places, 2)[0], rel=1e-9)
 
 
 def test_all_is_compiled_before_a_train_brakes() -> None:

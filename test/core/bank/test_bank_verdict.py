@@ -14,9 +14,9 @@ from banks import FULL, FULL_PA, S, bank_of
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from adhesion_node.core.bank import verdict
 from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.bank.following import Memory
+from adhesion_node.core.bank.kernels import mixture as mixtures
 from adhesion_node.core.bank.kinds import KINDS
 from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank
 from adhesion_node.core.bank.motion import Braking, resistance, use
@@ -74,10 +74,10 @@ def test_what_stays_of_a_fading_error_over_the_way(way: float) -> None:
             following = kept * x + math.sqrt(1.0 - kept**2) * rng.standard_normal(paths)
             total += 0.5 * (x + following) / count
             x = following
-        stays, added = verdict._mean_ahead(np.array([way]), length)
+        stays, added = mixtures._mean_ahead(way, length)
         error = 4.0 * total.std() / math.sqrt(paths)
-        assert total.mean() == pytest.approx(start * stays[0], abs=error)
-        assert total.var() == pytest.approx(added[0], rel=0.1), start
+        assert total.mean() == pytest.approx(start * stays, abs=error)
+        assert total.var() == pytest.approx(added, rel=0.1), start
 
 
 def ahead_bank(mu: float, speed: float, kinds: list[int] | None = None) -> Bank:

@@ -1,51 +1,179 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Quantiles of mixtures of Gaussians."""
+"""Quantiles of mixtures of Gaussians: of what is used, and of what may be counted on along the way ahead."""
+
+from __future__ import annotations
 
 import math
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import kernel
 
+if TYPE_CHECKING:
+    from ..layout import Bank
+    from ..motion import Use
+
 Array = NDArray[np.float64]
+
+GRAVITY = 9.8
+SPEED, MU, ROUGH, GRADE, SIZE = 1, 2, 3, 5, 10
+
+
+class Ahead(NamedTuple):
+    """What changes on the way to a standstill."""
+
+    lengths: Array
+    """Correlation lengths of roughness and grade, m."""
+    rough: Array
+    """Variance of the roughness of each kind, shape (K,) as the next."""
+    drift: Array
+    """Relative variance that adhesion gains in 1 s."""
+    resistance: Array
+    """Of the speed in m/s: c0, c1, c2, N/N."""
+    grade_error: float
+    resistance_error: float
+    error: float
+    """Of what is foreseen, relative."""
+    laws: Array
+    """floor, gain, offset, scale of each law, shape (L, 4)."""
+    rise: float
+    """Power of what a law promises for lower speeds that is counted on."""
+    least: float
+    """Adhesion less grade counts as no less."""
+
+
+class Asked(NamedTuple):
+    """Which quantile; where axles roll, what part of what they use is borne if they slide, and what is at least."""
+
+    missed: float
+    borne: float
+    known: float
+
+
+@kernel
+def _quantile(weight: Array, mean: Array, std: Array, probability: float) -> float:
+    """The root of F(x) = p by Halley's steps inside a bracket that shrinks, halved where a step would leave it.
+
+    It is begun at the quantile of the Gaussian with the mixture's moments (Abramowitz and Stegun 26.2.23).
+    """
+    low, high, whole, centre, spread = np.inf, -np.inf, 0.0, 0.0, 0.0
+    for h in range(weight.size):
+        low, high = min(low, mean[h] - 8.0 * std[h]), max(high, mean[h] + 8.0 * std[h])
+        whole += weight[h]
+        centre += weight[h] * mean[h]
+        spread += weight[h] * (mean[h] ** 2 + std[h] ** 2)
+    centre /= whole
+    tail = math.sqrt(-2.0 * math.log(min(probability, 1.0 - probability)))
+    off = tail - (2.515517 + tail * (0.802853 + tail * 0.010328)) / (
+        1.0 + tail * (1.432788 + tail * (0.189269 + tail * 0.001308))
+    )
+    x = centre + math.copysign(off, probability - 0.5) * math.sqrt(max(spread / whole - centre**2, 0.0))
+    if not low < x < high:
+        x = 0.5 * (low + high)
+    for _ in range(60):
+        below, density, bend = 0.0, 0.0, 0.0
+        for h in range(weight.size):
+            z = (x - mean[h]) / std[h]
+            if z > 8.0:
+                below += weight[h]
+            elif z > -8.0 and weight[h] > 0.0:
+                below += 0.5 * weight[h] * math.erfc(-z / math.sqrt(2.0))
+                each = weight[h] / std[h] * math.exp(-0.5 * z**2)
+                density += each
+                bend -= each * z / std[h]
+        excess = below - probability
+        if excess < 0.0:
+            low = x
+        else:
+            high = x
+        step = excess * math.sqrt(2.0 * math.pi) / density if density > 0.0 else np.inf
+        weaker = 1.0 - 0.5 * step * bend / density if density > 0.0 else 1.0
+        before, x = x, x - (step / weaker if weaker > 0.5 else step)
+        if not low < x < high:
+            x = 0.5 * (low + high)
+        if abs(x - before) <= 1e-12:
+            break
+    return x
 
 
 @kernel
 def quantiles(weights: Array, means: Array, stds: Array, probabilities: Array) -> Array:
-    """The roots of F(x) = p by Newton's steps inside a bracket that shrinks, halved where a step would leave it.
-
-    `weights` has the shape (H,), `means` and `stds` (R, H), the result (R, P).
-    """
+    """Of each row of `means` and `stds`, shape (R, H), those of P `probabilities`, shape (R, P)."""
     result = np.empty((means.shape[0], probabilities.size))
     for row in range(means.shape[0]):
-        mean, std = means[row], stds[row]
-        least, most = np.inf, -np.inf
-        for h in range(weights.size):
-            least, most = min(least, mean[h] - 8.0 * std[h]), max(most, mean[h] + 8.0 * std[h])
         for index in range(probabilities.size):
-            low, high = least, most
-            x = 0.5 * (low + high)
-            for _ in range(60):
-                below, density = 0.0, 0.0
-                for h in range(weights.size):
-                    z = (x - mean[h]) / std[h]
-                    if z > 8.0:
-                        below += weights[h]
-                    elif z > -8.0:
-                        below += 0.5 * weights[h] * math.erfc(-z / math.sqrt(2.0))
-                        density += weights[h] / std[h] * math.exp(-0.5 * z**2)
-                excess = below - probabilities[index]
-                if excess < 0.0:
-                    low = x
-                else:
-                    high = x
-                step = excess * math.sqrt(2.0 * math.pi) / density if density > 0.0 else np.inf
-                before, x = x, x - step
-                if not low < x < high:
-                    x = 0.5 * (low + high)
-                if abs(x - before) <= 1e-12:
-                    break
-            result[row, index] = x
+            result[row, index] = _quantile(weights, means[row], stds[row], probabilities[index])
+    return result
+
+
+@kernel
+def _law(laws: Array, law: int, v: float) -> float:
+    row = laws[law]
+    return float(row[3] * (row[0] + row[1] / (row[2] + max(v, 0.0) * 3.6)))
+
+
+@kernel
+def _mean_ahead(way_m: float, length_m: float) -> tuple[float, float]:
+    """Of what fades over a length: what stays of it in the mean over a way, and what share of its variance is added."""
+    relative = way_m / length_m
+    kept = -math.expm1(-relative) / relative
+    return kept, max(2.0 / relative * (1.0 - kept) - kept**2, 0.0)
+
+
+@kernel
+def counted_on(
+    rule: Ahead,
+    bank: Bank,
+    weight: Array,
+    used: Use,
+    resisting: Array,
+    speeds: Array,
+    asked: Asked,
+) -> Array:
+    """Quantile of adhesion and grade ahead at each of some `speeds`, shape as they.
+
+    Adhesion is above 0 and known in proportion: that of its logarithm, with the same mean and variance.
+    """
+    count, mean, covariance = weight.size, bank.mean, bank.covariance
+    middle, std = np.empty((speeds.size, count)), np.empty((speeds.size, count))
+    by = np.empty(SIZE)
+    for h in range(count):
+        x, u, grade, k = mean[h], used.value[h], mean[h, GRADE], bank.kind[h]
+        slope, slides = used.slope[h], used.slides[h]
+        speed = max(x[SPEED], 1.0)
+        slowing = GRAVITY * max(u + resisting[h] + grade, 0.005)
+        way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
+        rough_kept, rough_added = _mean_ahead(way_m, rule.lengths[0])
+        grade_kept, grade_added = _mean_ahead(way_m, rule.lengths[1])
+        by[:] = slope
+        by[ROUGH] *= rough_kept
+        by[GRADE] = grade_kept
+        c = rule.resistance
+        basic = c[0] + x[SPEED] * (c[1] + c[2] * x[SPEED])
+        variance = (rule.grade_error**2 + (rule.resistance_error * basic) ** 2) * grade_added + (rule.error * u) ** 2
+        for i in range(SIZE):
+            if by[i] != 0.0:
+                for j in range(SIZE):
+                    variance += by[i] * covariance[h, i, j] * by[j]
+        if slides:
+            variance += x[MU] ** 2 * (rule.rough[k] * rough_added + rule.drift[k] * time_s / 3.0)
+        one, rest = math.sqrt(max(variance, 1e-12)), grade * grade_kept
+        level = u - slope[ROUGH] * x[ROUGH] * (1.0 - rough_kept)
+        for row in range(speeds.size):
+            if slides:
+                rising = (_law(rule.laws, bank.law[h], speeds[row]) / _law(rule.laws, bank.law[h], speed)) ** rule.rise
+                foreseen, spread = level * rising + rest, one * rising
+            elif asked.borne * u < asked.known:
+                foreseen, spread = asked.known, 1e-6
+            else:
+                foreseen, spread = level + rest + asked.borne * u - u, one
+            foreseen = max(foreseen, rule.least)
+            square = math.log1p((spread / foreseen) ** 2)  # so much may be taken away, but not all
+            middle[row, h], std[row, h] = math.log(foreseen) - 0.5 * square, math.sqrt(square)
+    result = np.empty(speeds.size)
+    for row in range(speeds.size):
+        result[row] = math.exp(_quantile(weight, middle[row], std[row], asked.missed))
     return result
