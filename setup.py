@@ -91,6 +91,8 @@ setup(
             *PARQUET,
         ],
         "lint": ["ruff~=0.17.5", "mypy~=2.4", "import-linter~=2.16", "types-PyYAML>=6,<7"],
+        # How well the tests hold: mutants and branches. Cosmic Ray, not mutmut: it changes constants of modules, too.
+        "mutation": ["cosmic-ray>=8.4,<9", "pytest-cov>=5,<8"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
         # What `bench` measures against; particles wants numpy below 2.
         "bench": ["filterpy>=1.4.5,<3", "particles>=0.4,<0.5", "threadpoolctl>=3.2,<4"],
