@@ -41,6 +41,20 @@ def test_seed_and_stream_decide_every_bit() -> None:
         init(QUICK, -1)
 
 
+@pytest.mark.parametrize("sigma_m", [0.2, 0.5, 2.0])
+def test_a_window_opens_as_soon_as_the_speed_is_settled(sigma_m: float) -> None:
+    """Of a train met under the brake: its variance over that of the long run, sqrt(2) q^(3/4) (r dt)^(1/4), q = 1."""
+    long_run = math.sqrt(2.0) * (sigma_m**2 * 0.1) ** 0.25
+    state, ratios = init(windowed(), 1), []
+    for measurement in ride([(4.0, FULL)], sigma_m=sigma_m):
+        state, _ = step(windowed(), state, measurement)
+        assert state.belief is not None
+        ratios.append(state.belief.covariance[1, 1] / long_run)
+        if state.window is not None:
+            break
+    assert ratios[-1] <= 1.5 < ratios[-2]
+
+
 def test_an_old_state_is_still_usable() -> None:
     measurements = ride(STOP)[:128]
     state = init(QUICK, 1)
