@@ -2,9 +2,10 @@
 
 """Several trains in one process: an estimator for each on one executor, fed through DDS at the pace of the clock."""
 
+import gc
 import time
 from collections.abc import Callable, Iterator, Mapping
-from itertools import islice
+from itertools import chain, islice
 from types import MappingProxyType
 from typing import Any
 
@@ -44,16 +45,19 @@ Pairs = Iterator[tuple[PressureSample, PositionSample]]
 
 
 class _Train(Estimator):
-    """An estimator that notes when it has used a position."""
+    """An estimator that notes when it has used a position, and what that took of the processor."""
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(**kwargs)
         self.used_s: dict[int, float] = {}
+        self.work_s: list[float] = []
 
     def take(self, sample: Any) -> Any:
+        begun_s = time.thread_time()
         events = super().take(sample)
         if isinstance(sample, PositionSample):
             self.used_s[sample.t_ns] = time.perf_counter()
+            self.work_s.append(time.thread_time() - begun_s)
         return events
 
 
@@ -101,6 +105,7 @@ def share(kind: str, count: int, rate_hz: float, seconds: float, seed: int) -> d
             executor.add_node(node)
         return {"executor": kind, **_measured(executor, driver, trains, seconds)}
     finally:
+        gc.unfreeze()
         nodes = list(executor.get_nodes())
         executor.shutdown()
         for node in nodes:
@@ -111,10 +116,13 @@ def share(kind: str, count: int, rate_hz: float, seconds: float, seed: int) -> d
 def _measured(executor: Executor, driver: _Driver, trains: list[_Train], seconds: float) -> dict[str, Any]:
     ends = [end for pair in driver.outputs for end in pair]
     _spin(executor, FOUND_S, lambda: all(end.get_subscription_count() for end in ends))
+    gc.freeze()  # as the programs of the nodes do
     driver.begin()
     _spin(executor, WARM_S)
     before = [set(sent) for sent in driver.due_s]
     used = sum(len(train.used_s) for train in trains)
+    for train in trains:
+        train.work_s.clear()
     cpu_s, begun_s = time.process_time(), time.perf_counter()
     _spin(executor, seconds)
     cpu_s, elapsed_s = time.process_time() - cpu_s, time.perf_counter() - begun_s
@@ -125,11 +133,14 @@ def _measured(executor: Executor, driver: _Driver, trains: list[_Train], seconds
         for t_ns, at_s in stamps.items()
         if t_ns not in warm
     ]
+    work = figures(chain.from_iterable(train.work_s for train in trains))
     took = [used_s - at_s for used_s, at_s in sent if used_s is not None]
     return {
         "trains": len(trains),
         "cores": cpu_s / elapsed_s,
         "cpu_ms_per_position": 1e3 * cpu_s / max(used, 1),
+        "cpu_p99_ms": work["p99_ms"],
+        "cpu_max_ms": work["max_ms"],
         **figures(took),
         "unused": len(sent) - len(took),
     }

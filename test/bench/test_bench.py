@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import math
 import sys
@@ -211,6 +212,8 @@ def test_trains_of_one_process_are_all_served(kind: str, monkeypatch: pytest.Mon
     assert row["unused"] <= 12, "what is on its way at the end"
     assert 0.0 < row["median_ms"] <= row["p99_ms"]
     assert row["cpu_ms_per_position"] > 0.0
+    assert 0.0 < row["cpu_p99_ms"] <= row["cpu_max_ms"]
+    assert gc.get_freeze_count() == 0, "only while it measures"
 
 
 @pytest.mark.usefixtures("few_windows")

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -26,7 +27,7 @@ from adhesion_node.nodes.ros import runtime
 from adhesion_node.wire.parameter_file import sections, unheeded
 
 PROGRAM = """
-import os, sys
+import gc, os, sys
 from rclpy.node import Node
 from std_msgs.msg import Float64
 from adhesion_node.nodes.ros import runtime
@@ -59,6 +60,9 @@ class Probe(Node):
             say("spinning")
         if self.task == "fill the disk":
             raise OSError(28, "No space left on device")
+        if self.task == "collect":
+            say(f"of {gc.get_freeze_count()} objects {len(gc.get_objects())} are looked through")
+            self.task = ""
         if self.task == "finish":
             self.finished = True
         if self.task == "stumble":  # the messages of the test queue up behind this
@@ -134,6 +138,17 @@ def test_signals_end_a_node_cleanly(start: Start, stage: str, burst: tuple[signa
     wait_for(program, stage)
     for number in burst:
         program.send_signal(number)
+    assert end(program) == (0, [])
+
+
+def test_what_was_loaded_is_not_looked_through_again_and_again(start: Start) -> None:
+    """A full collection would stop the node for 0.1 s."""
+    program = start(TASK="collect", WAIT_AT="")
+    stdout: IO[str] = program.stdout or pytest.fail("no pipe")
+    told = next(match for line in stdout if (match := re.fullmatch(r"of (\d+) objects (\d+) are .*\n", line)))
+    frozen, looked_through = map(int, told.groups())
+    assert looked_through < 0.1 * frozen
+    program.send_signal(signal.SIGINT)
     assert end(program) == (0, [])
 
 
