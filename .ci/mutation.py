@@ -58,7 +58,7 @@ def mutated(clone: Path, part: str, count: int, rng: random.Random) -> tuple[lis
     """Try mutants of a part; return the differences that survived, and how many were tried."""
     module, tests = PARTS[part]
     session, config = clone / f"{part}.sqlite", clone / f"{part}.toml"
-    command = f"{PYTEST} {tests}"
+    command = f"{PYTEST} --doctest-modules adhesion_node/{module} {tests}"
     began = time.monotonic()
     environment = os.environ | {"PYTHONPATH": f"{clone}:{clone / 'test'}", "PYTHONDONTWRITEBYTECODE": "1"}
     subprocess.run(shlex.split(command), cwd=clone, env=environment, check=True, stdout=sys.stderr)

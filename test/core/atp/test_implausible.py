@@ -40,6 +40,7 @@ def test_since_its_state_a_train_may_have_accelerated() -> None:
     decision = decide(config, NOW_NS, state, CURVE._replace(position_m=1040.0))
     assert decision.reading is not None
     assert decision.reading.supervised_mps == 41.0
+    assert state.at_most(config, NOW_NS) == (1040.5, 41.0)
     # 0.5 m further, and (41.0 + 0.8)^2/1.6 + (41.0 + 0.4) 2 s instead of what 40 m/s need.
     needed = 41.8**2 / 1.6 + 41.4 * 2.0
     assert decision.reading.margin_m == pytest.approx(5000.0 - 1040.5 - 10.0 - needed, abs=0.5)
@@ -49,7 +50,8 @@ def test_since_its_state_a_train_may_have_accelerated() -> None:
     ("state", "message"),
     [
         (GOOD_STATE._replace(speed_std_mps=2.1), "state is too unsure: its speed has a standard deviation of 2.1 m/s"),
-        (GOOD_STATE._replace(position_std_m=20.1), "its position has a standard deviation of 20.1 m, at most 20 is"),
+        (GOOD_STATE._replace(speed_std_mps=2.1), "at most 2 is used (max_speed_std_mps)"),
+        (GOOD_STATE._replace(position_std_m=20.1), "its position has a standard deviation of 20.1 m, at most 20 is used (max_position_std_m)"),
         (GOOD_STATE._replace(speed_std_mps=float("nan")), "its speed has a standard deviation of nan m/s"),
         (GOOD_STATE._replace(t_ns=NOW_NS + SECOND_NS // 9), "stamped 0.111 s ahead of the clock, at most 0.1 s"),
     ],
@@ -129,6 +131,7 @@ def test_states_that_tell_of_one_way_are_believed(
         (lambda t: -83.0 * t, lambda _: 0.0, "the train runs back, by 41.5 m so far: positions must grow", 2),
         (lambda t: -83.0 * t, lambda _: -83.0, "the train runs back, by 41.5 m", 2),
         (lambda t: -0.5 * t, lambda _: 0.0, "the train runs back", 20),
+        (lambda t: 5000.0 - 0.5 * t, lambda _: -0.5, "the train runs back", 20),
         (lambda t: 83.0 * t, lambda _: 0.0, "its places and its speeds differ by 41.5 m within 1 s", 2),
         (lambda t: 83.0 * t, lambda _: 80.0, "its places and its speeds differ", 20),
         (lambda _: 0.0, lambda _: 83.0, "is the position sensor right", 2),
@@ -141,6 +144,12 @@ def test_a_train_that_runs_back_or_against_its_speed_is_never_believed_again(
     said = complaints(place, speed)
     assert message in next(text for text in said if text)
     assert all(said[latest:])
+
+
+def test_a_train_may_roll_back_by_the_tolerance_and_what_its_places_leave_open() -> None:
+    """2 m and three times 0.2 m and 0.2 m, beyond the greatest single step: of half a metre each, the eighth is more."""
+    said = complaints(lambda t: 5000.0 - t, lambda _: -1.0)
+    assert [bool(text) for text in said] == [step >= 8 for step in range(120)]
 
 
 def test_states_that_come_seldom_are_held_together_too() -> None:
@@ -157,5 +166,5 @@ def test_a_course_is_bounded_and_begins_anew_after_a_gap_or_a_jump_of_time() -> 
         course = course.after(TrainState(step * SECOND_NS // 100, 0.5 * step, 50.0))
     assert COURSE_S / 0.5 <= len(course.states) <= COURSE_S / 0.4 + 2
     newest = course.states[-1].t_ns
-    for t_ns in (newest + 11 * SECOND_NS, newest, newest - 100 * SECOND_NS):
+    for t_ns in (newest + round(10.1 * SECOND_NS), newest, newest - 100 * SECOND_NS):
         assert len(course.after(TrainState(t_ns, -1e6, 0.0)).states) == 1

@@ -51,6 +51,11 @@ def test_a_pair_is_judged_and_a_lone_state_is_not_before_the_watchdog_has_waited
     assert [t_s for t_s, _ in said] == [0.4, 0.6]
 
 
+def test_the_first_tick_of_all_is_judged() -> None:
+    _, said = run(at(0.2, Tick.ROS))
+    assert [one.level for _, one in said] == [Level.EMERGENCY_BRAKE]
+
+
 def test_between_two_judgements_there_are_at_most_three_ticks() -> None:
     ticks = [(0.2 * number + 0.05, Tick.ROS) for number in range(20)]
     apart = [event for number in range(40) for event in at(0.1 * number + 0.04, pair(0.1 * number, number * 4.0)[1])]
