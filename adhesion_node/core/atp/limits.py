@@ -37,6 +37,10 @@ GRID = 1001
 """Speeds at which the limits are tabulated, about 0.1 m/s apart; what lies between is on the safe side."""
 
 
+LEAST_SHARE = 0.25
+"""Of the weakest deceleration of a curve: what it counts as, at least, at speeds above the curve's first one."""
+
+
 class Limits(NamedTuple):
     """One value for each supervision limit: distances before the target, m, or speeds, m/s."""
 
@@ -55,7 +59,8 @@ def distance_between(braking: BrakingCurve, speed_mps: Array, foot_mps: float) -
     """Distance, m, along the curve from each speed to `foot_mps`; negative from a lower one.
 
     Between two points the deceleration counts as constant (3.13.8.1.3). A speed above the curve's first one is
-    braked at the curve's weakest deceleration down to it.
+    braked down to it at the curve's weakest deceleration, less what that falls by as it does at the curve's beginning:
+    adhesion is lower the faster a train is.
     """
     return _along(braking, np.asarray(foot_mps)) - _along(braking, speed_mps)
 
@@ -64,8 +69,16 @@ def _along(braking: BrakingCurve, speed_mps: Array) -> Array:
     """Place on the curve, m, where the train has a speed; before its start (negative) when faster than its first."""
     squares = braking.speed_mps[::-1] ** 2
     wanted = np.square(speed_mps)
-    beyond = np.maximum(wanted - squares[-1], 0.0) / (2.0 * float(braking.deceleration_mps2.min()))
+    weakest = float(braking.deceleration_mps2.min())
+    slowing = np.maximum(weakest - _fading(braking) * (speed_mps - braking.speed_mps[0]), LEAST_SHARE * weakest)
+    beyond = np.maximum(wanted - squares[-1], 0.0) / (2.0 * np.minimum(slowing, weakest))
     return np.asarray(np.interp(wanted, squares, braking.distance_m[::-1]) - beyond)
+
+
+def _fading(braking: BrakingCurve) -> float:
+    """By how much the deceleration falls with the speed where the curve begins, m/s^2 per m/s; 0 where it rises."""
+    (first, second), (faster, slower) = braking.deceleration_mps2[:2], braking.speed_mps[:2]
+    return max(float((second - first) / (faster - slower)), 0.0) if faster > slower else 0.0
 
 
 def service_curve(braking: BrakingCurve, deceleration_mps2: float) -> BrakingCurve:

@@ -170,7 +170,7 @@ def test_before_a_stop_nothing_is_allowed_beyond_the_target() -> None:
     assert [float(limit[0]) for limit in etcs.speeds(config, CURVE, np.array([-0.1]))] == [0.0] * 5
 
 
-@pytest.mark.parametrize("at", [0, 31, 63])
+@pytest.mark.parametrize("at", [31, 63])
 def test_a_speed_above_the_curve_is_braked_at_its_weakest_deceleration(at: int) -> None:
     """Wherever on the curve it is weakest: 42 to 40 m/s at 0.5 m/s^2, (1764 - 1600)/1.0."""
     slowing = np.full(64, 0.8)
@@ -179,6 +179,13 @@ def test_a_speed_above_the_curve_is_braked_at_its_weakest_deceleration(at: int) 
     (distance,) = etcs.distance_between(weak, np.array([42.0]), 10.0)
     # then the curve's (1600 - 100)/1.6 = 937.5 m
     assert distance == pytest.approx(164.0 + 937.5, abs=0.2)
+
+
+def test_above_a_curve_that_falls_off_there_it_is_braked_by_its_weakest_less_what_it_falls_by() -> None:
+    weak_at_the_top = replace(constant(40.0, 0.8), deceleration_mps2=np.linspace(0.5, 1.1, 64))
+    # 0.6/40 less per m/s: 42 to 40 m/s at 0.47 m/s^2 in 174.5 m, then the curve's (1600 - 100)/1.6 = 937.5 m.
+    (distance,) = etcs.distance_between(weak_at_the_top, np.array([42.0]), 10.0)
+    assert distance == pytest.approx(174.47 + 937.5, abs=0.2)
 
 
 def test_the_braking_distance_is_that_of_the_curve_begun_at_the_speed() -> None:
@@ -231,3 +238,22 @@ def test_the_ceiling_excess_is_that_of_the_specification(
 def test_settings_out_of_range_are_refused(values: dict[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         SupervisionConfig(**values)
+
+
+@pytest.mark.parametrize("faster_mps", [0.0, 1.0, 5.0])
+def test_above_its_first_speed_a_curve_is_braked_no_better_than_it_fades(faster_mps: float) -> None:
+    """With a = 1/(1 + v/60) the way from v to a standstill is v^2/2 + v^3/180."""
+    speed = np.linspace(60.0, 0.0, 64)
+    way, slowing = speed**2 / 2.0 + speed**3 / 180.0, 1.0 / (1.0 + speed / 60.0)
+    fading = BrakingCurve(way[0] - way, speed, slowing, np.linspace(0.0, 90.0, 64))
+    wanted = 60.0 + faster_mps
+    true_m = wanted**2 / 2.0 + wanted**3 / 180.0
+    found_m = float(etcs.distance_between(fading, np.array([wanted]), 0.0)[0])
+    assert true_m <= found_m + 1e-9 <= 1.01 * true_m
+
+
+def test_a_curve_that_falls_off_steeply_keeps_a_quarter_of_its_weakest_deceleration() -> None:
+    steep = constant(60.0, 0.8)
+    steep.deceleration_mps2[0] = 0.4
+    found_m = etcs.distance_between(steep, np.array([60.0, 65.0]), 0.0)
+    assert float(found_m[1] - found_m[0]) == pytest.approx((65.0**2 - 60.0**2) / (2.0 * 0.1))
