@@ -51,7 +51,10 @@ def test_since_its_state_a_train_may_have_accelerated() -> None:
     [
         (GOOD_STATE._replace(speed_std_mps=2.1), "state is too unsure: its speed has a standard deviation of 2.1 m/s"),
         (GOOD_STATE._replace(speed_std_mps=2.1), "at most 2 is used (max_speed_std_mps)"),
-        (GOOD_STATE._replace(position_std_m=20.1), "its position has a standard deviation of 20.1 m, at most 20 is used (max_position_std_m)"),
+        (
+            GOOD_STATE._replace(position_std_m=20.1),
+            "its position has a standard deviation of 20.1 m, at most 20 is used (max_position_std_m)",
+        ),
         (GOOD_STATE._replace(speed_std_mps=float("nan")), "its speed has a standard deviation of nan m/s"),
         (GOOD_STATE._replace(t_ns=NOW_NS + SECOND_NS // 9), "stamped 0.111 s ahead of the clock, at most 0.1 s"),
     ],
@@ -147,7 +150,7 @@ def test_a_train_that_runs_back_or_against_its_speed_is_never_believed_again(
 
 
 def test_a_train_may_roll_back_by_the_tolerance_and_what_its_places_leave_open() -> None:
-    """2 m and three times 0.2 m and 0.2 m, beyond the greatest single step: of half a metre each, the eighth is more."""
+    """2 m and three times 0.2 m and 0.2 m, beyond the greatest single step: of half a metre each the eighth is more."""
     said = complaints(lambda t: 5000.0 - t, lambda _: -1.0)
     assert [bool(text) for text in said] == [step >= 8 for step in range(120)]
 
