@@ -42,9 +42,6 @@ LEAST_MU, LEAST_PART, LEAST_STD = 0.005, 0.1, 0.02
 STRONG = 0.03
 """Probability from which a hypothesis has others spring from it."""
 
-CHANGE_STD = 0.05
-"""By how much the adhesion may have changed, standard deviation."""
-
 LESS, LESS_STD = (0.9, 0.6, 0.4, 0.25), 0.22
 """Parts of what the brake needs that a rail may give on which axles begin to slide, each known so well."""
 
@@ -52,7 +49,7 @@ PASSING_S, PASSED_S = 300.0, 3.0
 """A border of the rail comes once in that time, and the train takes so long to pass it."""
 
 CHANGE_S, BEND_S = 600.0, 60.0
-"""A rail changes abruptly once in that time, and how its adhesion depends on speed."""
+"""Axles roll again, whatever the adhesion was, once in that time, and how it depends on speed changes."""
 
 RISING_S, STEADY_S, REACHED_S = 5.0, 60.0, 2.0
 """In such times axles begin to slide while the brake is applied harder, and while it is not; and adhesion that the
@@ -100,9 +97,9 @@ def closed(bank: Bank) -> Bank:
 def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed_s: float) -> Bank:
     """With what may have become different within the last `elapsed_s`, beside what springs from it.
 
-    Of those that slide: the rail has changed, and maybe how its adhesion depends on speed; or that alone; or adhesion
-    has become more than the brake uses, likelier the nearer it was; or the train passes a border: what it uses drifts
-    meanwhile, as a long train takes seconds to, and lasts again behind it. Of those that roll: adhesion has become less
+    Of those that slide: adhesion depends otherwise on speed; or has become more than the brake uses, likelier the
+    nearer it was; or the train passes a border: what it uses drifts meanwhile, as a long train takes seconds to, and
+    lasts again behind it. Of those that roll: adhesion has become less
     than the brake needs, a little less while the brake rises, else any less. Where the wheels tell which it is, the
     other does not spring.
     """
@@ -111,7 +108,6 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         now_s=now_s,
         elapsed_s=elapsed_s,
         strong=STRONG,
-        change_std=CHANGE_STD,
         change_s=CHANGE_S,
         bend_s=BEND_S,
         begin_s=RISING_S if braking.rising else STEADY_S,

@@ -55,7 +55,7 @@ BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 BORNE_OUT_S, BORNE_OUT = 2.0, 0.1
-"""A change of the rail counts for the way ahead after so long, or once it is so probable."""
+"""A change of the rail counts for the way ahead after so long behind its border, or once it is so probable."""
 
 
 class Ahead(NamedTuple):
@@ -150,9 +150,10 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
 
 
 def _borne_out(memory: Memory) -> Bank:
-    """Without what has only just come to mind: that the rail may have changed this moment is always possible."""
+    """Without what has only just come to mind: that the rail may change this moment is always possible."""
     bank = memory.bank
-    old = (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) | (bank.weight > BORNE_OUT)
+    lasting = (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) & (bank.kind != kinds.PASSING)
+    old = lasting | (bank.weight > BORNE_OUT)
     return bank._replace(log_weight=np.where(old, bank.log_weight, -np.inf)).normalised() if old.any() else bank
 
 

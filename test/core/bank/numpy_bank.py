@@ -130,17 +130,13 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
 
 
 def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> list[Bank]:
-    """The rail has changed, and maybe how its adhesion depends on speed; or that alone; or a border is passed."""
-    covariance = sliding.covariance.copy()
-    covariance[:, MU, MU] += branching.CHANGE_STD**2
+    """Adhesion depends otherwise on speed; or a border is passed."""
     now = np.full(sliding.log_weight.size, now_s)
-    other = sliding._replace(covariance=covariance, changed_s=now)
     children = []
     for law, (_, probability) in enumerate(laws_of(config)):
         if probability > 0.0:
             laws = np.full(now.size, law)
             weight = sliding.log_weight + math.log(probability * elapsed_s)
-            children.append(other._replace(log_weight=weight - math.log(branching.CHANGE_S), law=laws, born_s=now))
             bent = sliding._replace(log_weight=weight - math.log(branching.BEND_S), law=laws, born_s=now)
             children.append(bent.part(sliding.law != law))
     steady, passing = sliding.part(sliding.kind != PASSING), sliding.part(sliding.kind == PASSING)

@@ -109,7 +109,7 @@ def test_the_longer_asked_the_likelier_a_change() -> None:
         for after in (branched(CONFIG, bank, Braking(FULL), 12.0, elapsed) for elapsed in (0.1, 0.5, 2.0))
     ]
     assert weights == sorted(weights)
-    assert weights[1] == pytest.approx(0.5 / 600.0 + 0.5 / 300.0, rel=0.1)
+    assert weights[1] == pytest.approx(0.5 / 300.0, rel=0.1)
 
 
 @pytest.mark.parametrize("seed", range(5))

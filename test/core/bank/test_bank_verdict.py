@@ -17,8 +17,8 @@ from scipy.stats import norm
 from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.bank.following import Memory
 from adhesion_node.core.bank.kernels import mixture as mixtures
-from adhesion_node.core.bank.kinds import KINDS
-from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank
+from adhesion_node.core.bank.kinds import KINDS, PASSING
+from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, resistance, use
 from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
 from adhesion_node.core.belief.rail import Rail
@@ -123,6 +123,16 @@ def test_rolling_axles_may_slide_under_the_whole_brake(share: float, counted: fl
     for known in (0.0, 0.2 * FULL, 0.6 * FULL):
         ahead = counted_on(config, bank, 0.5, braking, Rail(0.05, 0.04, known))
         assert ahead.mu == pytest.approx([max(counted * used, known)] * 6, rel=0.01)
+
+
+@pytest.mark.parametrize(("probability", "counts"), [(0.05, False), (0.2, True)])
+def test_a_border_counts_for_the_way_ahead_once_it_is_probable(probability: float, counts: bool) -> None:
+    steady = ahead_bank(0.05, 50.0, [2])
+    passing = ahead_bank(0.01, 50.0, [PASSING])._replace(born_s=np.array([-60.0]))
+    both = joined([steady, passing])._replace(log_weight=np.log([1.0 - probability, probability]))
+    aheads = [found(CONFIG, memory_of(bank, Braking(FULL), 3), NOTHING, NOTHING).ahead for bank in (steady, both)]
+    assert (max(aheads[1].mu) < 0.5 * min(aheads[0].mu)) == counts
+    assert counts or aheads[1].mu == pytest.approx(aheads[0].mu)
 
 
 def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:

@@ -22,7 +22,7 @@ Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 
 MU, ROUGH, BRAKE, SIZE = 2, 3, 4, 10
 HELD = 1
-RAIL, LAW, ROLLS, BORDER, LASTS, SLIDES = 1, 2, 3, 4, 5, 6
+LAW, ROLLS, BORDER, LASTS, SLIDES = 1, 2, 3, 4, 5
 """What is new of a hypothesis; from `SLIDES` on, by which part of `less`. A row of `rows` is its parent, law, kind, and
 this."""
 
@@ -34,9 +34,10 @@ class Rule(NamedTuple):
     elapsed_s: float
     strong: float
     """Probability from which others spring from a hypothesis."""
-    change_std: float
     change_s: float
+    """Time in which axles roll whatever the adhesion was."""
     bend_s: float
+    """Time in which adhesion begins to depend otherwise on speed."""
     begin_s: float
     """Time in which axles begin to slide."""
     reached_s: float
@@ -60,15 +61,14 @@ class Rule(NamedTuple):
 
 
 @kernel
-def _changed(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
-    """The rail has changed, and maybe how its adhesion depends on speed; or that alone."""
+def _bent(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """Adhesion depends otherwise on speed."""
     for law in range(rule.laws.size):
-        for new, every_s in ((RAIL, rule.change_s), (LAW, rule.bend_s)):
-            for h in range(slides.size):
-                if slides[h] and rule.laws[law] > 0.0 and (new == RAIL or bank.law[h] != law):
-                    rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, bank.kind[h], new
-                    weight[size] = bank.log_weight[h] + math.log(rule.laws[law] * rule.elapsed_s / every_s)
-                    size += 1
+        for h in range(slides.size):
+            if slides[h] and rule.laws[law] > 0.0 and bank.law[h] != law:
+                rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, bank.kind[h], LAW
+                weight[size] = bank.log_weight[h] + math.log(rule.laws[law] * rule.elapsed_s / rule.bend_s)
+                size += 1
     return size
 
 
@@ -146,11 +146,11 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     slides = strong & (rule.sliding[:, 1][bank.kind] > 0.0)
     holds = strong & (bank.kind == HELD) & (rule.told >= 0.0)
     kinds, laws = rule.sliding.shape[0], rule.laws.size
-    most = count + (2 * laws + 1 + kinds) * slides.sum() + laws * kinds * rule.less.size * holds.sum()
+    most = count + (laws + 1 + kinds) * slides.sum() + laws * kinds * rule.less.size * holds.sum()
     rows, weight = np.zeros((most, 4), np.intp), np.empty(most)
     for h in range(count):
         rows[h, 0], rows[h, 1], rows[h, 2], weight[h] = h, bank.law[h], bank.kind[h], bank.log_weight[h]
-    size = _changed(bank, slides, rule, rows, weight, count)
+    size = _bent(bank, slides, rule, rows, weight, count)
     size = _passing(bank, slides, rule, rows, weight, size)
     if rule.told <= 0.0 and slides.any():
         size = _rolling(bank, slides, rule, rows, weight, size)
@@ -161,10 +161,8 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     for row in range(count, size):
         new, x, p = rows[row, 3], mean[row], covariance[row]
         born[row] = rule.now_s
-        if new in (RAIL, BORDER, LASTS):
+        if new in (BORDER, LASTS):
             changed[row] = rule.now_s
-        if new == RAIL:
-            p[MU, MU] += rule.change_std**2
         if new == ROLLS:
             _fresh(x, p, ROUGH, 0.0, 0.0)
         if new >= LASTS:
