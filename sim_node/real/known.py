@@ -42,7 +42,14 @@ def parameters(scenario: Scenario, fitted: Fitted) -> dict[str, Any]:
     """
     grades = "; ".join(f"grade {one.start_m} {one.end_m} {one.rise_m}" for one in _grades(scenario))
     own = {f"train.{name}": value for name, value in asdict(train(scenario)).items()}
-    return own | {"assumed_pressure_pa": scenario.nominal.full_pa, "track": grades, **fitted.told}
+    return {**own, **brake(scenario), "track": grades, **fitted.told}
+
+
+def brake(scenario: Scenario) -> dict[str, float]:
+    """Return the full pressure and the time until the last cylinder has it, as parameters by name."""
+    nominal = scenario.nominal
+    builds_up_s = nominal.build_up_s + nominal.length_m / nominal.propagation_mps
+    return {"assumed_pressure_pa": nominal.full_pa, "brake_build_up_s": builds_up_s}
 
 
 def track(scenario: Scenario) -> Track:

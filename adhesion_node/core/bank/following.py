@@ -44,8 +44,8 @@ DOUBTED, PASSED, CERTAIN, CHANGED = 0.1, 0.5, 0.99, 0.2
 """Probabilities from which a change of the rail is in doubt, up to which it still goes on, and from which it is told,
 and by how much it must have changed."""
 
-SETTLING_S = 8.0
-"""For so long behind its opening a braking tells no change."""
+SETTLING_S = 6.0
+"""For so long, and the brake's build-up, behind its opening a braking tells no change."""
 
 SLID = 0.9
 """Probability from which axles slid."""
@@ -288,7 +288,7 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if braked and not memory.braked:
         likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
         known = rail()
-        told_s = now_s + SETTLING_S
+        told_s = now_s + SETTLING_S + config.brake_build_up_s
         return memory._replace(bank=opened(config, likely, known), since_s=0.0, seen=1, told_s=told_s, known=known)
     if memory.braked and not braked:
         return memory._replace(bank=closed(bank), seen=0)

@@ -59,8 +59,8 @@ class Case(NamedTuple):
         if self.scenario == point_mass.NAME:
             return Config()
         scenario = SCENARIOS[self.scenario]
-        train, told = known.train(scenario), dict[str, Any](FITTED[self.fitted].told)
-        return Config(train, known.track(scenario), assumed_pressure_pa=train.full_pressure_pa, **told)
+        told: dict[str, Any] = {**known.brake(scenario), **FITTED[self.fitted].told}
+        return Config(known.train(scenario), known.track(scenario), **told)
 
     @property
     def line(self) -> Line:
