@@ -61,6 +61,12 @@ def _recording(options: Options) -> Section:
     return {"settings": {"rate_hz": 10.0}, "rows": [recording.replay(options.hours, 10.0, options.seed)]}
 
 
+def _report(options: Options) -> Section:
+    from . import recording  # see above
+
+    return {"settings": {"rate_hz": 10.0}, "rows": recording.report(options.hours, 10.0, options.seed)}
+
+
 def _growth(options: Options) -> Section:
     return {"settings": {"rounds": GROWTH_ROUNDS}, "rows": growth.compare(GROWTH_ROUNDS, options.seed)}
 
@@ -77,6 +83,7 @@ BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], st
     "memory": (_memory, (), "resident memory over a long journey"),
     "trains": (_trains, ("rclpy",), "braking trains in one process, an estimator each on one executor, through DDS"),
     "recording": (_recording, (), "a recording through the offline replay"),
+    "report": (_report, (), "the report of that recording, with the estimator's results and of the sensors alone"),
     "growth": (_growth, (), "how the cost grows"),
     "against": (_against, (), "the default method beside that of another revision, under the brake"),
 }
@@ -101,7 +108,7 @@ def main(args: Sequence[str] | None = None) -> int:
     add("--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)")
     add("--trains", type=int, default=20, help="in one process (default %(default)s)")
     add("--seconds", type=float, default=20.0, help="of them on their way (default %(default)s)")
-    add("--hours", type=float, default=0.5, help="of the recording that is replayed (default %(default)s)")
+    add("--hours", type=float, default=0.5, help="of the recording that is replayed and reported (default %(default)s)")
     add("--against", metavar="REV", help="a revision of this clone, for the benchmark against, which is then run, too")
     add("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
     return run_tool(parser, _run, args)

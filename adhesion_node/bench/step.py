@@ -84,7 +84,7 @@ def memory(minutes: float, rate_hz: float, seed: int) -> dict[str, Any]:
     }
 
 
-def resident_mb() -> float:
-    """Resident memory of this process as Linux tells it, MB."""
+def resident_mb(of: str = "VmRSS") -> float:
+    """Resident memory of this process as Linux tells it, MB; of "VmHWM" the most that it ever was."""
     status = dict(line.split(":", 1) for line in Path("/proc/self/status").read_text(encoding="utf-8").splitlines())
-    return float(status["VmRSS"].split()[0]) / 1024.0
+    return float(status[of].split()[0]) / 1024.0

@@ -25,6 +25,7 @@ from ..command.options import (
     run_tool,
     setting_options,
 )
+from ..core.physics.train import KMH
 from ..run.offline import parameters_of
 from ..run.results import rows_to
 from ..wire.settings import Setup, setup_of
@@ -87,16 +88,17 @@ def _work(options: argparse.Namespace) -> int:
 
 
 def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:
+    targets = (0.0, options.target * KMH)
     with BagReader(path) as reader, rows_to(options.out) as write:
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
-            run, source = read_run(reader, setup.line, KEYS if options.out else ()), "as recorded"
+            run, source = read_run(reader, setup.line, KEYS if options.out else (), targets), "as recorded"
             lost: Mapping[str, int] = reader.undecodable
             for row in rows_of(run, setup.line.sign) if options.out else ():
                 write(row)
         else:
-            run, lost = estimate_run(reader, select_from(reader, options.remap), setup, write)
+            run, lost = estimate_run(reader, select_from(reader, options.remap), setup, write, targets)
             source = "estimated from the recorded sensors"
         for topic, count in lost.items():
             print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)

@@ -77,20 +77,24 @@ def chart_data(subject: Subject, target_kmh: float) -> dict[str, Any]:
 
 
 def _kept(run: Run, parts: list[Braking]) -> Times:
-    """Indices of the estimates that have a place on the slider: most of them under the brake."""
+    """Indices of the estimates that have a place on the slider: most of them under the brake, where curves are kept."""
     size = run.speed.t_ns.size
     if size <= MOST_MOMENTS or not parts:
         return evenly(size, MOST_MOMENTS)
     each = (MOST_MOMENTS - IDLE_MOMENTS) // len(parts)
     braked = (part.first + evenly(part.last - part.first + 1, max(each, 2)) for part in parts)
-    return np.unique(np.concatenate([evenly(size, IDLE_MOMENTS), *braked]))
+    chosen = np.unique(np.concatenate([evenly(size, IDLE_MOMENTS), *braked]))
+    drawn = np.flatnonzero(np.isin(run.speed.t_ns, [curve.t_ns for curve in run.safe.kept]))
+    if not drawn.size:
+        return chosen
+    return np.unique(drawn[np.minimum(np.searchsorted(drawn, chosen), drawn.size - 1)])
 
 
 def _moments(run: Run, config: Config, planned: Distances, parts: list[Braking]) -> list[dict[str, Any]]:
     """What is known at every estimate that has a place on the slider, with the braking curves from there."""
     kept = _kept(run, parts)
     times = run.speed.t_ns[kept]
-    safe, nominal = (curves.by_time(times) for curves in (run.safe, run.nominal))
+    safe, nominal = ({curve.t_ns: curve for curve in curves.kept} for curves in (run.safe, run.nominal))
     found = (series.exactly(times).tolist() for series in (run.mu, run.mu_lower))
     columns = (np.abs(run.speed.values[kept]).tolist(), run.position.values[kept].tolist(), *found)
     seconds, regimes, start_m = run.seconds(times), run.regimes_at(times), float(run.way[0].values[0])

@@ -3,7 +3,7 @@
 """The run of a recording that holds sensor messages alone: what the estimator makes of them, offline."""
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from ..bag import BagReader
 from ..command.options import progress
@@ -17,22 +17,23 @@ from ..wire.codecs import Line, Rejected
 from ..wire.settings import Setup
 from ..wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH, Frame
 from .findings import listed
-from .predicted import Curves
+from .predicted import Curve, Curves
 from .run import Inputs, Run
 from .series import Numbers, Texts, read_topics, sample_of
 
 
 def estimate_run(
-    reader: BagReader, selection: Mapping[str, str], setup: Setup, write: Write
+    reader: BagReader, selection: Mapping[str, str], setup: Setup, write: Write, targets: Sequence[float] = ()
 ) -> tuple[Run, Mapping[str, int]]:
     """Run the recorded topics of `selection` (recorded name to ours) through the estimator; write each estimate.
 
-    Return the run, and by recorded topic how many messages do not decode. Raises ValueError when nothing could be
+    Return the run, whose braking distances to `targets`, m/s, are those of every curve, and by recorded topic how many
+    messages do not decode. Raises ValueError when nothing could be
     estimated.
     """
     pipeline, inputs, lost = Pipeline(setup.config, setup.seed), Inputs(), Counter[str]()
     mu, mu_lower, position, speed = (Numbers() for _ in range(4))
-    regime, changes, safe, nominal = Texts(), Texts(), Curves(), Curves()
+    regime, changes, safe, nominal = Texts(), Texts(), Curves(targets), Curves(targets)
     recorded = progress(offline.messages(reader, selection), "messages")
     for made in _predictions(pipeline, inputs, _noting(inputs, lost, recorded, setup.line), setup.line):
         write(row_of(pipeline, made, setup.line.sign))
@@ -44,7 +45,7 @@ def estimate_run(
         changes.add(e.t_ns, str(e.changes))
         for curves, curve in ((safe, made.safe), (nominal, made.nominal)):
             if curve is not None:
-                curves.add(e.t_ns, e.position_m + curve.distance_m, curve.speed_mps)
+                curves.add(Curve(e.t_ns, e.position_m + curve.distance_m, curve.speed_mps))
     if pipeline.last is None:
         dropped = listed(pipeline.dropped) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")

@@ -83,7 +83,7 @@ def draw(
 def _draw_curves(axis: Any, run: Run) -> None:
     """The braking curve as it changed over the run: later ones darker."""
     for curves, color, style, label in ((run.safe, BLUE, "--", "safe curves"), (run.nominal, ORANGE, "-", "nominal")):
-        chosen = curves[:: max(len(curves) // CURVES, 1)]
+        chosen = curves.kept[:: max(len(curves.kept) // CURVES, 1)]
         for i, curve in enumerate(chosen):
             name = label if i + 1 == len(chosen) else None
             depth = 0.3 + 0.7 * (i + 1) / len(chosen)

@@ -1,18 +1,21 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""The braking curves of a run, those of a day too: kept by their points in single precision, 1 mm in 10 km."""
+"""The braking curves of a run, thinned while it is read: a day's would fill the memory, and a page shows hundreds."""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Sequence
-from typing import NamedTuple, overload
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import Array
-from .series import Series, Times
+from .series import Series
+
+MOST_CURVES = 8192
+"""Curves that are kept: all of the first hour; of a longer run evenly spread ones, half as many at least."""
 
 
 class Curve(NamedTuple):
@@ -21,6 +24,10 @@ class Curve(NamedTuple):
     t_ns: int
     position_m: Array
     speed_mps: Array
+
+    def distance_to(self, target_mps: float) -> float:
+        """Distance, m, from the start of the curve to where the train has the target speed; 0 where it is slower."""
+        return abs(float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0]))
 
     @property
     def braking(self) -> BrakingCurve:
@@ -31,54 +38,31 @@ class Curve(NamedTuple):
         return BrakingCurve(way, speed, np.append(slowing, slowing[-1]), times)
 
 
-class Curves(Sequence[Curve]):
-    """Braking curves, at most one for each estimate, in the order in which they were added."""
+class Curves:
+    """Braking curves, at most one for each estimate; of all of them the distances to some `targets`, m/s, are kept."""
 
-    def __init__(self) -> None:
-        self._t_ns, self._ends, self._start_m = array("q"), array("q", [0]), array("d")
-        self._way_m, self._speed_mps = array("f"), array("f")
+    def __init__(self, targets: Iterable[float] = ()) -> None:
+        self.kept: list[Curve] = []
+        self._t_ns, self._lengths = array("q"), {target: array("d") for target in targets}
+        self._stride = 1
 
-    def add(self, t_ns: int, position_m: Array, speed_mps: Array) -> None:
+    def add(self, curve: Curve) -> None:
         """Take a curve."""
-        self._t_ns.append(t_ns)
-        self._start_m.append(float(position_m[0]))
-        self._way_m.frombytes((position_m - position_m[0]).astype(np.float32).tobytes())
-        self._speed_mps.frombytes(speed_mps.astype(np.float32).tobytes())
-        self._ends.append(len(self._way_m))
-
-    def __len__(self) -> int:
-        return len(self._t_ns)
-
-    @overload
-    def __getitem__(self, index: int) -> Curve: ...
-
-    @overload
-    def __getitem__(self, index: slice) -> list[Curve]: ...
-
-    def __getitem__(self, index: int | slice) -> Curve | list[Curve]:
-        if isinstance(index, slice):
-            return [self[i] for i in range(*index.indices(len(self)))]
-        at = range(len(self))[index]
-        part = slice(self._ends[at], self._ends[at + 1])
-        way, speed = np.array([self._way_m[part], self._speed_mps[part]], dtype=np.float64)
-        return Curve(self._t_ns[at], self._start_m[at] + way, speed)
-
-    def by_time(self, t_ns: Times) -> dict[int, Curve]:
-        """Those of these times."""
-        places = {known: index for index, known in enumerate(self._t_ns)}
-        return {t: self[places[t]] for t in t_ns.tolist() if t in places}
+        for target, lengths in self._lengths.items():
+            lengths.append(curve.distance_to(target))
+        if len(self._t_ns) % self._stride == 0:
+            self.kept.append(curve)
+        self._t_ns.append(curve.t_ns)
+        if len(self.kept) > MOST_CURVES:
+            self._stride *= 2
+            self.kept = self.kept[::2]
 
     def lengths(self, target_mps: float) -> Series:
-        """Distance, m, from the start of every curve to where the train has the target speed; 0 where it is slower."""
-        if not len(self):
-            return Series(np.array([], dtype=np.int64), np.array([]))
-        way, speed = (np.frombuffer(part, dtype=np.float32) for part in (self._way_m, self._speed_mps))
-        ends = np.array(self._ends)
-        starts, last = ends[:-1], ends[1:] - 1
-        beyond = np.minimum(starts + np.add.reduceat(speed > target_mps, starts), last)  # the first that is not faster
-        before = np.maximum(beyond - 1, starts)
-        slower = speed[before] - speed[beyond]
-        part = np.clip((speed[before] - target_mps) / np.where(slower > 0.0, slower, np.inf), 0.0, 1.0)
-        reached = np.abs(way[before] + part * (way[beyond] - way[before]).astype(np.float64))
-        order = np.argsort(t_ns := np.array(self._t_ns, dtype=np.int64), kind="stable")
-        return Series(t_ns[order], reached[order])
+        """Distance, m, to the target speed by their times; of another target than was asked for by those kept alone."""
+        if target_mps in self._lengths:
+            t_ns, found = np.array(self._t_ns, dtype=np.int64), np.array(self._lengths[target_mps])
+        else:
+            t_ns = np.array([curve.t_ns for curve in self.kept], dtype=np.int64)
+            found = np.array([curve.distance_to(target_mps) for curve in self.kept])
+        order = np.argsort(t_ns, kind="stable")
+        return Series(t_ns[order], found[order])

@@ -21,7 +21,7 @@ from ..wire.results import Status
 from ..wire.topics import Topic
 from .ahead import TOLD
 from .creep import CreepCurves, CreepTaken
-from .predicted import Curves
+from .predicted import Curve, Curves
 from .series import NONE, Keyed, Numbers, Sample, Series, Take, Texts, Times, read_topics, with_key
 
 FIXED_MU = 0.0726
@@ -30,7 +30,7 @@ FIXED_MU = 0.0726
 RESULTS = (topics.MU, topics.MU_LOWER, topics.STATE)
 """Without these a recording holds no results."""
 
-MOST_CURVES = 2000
+MOST_SPEEDS = 2000
 """Curves on one adhesion are integrated at so many speeds at most, and interpolated between: to 1 mm at 100 m/s."""
 
 IN_WORDS = {
@@ -125,10 +125,11 @@ class Run(NamedTuple):
         return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
 
 
-def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = ()) -> Run:
+def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = (), targets: Sequence[float] = ()) -> Run:
     """Read the series in one pass, and what is told of estimates by `keys`, with the standard deviations of the state.
 
-    Raises ValueError when the recording holds no estimates.
+    The braking distances to `targets`, m/s, are those of every curve. Raises ValueError when the recording holds no
+    estimates.
     """
     position, speed = Numbers(attrgetter("position_m")), Numbers(attrgetter("speed_mps"))
     # mu stands in its stamped form, the deceleration -mu g, where that was recorded.
@@ -136,7 +137,7 @@ def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = ()) 
     mu, mu_lower, told, inputs, levels = Numbers(), Numbers(), _Told(), Inputs(), Texts()
     position_std, speed_std = Numbers(attrgetter("position_std_m")), Numbers(attrgetter("speed_std_mps"))
     values, said = Keyed(keys), Keyed(TOLD)
-    curves = {topic: Curves() for topic in (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)}
+    curves = {topic: Curves(targets) for topic in (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)}
     read_topics(
         reader,
         [
@@ -233,7 +234,7 @@ class _Told:
 def _curve_taker(curves: Curves) -> Take:
     def take(sample: Sample) -> None:
         if sample.read is not None:
-            curves.add(sample.read.t_ns, sample.read.places_m, sample.read.curve.speed_mps)
+            curves.add(Curve(sample.read.t_ns, sample.read.places_m, sample.read.curve.speed_mps))
 
     return take
 
@@ -279,8 +280,8 @@ def distance_to_target(
     found = (curves or Curves()).lengths(target_mps).exactly(run.speed.t_ns)
     speeds, (held, _) = np.abs(run.speed.values), np.broadcast_arrays(np.maximum(mu, 0.0), found)
     without = np.isnan(found)
-    if np.ndim(mu) == 0 and without.sum() > MOST_CURVES:
-        grid = np.linspace(0.0, speeds.max(), MOST_CURVES)
+    if np.ndim(mu) == 0 and without.sum() > MOST_SPEEDS:
+        grid = np.linspace(0.0, speeds.max(), MOST_SPEEDS)
         lengths = [braking.curve(train, v, float(held[0]), target_mps).distance_m[-1] for v in grid.tolist()]
         return np.where(without, np.interp(speeds, grid, lengths), found)
     found[without] = [

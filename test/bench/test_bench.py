@@ -163,6 +163,14 @@ def test_a_recording_is_replayed_whole() -> None:
     assert 0.0 < row["of_it_reading"] < 1.0
 
 
+def test_a_recording_is_reported_with_its_results_and_without() -> None:
+    results, sensors = recording.report(0.02, 10.0, seed=1)
+    assert (results["holds"], sensors["holds"]) == ("results", "sensors")
+    assert results["beside_estimating"] == results["cpu_seconds"] > 0.0
+    assert 0.0 < sensors["beside_estimating"] < sensors["cpu_seconds"]
+    assert min(results["peak_mb"], sensors["peak_mb"]) > 50.0
+
+
 def test_what_grows_has_an_exponent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "SECONDS", 3.0)
     monkeypatch.setattr(growth, "SIZES", {"trains": (1, 4), "hypotheses": (20, 40), "rate_hz": (5, 20)})

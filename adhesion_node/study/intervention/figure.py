@@ -64,7 +64,7 @@ def draw_changing(run: Run, laws: Rail, patch: tuple[float, float], target: tupl
     known = np.array(
         [
             (curve.position_m[0], etcs.speeds(config, curve.braking, place_m - curve.position_m[:1]).ebi[0])
-            for curve in run.safe
+            for curve in run.safe.kept
             if curve.position_m[0] < place_m
         ]
     )
