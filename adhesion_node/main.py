@@ -9,6 +9,7 @@ is not installed says how to get it: the nodes of a train run with rclpy, numpy,
 import sys
 from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 
 from .command.signals import stop_on_signals
 
@@ -60,8 +61,11 @@ def _saying_what_is_missing(program: Program) -> Program:
             name = (error.name or "").partition(".")[0]
             if name in ("", __package__, "sim_node"):
                 raise
-            from .command import without_ros  # only here: nothing comes before the signals that is not needed
+            from .command import options, without_ros  # only here: nothing comes before the signals that is not needed
 
+            if "--version" in sys.argv[1:]:
+                print(options.version_of(Path(sys.argv[0]).name))
+                return options.DONE
             if without_ros.is_of_ros(name) and without_ros.is_help_asked():
                 with without_ros.stand_ins():
                     return program()

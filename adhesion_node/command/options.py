@@ -54,14 +54,19 @@ class _Version(argparse.Action):
     """Looks the version up only when it is asked for."""
 
     def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> None:
-        from importlib.metadata import PackageNotFoundError, version
-
-        try:
-            number = version("adhesion_node")
-        except PackageNotFoundError:
-            number = "of a source tree that is not installed"
-        print(f"{parser.prog}, adhesion_node {number}")
+        print(version_of(parser.prog))
         parser.exit(DONE)
+
+
+def version_of(program: str) -> str:
+    """What a program says to --version."""
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        number = version("adhesion_node")
+    except PackageNotFoundError:
+        number = "of a source tree that is not installed"
+    return f"{program}, adhesion_node {number}"
 
 
 def remap_option(add: Callable[..., Any]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core.physics.train import CRH3, KMH, Train
 from ..run.seen import is_known
-from .findings import distances
+from .findings import distances, why_not
 from .run import FIXED_MU, Run
 
 Column = TypeVar("Column")
@@ -48,11 +48,11 @@ def rows(run: Run, target_kmh: float, train: Train = CRH3, absent: str = "–") 
     if within.size > ROWS:
         within = within[np.linspace(0, within.size - 1, ROWS).round().astype(int)]
     mu, lower = run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns)
-    planned = distances(run, target_mps, train)
+    planned, is_anything_known = distances(run, target_mps, train), why_not(run) is None
     for i in within:
         true_mu, true_m = _truth(run, int(run.speed.t_ns[i]), target_mps)
         nominal, longest, fixed = (float(column[i]) for column in (planned.identified, planned.longest, planned.fixed))
-        identified = (float(mu[i]), nominal) if is_known(mu[i], lower[i]) else (None, None)
+        identified = (float(mu[i]), nominal) if is_anything_known and is_known(mu[i], lower[i]) else (None, None)
         row = (float(speeds[i]) / KMH, true_mu, identified[0], float(lower[i]), true_m, identified[1], longest, fixed)
         texts = (absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True))
         yield shown(run, list(texts))

@@ -47,6 +47,7 @@ class Seen:
         """The highest bound while the brake limited."""
         self._estimates = self._moving = self._back = self._pressed = self._held = 0
         """Estimates, those of a train that runs, and of these: backwards, under pressure, in spite of that."""
+        self._fastest_mps = 0.0
         self._newest: deque[tuple[int, float]] = deque()
 
     def note(
@@ -65,6 +66,7 @@ class Seen:
         self.hardest_mps2 = max(self.hardest_mps2, 0.0 if math.isnan(slows_mps2) else slows_mps2)
         if pressure_pa is not None:
             self.most_pa = max(pressure_pa, self.most_pa or 0.0)
+        self._fastest_mps = max(abs(speed_mps), self._fastest_mps)
         if abs(speed_mps) > RUNS_MPS:
             self._moving += 1
             self._back += speed_mps < 0.0
@@ -115,6 +117,8 @@ class Seen:
             yield f"the brake pressure is {self.most_pa:.3g} Pa at most: is its unit right, was there a braking?"
         if self._runs_on:
             yield "the train runs on under brake pressure: is it the brake pipe's, or absolute and taken as gauge?"
+        if not self._moving:
+            yield f"the train was never faster than {self._fastest_mps:.2g} m/s: are its positions degrees, or km?"
         if self.hardest_mps2 < BRAKES_MPS2:
             yield f"no braking harder than {BRAKES_MPS2:g} m/s^2: the hardest was {self.hardest_mps2:.2f}"
         if self._at_brake:

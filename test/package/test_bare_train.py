@@ -69,6 +69,14 @@ def test_a_node_runs_with_ros_and_what_is_always_installed(program: str) -> None
     assert process.returncode == 0, rest
 
 
+@pytest.mark.parametrize("program", ["report", "brakings", "estimator"])
+def test_the_version_is_told_whatever_is_missing(program: str) -> None:
+    with on_bare(program, "--version", without=refused() | {"rclpy"}) as process:
+        told, _ = process.communicate(timeout=60.0)
+    assert process.returncode == 0
+    assert ", adhesion_node " in told
+
+
 @pytest.mark.parametrize("program", sorted(console_scripts().keys() - set(ON_THE_TRAIN)))
 def test_any_other_program_says_what_to_install(program: str, tmp_path: Path) -> None:
     given = ["--output", str(tmp_path / "run")] if program == "recorder" else ["--help"]

@@ -289,3 +289,8 @@ def test_an_adhesion_that_is_only_believed_is_not_called_identified(recorded: Ru
     body = [line.split() for line in table(believed, 180.0, FREE).splitlines()[2:]]
     assert {(row[2], row[5]) for row in body} == {("–", "–")}
     assert {row[3] for row in body} == {"0.0200"}, "the bound is counted on all the same"
+    backwards = recorded._replace(
+        speed=recorded.speed.map(np.negative)
+    )  # so the report says that nothing is identified
+    body = [line.split() for line in table(backwards, 180.0, FREE).splitlines()[2:]]
+    assert {(row[2], row[5]) for row in body} == {("–", "–")}

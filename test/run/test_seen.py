@@ -24,6 +24,14 @@ def run(
     return seen
 
 
+def creeping() -> Seen:
+    """Degrees of latitude taken for metres."""
+    seen = Seen()
+    for i in range(40):
+        seen.note(i * S // 2, "COASTING", 0.1, 0.02, 0.00072, 4e5 * (i > 20))
+    return seen
+
+
 @pytest.mark.parametrize(
     ("seen", "why"),
     [
@@ -32,6 +40,7 @@ def run(
         (run(0.9, None), "no brake pressure and no demand came"),
         (run(0.9, 4.1), "the brake pressure is 4.1 Pa at most: is its unit right"),
         (run(0.0, 5e5, seconds=40), "the train runs on under brake pressure: is it the brake pipe's"),
+        (creeping(), "the train was never faster than 0.00072 m/s: are its positions degrees, or km?"),
         (run(0.9, 4e5), "braked by up to 0.90 m/s^2"),
     ],
 )

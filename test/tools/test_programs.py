@@ -16,7 +16,7 @@ from test_package import console_scripts
 
 from adhesion_node.tools import line
 
-TOOLS = {"import_csv", "recover", "demo", "report", "study", "bench", "train"}
+TOOLS = {"import_csv", "brakings", "recover", "demo", "report", "study", "bench", "train"}
 
 
 @pytest.mark.parametrize("program", sorted(console_scripts()))

@@ -61,6 +61,14 @@ def test_where_the_map_is_thin_or_not_of_now_it_makes_no_train_less_careful(rail
     assert found.mu <= NOTHING.mu
 
 
+def test_a_map_of_a_small_part_of_the_way_ahead_is_thin() -> None:
+    """800 m are looked ahead: what no train showed counts as no braking, so 10 on an eighth of it are one."""
+    part = RailMap(seen(0.10).pieces[10:11])
+    assert told(part).lower <= NOTHING.lower
+    assert told(part).mu <= NOTHING.mu
+    assert NOTHING.lower < told(RailMap(seen(0.10).pieces[10:14])).lower < told(seen(0.10)).lower
+
+
 def test_elsewhere_nothing_is_known_and_the_way_is_looked_along() -> None:
     assert told(seen(0.10), HERE._replace(position_m=9000.0)) == NOTHING
     assert told(seen(0.10), HERE._replace(position_m=3500.0, speed_mps=-40.0)) == NOTHING
