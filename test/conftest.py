@@ -60,6 +60,14 @@ def pytest_configure(config: pytest.Config) -> None:
     set_hypothesis_home_dir(os.path.join(home, "hypothesis"))
     os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    if config.getoption("dist", None) == "load":  # what tests of one file share is made once, and none ends long before
+        config.option.dist = "worksteal"
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Return half as many again as there are cores: tests of nodes wait more than they compute."""
+    return 3 * (os.cpu_count() or 1) // 2
 
 
 @pytest.hookimpl(tryfirst=True)

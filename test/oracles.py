@@ -173,11 +173,11 @@ def literal_pairwise(filter_weights: Array, densities: Array, last: Array) -> tu
     marginals, pairs = [last], list[Array]()
     for t in range(steps - 1, -1, -1):
         pair = np.empty((count, count))
-        for i in range(count):
-            for j in range(count):
-                total = 0.0
-                for m in range(count):
-                    total += filter_weights[t, m] * densities[t, m, j]
+        for j in range(count):
+            total = 0.0
+            for m in range(count):
+                total += filter_weights[t, m] * densities[t, m, j]
+            for i in range(count):
                 pair[i, j] = filter_weights[t, i] * marginals[0][j] * densities[t, i, j] / total
         pairs.insert(0, pair)
         marginals.insert(0, np.array([sum(pair[i]) for i in range(count)]))
@@ -194,9 +194,8 @@ def log_densities(states: Array, motion: Motion, window: Window, mu: float, per_
         slower = v - dt * G * (min(mu, float(window.brake[t])) + specific_resistance(v) + per_mille / 1000.0)
         moved = s + dt * (v + slower) / 2
         std_s, std_v = math.sqrt(motion.position_noise_rate * dt), math.sqrt(motion.speed_noise_rate * dt)
-        for i in range(count):
-            by_s = stats.norm(moved[i], std_s).logpdf(states[0, t + 1])
-            log_density[t, i] = by_s + stats.norm(slower[i], std_v).logpdf(states[1, t + 1])
+        by_s = stats.norm.logpdf(states[0, t + 1], moved[:, np.newaxis], std_s)
+        log_density[t] = by_s + stats.norm.logpdf(states[1, t + 1], slower[:, np.newaxis], std_v)
     return log_density
 
 

@@ -225,7 +225,9 @@ def test_trains_of_one_process_are_all_served(kind: str, monkeypatch: pytest.Mon
 
 
 @pytest.mark.usefixtures("few_windows")
-def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str]) -> None:
+def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a journey of 28 s, 8 s of them braked."""
+    monkeypatch.setattr(step, "journey", lambda rate_hz, rng: islice(scene.journey(rate_hz, rng), round(28 * rate_hz)))
     options = ["step", "memory", "--journeys", "1", "--minutes", "0.5"]
     assert bench.main([*options, "--json", "-"]) == 0
     result = json.loads(capsys.readouterr().out)

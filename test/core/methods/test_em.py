@@ -77,8 +77,8 @@ def _information(window: Window, mu: float) -> float:
 
 
 def _best_mu(window: Window, limit: float = 0.0952) -> float:
-    """Maximum-likelihood mu: the best of a dense grid, polished."""
-    grid = np.linspace(0.0, limit, 400)
+    """Maximum-likelihood mu: the best of a grid, polished between its neighbours."""
+    grid = np.linspace(0.0, limit, 100)
     best = grid[np.argmax([log_likelihood(SEEN, PRIOR, window, mu) for mu in grid])]
     found = minimize_scalar(
         lambda mu: -log_likelihood(SEEN, PRIOR, window, mu),
