@@ -11,26 +11,24 @@ import subprocess
 import sys
 from functools import cache
 from importlib.metadata import packages_distributions
-from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from forked import Call, Ended, ended
 from test_package import console_scripts, names_of, setup_arguments
 
 ON_THE_TRAIN = ("estimator", "creep_estimator", "atp_monitor", "simulator", "slip_simulator")
 DEFAULTS = ROOT / "adhesion_node" / "nodes" / "defaults.yaml"
 
-BARE = """
+REFUSING = """
 import sys
 class Refuse:
     def find_spec(self, name, path=None, target=None):
         if name.partition(".")[0] in {refused}:
             raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
 sys.meta_path.insert(0, Refuse())
-from adhesion_node import main
-sys.exit(main.{program}())
 """
-"""A program where nothing is installed that setup.py has as an extra."""
+"""Nothing is installed that setup.py has as an extra."""
 
 NO_PROGRAM = {"ros", "test", "lint", "docs", "build"}
 """Extras that no program imports, and ROS itself."""
@@ -49,7 +47,8 @@ def refused() -> frozenset[str]:
 def on_bare(program: str, *arguments: str, without: frozenset[str] | None = None) -> subprocess.Popen[str]:
     private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
     environment = {name: value for name, value in os.environ.items() if name not in private}
-    code = BARE.format(refused=set(without or refused()), program=program)
+    code = REFUSING.format(refused=set(without or refused()))
+    code += f"from adhesion_node import main\nsys.exit(main.{program}())"
     command = [sys.executable, "-c", code, *arguments]
     return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
@@ -77,16 +76,27 @@ def test_the_version_is_told_whatever_is_missing(program: str) -> None:
     assert ", adhesion_node " in told
 
 
-@pytest.mark.parametrize("program", sorted(console_scripts().keys() - set(ON_THE_TRAIN)))
-def test_any_other_program_says_what_to_install(program: str, tmp_path: Path) -> None:
-    given = ["--output", str(tmp_path / "run")] if program == "recorder" else ["--help"]
-    with on_bare(program, *given) as process:
-        _, told = process.communicate(timeout=60.0)
+OTHERS = sorted(console_scripts().keys() - set(ON_THE_TRAIN))
+
+
+@pytest.fixture(scope="module")
+def others(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ended]:
+    """How every other program ends there."""
+    first = f"{REFUSING.format(refused=set(refused()))}import adhesion_node.nodes.estimator, sim_node.nodes.simulator"
+    calls: list[Call] = [
+        ([program, *(["--output", "run"] if program == "recorder" else ["--help"])], {}) for program in OTHERS
+    ]
+    return dict(zip(OTHERS, ended(calls, tmp_path_factory.mktemp("bare") / "calls", first), strict=True))
+
+
+@pytest.mark.parametrize("program", OTHERS)
+def test_any_other_program_says_what_to_install(program: str, others: dict[str, Ended]) -> None:
+    told = others[program]
     if program == "bench":
-        assert (process.returncode, told) == (0, "")
+        assert (told.returncode, told.stderr) == (0, "")
     else:
-        assert process.returncode == 2
-        assert re.fullmatch(r"(rosbags|pandas) is missing: pip install '\.\[tools\]'\n", told)
+        assert told.returncode == 2
+        assert re.fullmatch(r"(rosbags|pandas) is missing: pip install '\.\[tools\]'\n", told.stderr)
 
 
 def test_without_the_compiler_it_says_so() -> None:

@@ -4,17 +4,15 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from forked import Ended, ended
 from test_package import NODES, console_scripts
 
 BLOCKED = """
 import re, sys
-from importlib import import_module
 from importlib.abc import MetaPathFinder
 
 class NoRos(MetaPathFinder):
@@ -23,41 +21,49 @@ class NoRos(MetaPathFinder):
             raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
 sys.meta_path.insert(0, NoRos())
-module, function, *sys.argv = sys.argv[1:]
-sys.exit(getattr(import_module(module), function)())
 """
 
+SHARED = "import adhesion_node.report.__main__, adhesion_node.study.__main__, adhesion_node.tools.brakings"
+"""What needs no ROS, and most of what the others import."""
 
-def without_ros(program: str, *args: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-c", BLOCKED, "adhesion_node.main", program, program, *args]
-    return subprocess.run(command, capture_output=True, text=True, timeout=60.0, check=False)
+ARGUMENTS = {"recorder": ["--output", "there"], "replay": [str(ROOT / "bags" / "tunnel_entry")]}
+CALLS = [
+    *([program, "--help"] for program in sorted(console_scripts())),
+    *([program, *ARGUMENTS.get(program, [])] for program in sorted({*NODES, "demo"})),
+]
+
+
+@pytest.fixture(scope="module")
+def without_ros(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ended]:
+    """How each of `CALLS` ends, by its words."""
+    folder = tmp_path_factory.mktemp("calls") / "calls"
+    found = ended([(call, {}) for call in CALLS], folder, f"{BLOCKED}\n{SHARED}")
+    assert not (folder / "there").exists()
+    return {" ".join(call): each for call, each in zip(CALLS, found, strict=True)}
 
 
 @pytest.mark.parametrize("program", sorted(console_scripts()))
-def test_help_needs_no_ros(program: str) -> None:
-    shown = without_ros(program, "--help")
+def test_help_needs_no_ros(program: str, without_ros: dict[str, Ended]) -> None:
+    shown = without_ros[f"{program} --help"]
     assert (shown.returncode, shown.stderr) == (0, "")
     assert shown.stdout.startswith(f"usage: {program}")
     assert "\nexamples:\n" in shown.stdout
 
 
-ARGUMENTS = {"recorder": ["--output", "there"], "replay": [str(ROOT / "bags" / "tunnel_entry")]}
-
-
 @pytest.mark.parametrize("program", sorted({*NODES, "demo"}))
-def test_what_needs_ros_says_how_to_get_it_in_one_line(program: str) -> None:
-    ended = without_ros(program, *ARGUMENTS.get(program, []))
-    assert (ended.returncode, ended.stdout) == (2, "")
-    assert ended.stderr.count("\n") == 1
-    assert ended.stderr.startswith("rclpy is missing: ")
-    assert "source /opt/ros/jazzy/setup.bash" in ended.stderr
-    assert "pip install '.[ros]'" in ended.stderr
-    assert not Path("there").exists()
+def test_what_needs_ros_says_how_to_get_it_in_one_line(program: str, without_ros: dict[str, Ended]) -> None:
+    told = without_ros[" ".join([program, *ARGUMENTS.get(program, [])])]
+    assert (told.returncode, told.stdout) == (2, "")
+    assert told.stderr.count("\n") == 1
+    assert told.stderr.startswith("rclpy is missing: ")
+    assert "source /opt/ros/jazzy/setup.bash" in told.stderr
+    assert "pip install '.[ros]'" in told.stderr
 
 
 def test_an_offline_replay_needs_none(tmp_path: Path) -> None:
     out = tmp_path / "results.csv"
-    ended = without_ros("replay", str(ROOT / "bags" / "tunnel_entry"), "--offline", "--out", str(out))
-    assert ended.returncode == 0, ended.stderr
-    assert "digest" in ended.stdout
+    call = ["replay", str(ROOT / "bags" / "tunnel_entry"), "--offline", "--out", str(out)]
+    (told,) = ended([(call, {})], tmp_path / "calls", BLOCKED)
+    assert told.returncode == 0, told.stderr
+    assert "digest" in told.stdout
     assert len(out.read_text(encoding="utf-8").splitlines()) > 100

@@ -5,14 +5,12 @@
 from __future__ import annotations
 
 import importlib
-import os
 import re
-import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from conftest import ROOT
+from forked import ended
 from test_package import console_scripts
 
 from adhesion_node.study.__main__ import STUDIES
@@ -40,21 +38,6 @@ def test_help_says_the_purpose_and_gives_examples(
     assert all(line.startswith(f"  {called}") for line in examples)
 
 
-def complete(program: str, line: str, folder: Path) -> set[str]:
-    """Return what a shell would offer behind `line`."""
-    asked = {
-        "_ARGCOMPLETE": "1",
-        "_ARGCOMPLETE_STDOUT_FILENAME": str(folder / "answer"),
-        "_ARGCOMPLETE_IFS": "\n",
-        "COMP_LINE": line,
-        "COMP_POINT": str(len(line)),
-    }
-    module, function = console_scripts()[program]
-    code = f"from {module} import {function}; {function}()"
-    subprocess.run([sys.executable, "-c", code], env={**os.environ, **asked}, check=True, timeout=60.0)
-    return {word.strip() for word in (folder / "answer").read_text().splitlines()}
-
-
 COMPLETED = [
     ("study ", set(STUDIES)),
     ("demo --scenario tunnel_e", {"tunnel_entry", "tunnel_exit"}),
@@ -76,11 +59,28 @@ COMPLETED = [
 """Command line up to the <TAB>, and what must be among the offers."""
 
 
+@pytest.fixture(scope="module")
+def offers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
+    """What a shell would offer behind each line."""
+    folder = tmp_path_factory.mktemp("offers")
+    answers = {line: folder / str(number) for number, (line, _) in enumerate(COMPLETED)}
+    asked = {"_ARGCOMPLETE": "1", "_ARGCOMPLETE_IFS": "\n"}
+    calls = [
+        (
+            line.split()[:1],
+            {**asked, "_ARGCOMPLETE_STDOUT_FILENAME": str(answer), "COMP_LINE": line, "COMP_POINT": str(len(line))},
+        )
+        for line, answer in answers.items()
+    ]
+    shared = "import adhesion_node.study.__main__, adhesion_node.tools.brakings, adhesion_node.tools.demo"
+    assert [call.returncode for call in ended(calls, folder / "calls", shared)] == [0] * len(calls)
+    return {line: {word.strip() for word in answer.read_text().splitlines()} for line, answer in answers.items()}
+
+
 @pytest.mark.parametrize(("line", "expected"), COMPLETED)
-def test_a_shell_completes_what_a_program_takes(line: str, expected: set[str], tmp_path: Path) -> None:
-    offered = complete(line.split(maxsplit=1)[0], line, tmp_path)
-    assert offered >= expected
-    assert all(word.startswith(line.rsplit(" ", 1)[1]) for word in offered)
+def test_a_shell_completes_what_a_program_takes(line: str, expected: set[str], offers: dict[str, set[str]]) -> None:
+    assert offers[line] >= expected
+    assert all(word.startswith(line.rsplit(" ", 1)[1]) for word in offers[line])
 
 
 def test_the_documented_command_completes_every_program() -> None:
