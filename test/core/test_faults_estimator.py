@@ -5,7 +5,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -20,12 +19,10 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_srvs.srv import SetBool, Trigger
 from test_estimator_node import FAST, Line
 
 from adhesion_node.nodes.estimator import Estimator
-from adhesion_node.nodes.ros import qos
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.settings import setup_of
@@ -121,57 +118,6 @@ def stamped(message: Any) -> bool:
     return hasattr(message, "header")
 
 
-def test_late_messages_within_the_lag_and_duplicates_give_the_ordered_run(make_line: MakeLine) -> None:
-    lag = {"max_lag_s": 0.5}
-    line = make_line(**lag)
-    late = ticks("late", size=0.3, share=0.3)
-    doubled = [(truth, sent * 2) for truth, sent in late]
-    play(line, doubled)
-    line.estimator.close()
-    line.hear_all()
-    in_order = sorted(flat(late), key=lambda message: message.t_ns)
-    assert in_order != flat(late)
-    assert line.estimator.digest == offline_digest(
-        [(tick[0], (m,)) for tick, m in zip([late[0]] * len(in_order), in_order, strict=True)], **lag
-    )
-    assert int(line.values()["dropped.DUPLICATE"]) == sum(
-        len([m for m in sent if m.topic == topics.POSITION]) for _, sent in late
-    )
-
-
-def test_messages_older_than_the_lag_are_dropped_and_counted(make_line: MakeLine) -> None:
-    line = make_line(max_lag_s=0.1)
-    play(line, ticks("late", size=0.5, share=0.3))
-    line.hear_all()
-    assert int(line.values()["dropped.LATE"]) > 5
-
-
-@pytest.mark.parametrize("fault", ["stamps_back", "stamps_forward"])
-def test_a_jump_of_the_stamps_is_one_reset_and_estimates_come_again(make_line: MakeLine, fault: str) -> None:
-    line = make_line()
-    play(line, ticks(fault, end_s=30.0))
-    line.hear_all()
-    values = line.values()
-    assert values["resets"] == "1"
-    assert int(values["window"]) >= 50
-
-
-def test_a_paused_clock_is_one_reset_and_estimates_come_again(make_line: MakeLine) -> None:
-    """The train brakes on for 13 s without the time moving: ten positions far off, and it is taken to be elsewhere."""
-    line = make_line()
-    run = [
-        (t, tuple(m._replace(t_ns=22 * S) if t.t_ns < 35 * S else m._replace(t_ns=m.t_ns - 13 * S) for m in sent))
-        if t.t_ns >= 22 * S
-        else (t, sent)
-        for t, sent in ticks("none", end_s=45.0)
-    ]
-    play(line, run)
-    line.hear_all()
-    values = line.values()
-    assert values["resets"] == "1"
-    assert int(values["window"]) >= 50
-
-
 @pytest.mark.parametrize(
     ("fault", "remedy"),
     [
@@ -219,115 +165,6 @@ def test_a_stuck_position_is_an_error_and_nothing_is_said_of_mu(make_line: MakeL
     assert len(line.heard[topics.MU]) == len(line.heard[topics.MU_LOWER]) == known
     assert line.heard[topics.BRAKING_CURVE][-1].header.stamp.sec >= 26
     assert_published_is_sound(line)
-
-
-def test_silence_is_stale_within_the_timeout_and_a_tick(make_line: MakeLine) -> None:
-    line = make_line(sensor_timeout_s=0.2)
-    play(line, ticks("none", end_s=17.0))
-    before = line.estimator.published[topics.DIAGNOSTICS]  # a busy machine may have been silent meanwhile, too
-    told = line.heard[topics.DIAGNOSTICS]
-    line.spin_until(line.executor, lambda: len(told) > before and is_stale(line)())
-    first = next(m for m in told[before:] if m.status[0].level == DiagnosticStatus.STALE)
-    assert first.status[0].message.startswith("/position: nothing for 0.2 s: is the sensor alive?")
-    before = line.estimator.published[topics.DIAGNOSTICS]
-    play(line, ticks("none", begin_s=17.2, end_s=18.4))
-    line.hear_all()
-    assert DiagnosticStatus.OK in [message.status[0].level for message in told[before:]]
-    assert_published_is_sound(line)
-
-
-def test_a_sensor_never_heard_is_stale(make_line: MakeLine) -> None:
-    line = make_line(sensor_timeout_s=0.1)
-    line.spin_until(line.executor, is_stale(line))
-    assert "/position or /odometry: nothing received yet, publishers: 2" in last(line).message
-
-
-def test_with_sim_time_silence_is_measured_by_the_clock(make_line: MakeLine) -> None:
-    line = make_line(use_sim_time=True)
-    clock = qos.advertise(line.driver, topics.CLOCK, qos.SENSOR_PUBLISHER)
-    estimator_clock = line.estimator.get_clock()
-
-    def turn_to(t_s: int) -> None:
-        clock.publish(messages.clock(t_s * S))
-        line.spin_until(line.executor, lambda: estimator_clock.now().nanoseconds == t_s * S)
-
-    line.spin_until(line.executor, clock.get_subscription_count)
-    turn_to(100)
-    line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
-    turn_to(107)
-    line.spin_until(line.executor, said(line, "/position: nothing for 7.0 s"))
-
-
-def test_a_second_clock_is_told(make_line: MakeLine) -> None:
-    line = make_line(use_sim_time=True)
-    clocks = [qos.advertise(line.driver, topics.CLOCK, qos.SENSOR_PUBLISHER) for _ in range(2)]
-    line.spin_until(line.executor, lambda: line.estimator.count_publishers("/clock") == 2)
-    for clock in clocks:
-        clock.publish(messages.clock(S))
-    line.spin_until(line.executor, lambda: line.estimator.get_clock().now().nanoseconds == S)
-    play(line, ticks("none", end_s=16.5))
-    line.hear_all()
-    assert "2 publishers of /clock" in last(line).message
-
-
-RELIABLE = {"qos_overrides./position.subscription.reliability": "reliable"}
-
-
-def test_a_publisher_that_offers_too_little_is_told_with_the_remedy(make_line: MakeLine) -> None:
-    line = make_line(**RELIABLE)
-    line.driver.create_publisher(
-        messages.message_class(topics.POSITION),
-        "position",
-        QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
-    )
-    told = said(line, "less reliability", "-p qos_overrides./position.subscription.reliability:=best_effort")
-    line.spin_until(line.executor, told, 1.0)
-
-
-def test_a_subscriber_that_asks_too_much_is_told(make_line: MakeLine) -> None:
-    line = make_line()
-    line.driver.create_subscription(messages.message_class(topics.MU), topics.MU.name, print, qos.LATCHED)
-    line.spin_until(line.executor, said(line, "/adhesion/mu: a subscriber asks for more durability"), 1.0)
-
-
-def test_a_missed_deadline_is_told(make_line: MakeLine) -> None:
-    deadline = {f"qos_overrides./position.{end}.deadline": S // 10 for end in ("subscription", "publisher")}
-    line = make_line(**deadline)
-    line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
-    line.spin_until(line.executor, said(line, "/position: deadline missed"), 1.0)
-
-
-def test_a_publisher_that_shows_no_life_is_told(make_line: MakeLine) -> None:
-    """It promised to assert its liveliness every 0.1 s and does so by publishing only."""
-    promise: dict[str, Any] = {}
-    for end in ("subscription", "publisher"):
-        promise[f"qos_overrides./position.{end}.liveliness"] = "manual_by_topic"
-        promise[f"qos_overrides./position.{end}.liveliness_lease_duration"] = S // 10
-    line = make_line(**promise)
-    line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
-    line.spin_until(line.executor, said(line, "/position: a publisher shows no life, 0 left"), 1.0)
-
-
-def test_a_publisher_that_goes_is_told_and_stands_for_as_long_as_the_silence(make_line: MakeLine) -> None:
-    line = make_line(sensor_timeout_s=0.1)
-    line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
-    line.driver.destroy_publisher(line.outputs[topics.POSITION])
-    line.spin_until(line.executor, said(line, "/position: a publisher has gone, 0 left"), 1.0)
-    line.spin_until(line.executor, said(line, "/position: nothing for 0.1 s", "/position: a publisher has gone"))
-
-
-def test_who_comes_late_gets_no_old_curve(make_line: MakeLine) -> None:
-    """The safe curve lives for 0.1 s here and the nominal one, the control, for its 5 s."""
-    line = make_line(**{"qos_overrides./adhesion/braking_curve.publisher.lifespan": S // 10})
-    play(line, ticks("none", end_s=22.0))
-    line.hear_all()
-    expired = time.monotonic() + 0.2
-    line.spin_until(line.executor, lambda: time.monotonic() > expired)
-    late: dict[topics.Topic, list[Any]] = {topics.BRAKING_CURVE: [], topics.BRAKING_CURVE_NOMINAL: []}
-    for topic, heard in late.items():
-        line.driver.create_subscription(messages.message_class(topic), topic.name, heard.append, qos.LATCHED)
-    line.spin_until(line.executor, lambda: late[topics.BRAKING_CURVE_NOMINAL])
-    assert late[topics.BRAKING_CURVE] == []
 
 
 def test_reset_starts_anew(make_line: MakeLine) -> None:

@@ -8,7 +8,6 @@ import csv
 import re
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -168,110 +167,6 @@ def test_unsorted_rows_are_sorted_on_demand_and_the_option_is_named(importing: I
 def test_a_log_of_speed_and_pressure_alone_is_enough(importing: Import) -> None:
     assert importing(text(ride().drop(columns="position"))) == 0
     assert set(importing.summary["messages"]) == {"/speed", "/brake_pressure"}
-
-
-def kilometre(rows: pd.DataFrame) -> pd.Series[Any]:
-    return 120_000.0 - rows["position"]
-
-
-ODD: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], str, list[str]]] = [
-    ("falling", lambda r: r.assign(position=kilometre(r)), "the positions fall", ["--direction", "down"]),
-    (
-        "falling alone",
-        lambda r: r.assign(position=kilometre(r)).drop(columns="speed"),
-        "the positions fall",
-        ["--direction", "down"],
-    ),
-    ("bar", lambda r: r.assign(brake_pressure=r.brake_pressure / 1e5), "in bar", ["--pressure-unit", "bar"]),
-    ("kPa", lambda r: r.assign(brake_pressure=r.brake_pressure / 1e3), "in kpa", ["--pressure-unit", "kpa"]),
-    (
-        "absolute",
-        lambda r: r.assign(brake_pressure=r.brake_pressure + 1e5),
-        "never falls below 1 bar",
-        ["--pressure-kind", "absolute"],
-    ),
-    ("km/h", lambda r: r.assign(speed=3.6 * r.speed), "0.278 times the speed", ["--speed-unit", "kmh"]),
-    ("km", lambda r: r.assign(position=r.position / 1e3), "0.001 times the speed", ["--position-unit", "km"]),
-    (
-        "km alone",
-        lambda r: r.assign(position=r.position / 1e3).drop(columns="speed"),
-        "creeps at 0.05 m/s",
-        ["--position-unit", "km"],
-    ),
-    (
-        "km/h alone",
-        lambda r: r.assign(speed=3.6 * r.speed).drop(columns="position"),
-        "648 km/h",
-        ["--speed-unit", "kmh"],
-    ),
-    ("ms", lambda r: r.assign(time=1e3 * r.time), "a row every 100 s", ["--time-unit", "ms"]),
-    (
-        "degrees",
-        lambda r: r.assign(position=47.0 + r.position / 111_181.0),
-        "are they degrees",
-        ["--lat", "position", "--lon", "lon"],
-    ),
-    (
-        "degrees alone",
-        lambda r: r.assign(position=47.0 + r.position / 111_181.0).drop(columns="speed"),
-        "are the positions degrees",
-        ["--lat", "position", "--lon", "lon"],
-    ),
-    (
-        "pipe",
-        lambda r: r.assign(brake_pressure=5e5 - r.brake_pressure / 2),
-        "5.0 bar while the train runs",
-        ["--pipe", "brake_pressure"],
-    ),
-]
-
-
-@pytest.mark.parametrize(("spoil", "said", "cure"), [case[1:] for case in ODD], ids=[case[0] for case in ODD])
-def test_what_is_odd_is_said_with_the_option_that_cures_it(
-    importing: Import, tmp_path: Path, spoil: Callable[[pd.DataFrame], pd.DataFrame], said: str, cure: list[str]
-) -> None:
-    log = text(spoil(ride().assign(lon=8.0)))
-    assert importing(log) == 1
-    (odd,) = [line for line in importing.errors if "odd: " in line and said in line]
-    assert importing.summary["odd"] == [odd.removeprefix("import_csv: odd: ")]
-    for option in cure[::2]:
-        assert option in odd
-    importing.output = tmp_path / "cured"
-    assert importing(log, *cure) == 0, importing.errors
-
-
-def test_the_speed_of_a_step_of_the_clock_is_said(importing: Import) -> None:
-    rows = ride()
-    rows.loc[rows.time > 10.0, "time"] += 3600.0
-    assert importing(text(rows)) == 1
-    assert "the clock goes on by 3600 s at 10 s and the train does not" in importing.errors[0]
-    late = ride()
-    late.loc[late.time > 10.0, "time"] -= 5.0
-    importing.output = importing.output.with_name("back")
-    assert importing(text(late)) == 1
-    assert "the clock was set back" in importing.errors[0]
-
-
-def test_there_and_back_is_said(importing: Import) -> None:
-    there = ride()
-    back = there.assign(time=there.time + 60.0, position=there.position.iloc[-1] - there.position + 1000.0)
-    assert importing(text(pd.concat([there, back]))) == 1
-    assert "the positions rise and fall: cut the log" in importing.errors[0]
-    assert len(importing.errors) == 1, "their speed is right all the same"
-
-
-def test_a_train_that_stands_for_long_is_not_odd(importing: Import) -> None:
-    rows = ride(82)
-    stands = pd.DataFrame({"time": 90.0 + np.arange(6000) / 10.0})
-    noise = np.random.default_rng(1).normal(0.0, 1.0, len(stands))
-    stands = stands.assign(position=rows.position.iloc[-1] + noise, speed=0.0, brake_pressure=3e5)
-    assert importing(text(pd.concat([rows, stands]))) == 0, importing.errors
-
-
-def test_a_stop_of_ten_minutes_without_rows_is_no_step_of_the_clock(importing: Import) -> None:
-    rows = ride(89)
-    rows = pd.concat([rows, ride().assign(time=rows.time + 700.0, position=rows.position.iloc[-1] + ride().position)])
-    assert importing(text(rows)) == 0, importing.errors
 
 
 def test_the_chainage_is_turned_and_that_is_said(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:

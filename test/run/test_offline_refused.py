@@ -1,0 +1,165 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Recordings and command lines that the offline replay cannot use: told in one line, with the remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cdrs
+import pytest
+from test_offline import (
+    FAST_CONFIG,
+    KEYS,
+    NO_TRUTH,
+    START_NS,
+    Offline,
+    bag,
+    in_frame,
+    offline,
+    samples,
+    straight,
+    write_run,
+)
+
+from adhesion_node.bag import deserialize, serialize
+from adhesion_node.nodes import replay
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, Topic
+
+__all__ = ["bag", "offline"]
+
+
+def test_a_falling_chainage_is_run_as_a_rising_one_or_told(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    def mirrored(topic: Topic, _index: int, cdr: bytes) -> bytes:
+        if topic is not POSITION:
+            return cdr
+        message = deserialize(cdr, topic.type)
+        message.pose.pose.position.x *= -1.0
+        return serialize(message, topic.type)
+
+    write_run(tmp_path / "down", samples(), edit=mirrored)
+    rows = tmp_path / "rows.csv"
+    down = offline(tmp_path / "down", "--set", "direction=down", "--out", str(rows))
+    assert down.result["digest"] == offline(bag).result["digest"]
+    assert "back_m" not in down.result
+    assert float(rows.read_text().splitlines()[-1].split(",")[1]) < -1000.0, "the chainage, as it was given"
+    unannounced = offline(tmp_path / "down")
+    assert unannounced.result["back_m"] > 500.0
+    assert any("set direction to what the chainage does along the run" in line for line in unannounced.err)
+
+
+def test_a_wrong_frame_is_counted_or_accepted_by_name(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    write_run(tmp_path / "map", samples(), edit=lambda topic, _, cdr: in_map(topic, cdr))
+    code, result, *_ = offline(tmp_path / "map", "--set", "frame=map")
+    assert (code, result["dropped"]) == (0, {})
+    assert result["digest"] == offline(bag).result["digest"]
+    code, result, *_ = offline(tmp_path / "map")
+    assert code == 1
+    assert result["dropped"] == {"WRONG_FRAME": 180}
+    assert (result["measurements"], result["accepted"]) == (180, 0)
+
+
+def in_map(topic: Topic, cdr: bytes) -> bytes:
+    return in_frame("map", cdr, topic) if topic in (POSITION, BRAKE_PRESSURE) else cdr
+
+
+def test_a_few_bad_messages_are_counted_and_change_nothing(tmp_path: Path, offline: Offline) -> None:
+    """As if they were not there: NaN, a negative variance, another frame, a gauge pressure."""
+
+    def spoil(topic: Topic, index: int, cdr: bytes) -> bytes:
+        t_ns = START_NS + samples_[index][0].t_ns
+        if topic is POSITION and index == 20:
+            return cdrs.position(t_ns, float("nan"), 0.25)
+        if topic is POSITION and index in (40, 41):
+            return cdrs.position(t_ns, 1.0, -1.0)
+        if topic is POSITION and index == 60:
+            return in_frame("", cdr, topic)
+        if topic is BRAKE_PRESSURE and index == 10:
+            return cdrs.brake_pressure(t_ns, 0.0)
+        return cdr
+
+    samples_ = samples()
+    write_run(tmp_path / "spoilt", samples_, edit=spoil)
+    result = offline(tmp_path / "spoilt").result
+    reasons = {"NOT_FINITE": 1, "BAD_VARIANCE": 2, "WRONG_FRAME": 1, "IMPLAUSIBLE_PRESSURE": 1}
+    assert result["dropped"] == reasons
+    assert (result["measurements"], result["accepted"]) == (180, 176)
+    kept = [sample for index, sample in enumerate(samples_) if index not in (20, 40, 41, 60)]
+    assert result["mu_final"] == straight(kept, FAST_CONFIG)[-1].mu
+
+
+def test_a_bag_without_any_estimate_has_failed(tmp_path: Path, offline: Offline) -> None:
+    def no_variance(topic: Topic, _: int, cdr: bytes) -> bytes:
+        return cdrs.position(START_NS, 1.0, -1.0) if topic is POSITION else cdr
+
+    write_run(tmp_path / "bad", samples()[:20], edit=no_variance)
+    code, result, _, err = offline(tmp_path / "bad")
+    dropped, why = err
+    assert dropped.startswith("replay: 20 messages were dropped: BAD_VARIANCE: ")
+    assert (code, why) == (1, f"replay: nothing is identified: {result['why']}")
+    assert result["why"] == "no estimate came of it; see what was dropped, and why"
+    assert set(result) == KEYS | {"why"}
+    assert (result["measurements"], result["accepted"], result["dropped"]) == (20, 0, {"BAD_VARIANCE": 20})
+    assert [result[key] for key in ("mu_final", "mu_lower_final", "regime_final", "windows")] == [None, None, None, 0]
+
+
+def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offline) -> None:
+    write_run(tmp_path / "other", samples()[:3], names={POSITION: "/gnss/position", **NO_TRUTH})
+    code, result, out, (line,) = offline(tmp_path / "other")
+    assert (code, result, out) == (2, None, "")
+    assert "topic position: not in the recording. It holds: /brake_pressure (" in line
+    assert line.endswith("for instance --remap /gnss/position:=position")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--set", "windw=40"], "setting 'windw=40': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
+        (["--set", "window=forty"], "setting window = 'forty': give a value of type int"),
+        (["--set", "window=2"], "window = 2: give a value from 3 to 10000"),
+        (["--set", "window=10"], "step = 10: choose less than the window, 10"),
+        (["--set", "train.mass_kg=nan"], "train.mass_kg = nan: give a value from 1000 to 1e+08 kg"),
+        (["--set", "low_adhesion=ice"], "low_adhesion = 'ice': choose one of "),
+        (["--set", "track=tunnel 0"], "track section 'tunnel 0': write 'grade START END RISE'"),
+        (["--seed", "-1"], "seed = -1: give "),
+        (["--seed", "3000000000"], "seed = 3000000000: give "),
+        (["--remap", "position"], "remap = 'position': write FROM:=TO"),
+        (["--remap", "/nothing:=position"], "remap from /nothing: not in the recording. It holds: "),
+        (["--topics", "wheel_speed"], "topic wheel_speed: not in the recording"),
+        (["--params", "/nowhere/params.yaml"], "params = /nowhere/params.yaml: not a readable ROS parameter file"),
+    ],
+)
+def test_bad_input_is_one_line_and_code_2(bag: Path, options: list[str], message: str, offline: Offline) -> None:
+    code, result, out, (line,) = offline(bag, *options)
+    assert (code, result, out) == (2, None, "")
+    assert line.startswith("replay: ")
+    assert message in line
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (None, "does not exist: name a rosbag2 directory or an .mcap file"),
+        (b"", "is empty: name another recording"),
+        (b"garbage", "is not an MCAP file: name another recording"),
+        (b"\x89MCAP0\r\n", "holds no readable message ("),
+    ],
+)
+def test_an_unreadable_bag_is_one_line_and_code_2(
+    content: bytes | None, message: str, tmp_path: Path, offline: Offline
+) -> None:
+    if content is not None:
+        (tmp_path / "x.mcap").write_bytes(content)
+    code, result, out, (line,) = offline(tmp_path / "x.mcap")
+    assert (code, result, out) == (2, None, "")
+    assert line.startswith("replay: ")
+    assert "x.mcap" in line
+    assert message in line
+
+
+def test_bad_usage_ends_with_code_2(bag: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    for arguments in (["--offline"], [str(bag), "--offline", "--nothing"], [str(bag), "--offline", "--seed", "one"]):
+        with pytest.raises(SystemExit) as ended:
+            replay.main(arguments)
+        assert ended.value.code == 2
+    assert "Traceback" not in capfd.readouterr().err

@@ -1,0 +1,118 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Settings of the offline replay: from its options and from a parameter file as ROS reads it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from test_offline import FAST, FAST_CONFIG, FAST_SETTINGS, Offline, bag, offline, samples, straight
+
+from adhesion_node.wire.settings import setup_of
+
+__all__ = ["bag", "offline"]
+
+
+def test_the_seed_changes_the_result(bag: Path, offline: Offline) -> None:
+    one, two, again = (offline(bag, "--seed", seed).result for seed in ("1", "2", "1"))
+    assert one["digest"] == again["digest"] == offline(bag).result["digest"] != two["digest"]
+    assert two["mu_final"] == straight(samples(), FAST_CONFIG, 2)[-1].mu
+
+
+def test_a_setting_is_used(bag: Path, offline: Offline) -> None:
+    config = setup_of({**FAST, "window": 40}).config
+    shorter = offline(bag, "--set", "window=40").result
+    assert shorter["mu_final"] == straight(samples(), config)[-1].mu != straight(samples(), FAST_CONFIG)[-1].mu
+    rougher = offline(bag, "--set", "window=40", "--set", "train.resistance_c0=5.79").result
+    # 5 N/kN more of the same braking are not the adhesion's; the few iterations leave some of the start in both.
+    assert 0.003 < shorter["mu_final"] - rougher["mu_final"] < 0.007
+
+
+PARAMS = """
+{name}:
+  ros__parameters:
+    method: particle_em
+    step: 10
+    iterations: 3
+    particles: 10
+    confidence: 0.9
+    seed: 7
+    train:
+      mass_kg: 500000
+"""
+
+SAME_AS_PARAMS = [*FAST_SETTINGS, "--set=confidence=0.9", "--set=train.mass_kg=500000", "--seed=7"]
+
+
+@pytest.mark.parametrize("name", ["estimator", "/estimator", "/**"])
+def test_a_parameter_file_is_used(name: str, tmp_path: Path, bag: Path, offline: Offline) -> None:
+    file = tmp_path / "params.yaml"
+    file.write_text(PARAMS.format(name=name))
+    assert (
+        offline(bag, "--params", str(file), fast=False).result["digest"]
+        == offline(bag, *SAME_AS_PARAMS, fast=False).result["digest"]
+    )
+
+
+def test_the_nearer_setting_wins(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    """Those of the node before those of all nodes, --set before the file, --seed before all."""
+    file = tmp_path / "params.yaml"
+    everyone = PARAMS.format(name="/**").replace("0.9", "0.6").replace("7", "8")
+    file.write_text(everyone + PARAMS.format(name="estimator").replace("7", "9").replace("iterations: 3", ""))
+    options = ["--params", str(file), "--seed", "7"]
+    same = offline(bag, *SAME_AS_PARAMS, fast=False).result["digest"]
+    assert offline(bag, *options, fast=False).result["digest"] == same
+    low = offline(bag, *options, "--set", "confidence=0.6", fast=False).result
+    assert low["digest"] != same
+    assert low["mu_lower_final"] > offline(bag, *options, fast=False).result["mu_lower_final"]
+
+
+def test_other_nodes_in_the_parameter_file_are_left_alone(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    file = tmp_path / "params.yaml"
+    file.write_text(PARAMS.format(name="estimator") + "simulator:\n  ros__parameters:\n    scenario: cruise\n")
+    assert offline(bag, "--params", str(file), fast=False).code == 0
+
+
+@pytest.mark.parametrize("name", ["estimator", "/**"])
+def test_what_every_ros_node_understands_may_stand_in_the_file(
+    name: str, tmp_path: Path, bag: Path, offline: Offline
+) -> None:
+    """The file of a live estimator: it follows /clock and subscribes reliably."""
+    file = tmp_path / "params.yaml"
+    file.write_text(
+        PARAMS.format(name=name)
+        + "    use_sim_time: true\n"
+        + "    qos_overrides:\n      /position:\n        subscription:\n          reliability: reliable\n"
+    )
+    code, result, _, err = offline(bag, "--params", str(file), fast=False)
+    assert (code, err) == (0, [])
+    assert result["digest"] == offline(bag, *SAME_AS_PARAMS, fast=False).result["digest"]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "not a readable ROS parameter file"),
+        ("a: [1", "not a readable ROS parameter file"),
+        ("5", "not a readable ROS parameter file"),
+        ("estimator:\n  window: 40\n", "not a readable ROS parameter file"),
+        ("simulator:\n  ros__parameters:\n    seed: 1\n", "has simulator: name the node 'estimator' or '/**'"),
+        ("estimator:\n  ros__parameters:\n    windw: 40\n", "setting windw = 40: there is none; choose of "),
+        ("estimator:\n  ros__parameters:\n    window: forty\n", "window = 'forty': give a value of type int"),
+        ("estimator:\n  ros__parameters:\n    window: 2\n", "window = 2: give a value from 3 to 10000"),
+        ("estimator:\n  ros__parameters:\n    seed: one\n", "seed = 'one': give "),
+        ("estimator:\n  ros__parameters:\n    seed: 1.5\n", "seed = 1.5: give "),
+        ("estimator:\n  ros__parameters:\n    frame: 5\n", "frame = 5: give "),
+        ("estimator:\n  ros__parameters:\n", "params = "),  # refused by ROS, too
+        ("estimator:\n  ros__parameters: 5\n", "params = "),
+        ("estimator:\n  ros__parameters: [1, 2]\n", "params = "),
+    ],
+)
+def test_a_bad_parameter_file_is_one_line_and_code_2(
+    text: str, message: str, tmp_path: Path, bag: Path, offline: Offline
+) -> None:
+    (tmp_path / "params.yaml").write_text(text)
+    code, _, out, (line,) = offline(bag, "--params", str(tmp_path / "params.yaml"), fast=False)
+    assert (code, out) == (2, "")
+    assert message in line
