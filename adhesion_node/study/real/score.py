@@ -17,7 +17,7 @@ where at least half of the axle groups slid within the last 3 s, the *brake* whe
   behind the last rise of the rail, which is as unseen;
 - regimes: where adhesion limits, the shares that claim each; where the brake does, the share that claims that adhesion
   limits; `regime_wrong` where either claims the other, among both. COASTING claims nothing;
-- false changes: told while the rail had no border within 5 s, per hour;
+- false changes: told while no border of the rail that was not told yet lay 15 s behind or 5 s ahead at most, per hour;
 - speed: its rms error, and the share beyond 3 of its own standard deviations;
 - silence: longest time without an estimate from the first one on, and under the brake;
 - found: from a fall of the rail until mu is again within 20 % of used; 0 where it never left it.
@@ -45,7 +45,7 @@ AFTER_SHARE = 0.25
 TOLERANCE_M = 5.0
 LONG_WAY_M = 100.0
 UNSEEN_S = 2.0
-NEAR_S = 5.0
+EARLY_S, LATE_S = 5.0, 15.0  # twice what positions alone need
 FOUND_SHARE = 0.2
 MANY_STD = 3.0
 
@@ -171,13 +171,18 @@ def _curves(braked: Rows, borders: NDArray[np.void]) -> dict[str, float | None]:
 
 
 def _false_changes(found: Found) -> int:
-    """Changes of the rail that were told under the brake while it had none nearby."""
+    """Changes of the rail that were told under the brake and are those of no border; of one border is one told."""
     (run,), rows = found.runs, found.rows
     told = np.maximum(np.diff(rows["changes"], prepend=rows["changes"][:1]), 0)
-    near = np.zeros(rows.size, np.bool_)
-    for border in found.borders:
-        near |= (rows["t_s"] >= border["start_s"] - NEAR_S) & (rows["t_s"] <= border["end_s"] + NEAR_S)
-    return int(told[(rows["t_s"] >= run["full_s"]) & (rows["t_s"] < run["slow_s"]) & ~near].sum())
+    braked = (rows["t_s"] >= run["full_s"]) & (rows["t_s"] < run["slow_s"])
+    untold, false = sorted((border["start_s"], border["end_s"]) for border in found.borders), 0
+    for t_s in np.repeat(rows["t_s"][braked], told[braked]):
+        untold = [border for border in untold if border[1] + LATE_S >= t_s]
+        if untold and untold[0][0] - EARLY_S <= t_s:
+            del untold[0]
+        else:
+            false += 1
+    return false
 
 
 def _silences(run: NDArray[np.void], out_s: Array) -> tuple[float, float]:

@@ -143,10 +143,15 @@ def test_regimes_are_wrong_where_they_claim_the_other_one() -> None:
     assert one["regime_wrong"] == pytest.approx(8 / 34)
 
 
-def test_a_change_is_false_where_the_rail_has_no_border_near() -> None:
+@pytest.mark.parametrize(
+    ("borders", "false"),
+    [((), 2), ((30.0,), 1), ((19.0,), 1), ((19.0, 30.0), 0), ((4.0,), 2), ((6.0,), 1), ((33.0, 34.0), 1), ((25.0,), 1)],
+)
+def test_a_change_is_false_that_is_none_of_a_border_near(borders: tuple[float, ...], false: int) -> None:
+    """The changes at 5 and 62 s are told while there is no brake; one border is no excuse for two changes."""
     told: dict[str, Any] = {"changes": lambda t: np.searchsorted([5.0, 20.0, 34.5, 62.0], t)}
-    assert of_run(found(**told))["false_changes_per_hour"] == pytest.approx(2 * 72.0)
-    assert of_run(found(borders=((30.0, 30.0, 1.5),), **told))["false_changes_per_hour"] == pytest.approx(72.0)
+    one = of_run(found(borders=tuple((at, at, 1.5) for at in borders), **told))
+    assert one["false_changes_per_hour"] == pytest.approx(false * 72.0)
 
 
 def test_the_speed_is_judged_by_its_own_deviation() -> None:
