@@ -131,9 +131,9 @@ class ExactEStep(NamedTuple):
     prior: Gaussian
     window: Window
 
-    def __call__(self, mu: Array) -> Expectation:
+    def __call__(self, mu: float) -> Expectation:
         """Statistics of Q from the exact smoother of this one window."""
-        exact = rts(self.model, self.prior, self.window, float(mu[0]))
+        exact = rts(self.model, self.prior, self.window, mu)
         used, weight = [], []
         for k in range(self.window.steps):
             dt = float(self.window.dt_s[k])
@@ -142,8 +142,7 @@ class ExactEStep(NamedTuple):
             precision = np.linalg.inv(self.model.noise(dt))
             weight.append(per_mu @ precision @ per_mu)
             used.append(per_mu @ precision @ moved / weight[-1])
-        likelihood, ess = np.array([exact.log_likelihood]), np.array([math.inf])
-        return Expectation(np.array([used]), np.array([weight]), self.window.brake[None], likelihood, ess)
+        return Expectation(np.array((used, weight, self.window.brake)), exact.log_likelihood, math.inf)
 
 
 def make_window(

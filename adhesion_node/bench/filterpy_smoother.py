@@ -50,12 +50,11 @@ def rts_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> La
 
 def em(scene: Scene, start: float, iterations: int, tolerance: float) -> Update:
     """EM with `rts_window` as its E-step; stops when mu moves no more than the tolerance."""
-    windows = scene.windows
     mu, moved, done, laws = start, np.inf, 0, Laws(np.empty(0), np.empty(0))
     while done < iterations and moved > tolerance:
         laws = rts_window(*scene, mu)
         # Of laws this narrow the means are enough: one particle.
-        mu, before = maximised(scene.motion, windows, laws.mean.T[:, :, None], np.ones((len(laws.mean), 1)), mu), mu
+        mu, before = maximised(scene, laws.mean.T[:, :, None], np.ones((len(laws.mean), 1)), mu), mu
         moved, done = abs(mu - before), done + 1
     return Update(mu, laws.mean[:, 1], done)
 

@@ -29,7 +29,7 @@ def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, An
     rng = np.random.default_rng(seed)
     scene = braking_window(steps, rng)
     contenders = (
-        Contender(OURS, partial(_ours, ParticleEStep(scene.motion, count, scene.windows, [rng])), rounds),
+        Contender(OURS, partial(_ours, ParticleEStep(scene.motion, count, scene.prior, scene.window, rng)), rounds),
         Contender(MCMC, partial(_sampled, scene, count, particles_smoother.mcmc), rounds),
         Contender(EXACT, partial(_sampled, scene, count, particles_smoother.exact), math.ceil(rounds / SLOW)),
     )
@@ -38,15 +38,14 @@ def compare(steps: int, count: int, rounds: int, seed: int) -> list[dict[str, An
 
 
 def _ours(e_step: ParticleEStep) -> Update:
-    expected = e_step(np.array([MU]))
-    speed = np.einsum("krn,krn->k", e_step.smoother.marginal, e_step.filter.states[1])
-    return Update(float(maximise(expected, np.zeros(1))[0]), speed)
+    mu = maximise(e_step(MU), 0.0)
+    return Update(mu, np.einsum("kn,kn->k", e_step.marginal, e_step.filter.particles.states[1]))
 
 
 def _sampled(scene: Scene, count: int, smoother: Callable[[Scene, float, int], Array]) -> Update:
     states = np.moveaxis(smoother(scene, MU, count), 2, 0)
     return Update(
-        maximised(scene.motion, scene.windows, states, np.full(states.shape[1:], 1.0 / count), MU),
+        maximised(scene, states, np.full(states.shape[1:], 1.0 / count), MU),
         states[1].mean(axis=1),
     )
 

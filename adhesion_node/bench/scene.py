@@ -15,9 +15,9 @@ from ..core.belief.gaussian import Gaussian
 from ..core.belief.window import Window
 from ..core.config import Config
 from ..core.intake.samples import PositionSample, PressureSample
-from ..core.methods.particle_em.em import expectation, maximise
-from ..core.methods.particle_em.particles import Particles
-from ..core.methods.particle_em.windows import Windows, stack
+from ..core.methods.kernels import filtering
+from ..core.methods.kernels.filtering import Particles
+from ..core.methods.particle_em.particles import given
 from ..core.physics.adhesion import WET
 from ..core.physics.motion import Motion
 from ..core.physics.train import GRAVITY, KMH, Array, Train
@@ -40,11 +40,6 @@ class Scene(NamedTuple):
     prior: Gaussian
     window: Window
 
-    @property
-    def windows(self) -> Windows:
-        """The window, side by side with no other."""
-        return stack([self.prior], [self.window])
-
 
 class Update(NamedTuple):
     """What a contender finds in a window."""
@@ -55,13 +50,13 @@ class Update(NamedTuple):
     iterations: int = 1
 
 
-def maximised(motion: Motion, windows: Windows, states: Array, marginal: Array, mu: float) -> float:
+def maximised(scene: Scene, states: Array, marginal: Array, mu: float) -> float:
     """M-step with what a peer smoothed at `mu`: particles, (2, K + 1, N), and their weights, (K + 1, N)."""
-    places, unknown = states[:, :, None, :], np.zeros(1)
-    stepped = np.stack(motion.advance(places[0, :-1], places[1, :-1], windows.dt_s, windows.brake, mu))
-    particles = Particles(places, stepped, np.zeros(places.shape[1:]), unknown, unknown)
-    expected = expectation(motion, windows, np.array([mu]), particles, marginal[:, None, :])
-    return float(maximise(expected, np.zeros(1))[0])
+    states, window = np.ascontiguousarray(states), scene.window
+    stepped = scene.motion.advance(states[0, :-1], states[1, :-1], window.dt_s[:, None], window.brake[:, None], mu)
+    particles = Particles(states, np.array(stepped), np.zeros(marginal.shape))
+    statistics = filtering.reduced(given(*scene), mu, particles, np.ascontiguousarray(marginal))
+    return filtering.maximised(statistics, 0.0)
 
 
 def braking_window(steps: int, rng: np.random.Generator) -> Scene:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import pickle
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
@@ -25,8 +25,8 @@ from adhesion_node.core import Config, Measurement, Outcome
 from adhesion_node.core.intake import stream
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample
 from adhesion_node.core.methods.particle_em import method as particle_em
-from adhesion_node.core.methods.particle_em.method import ParticleWindow, evaluate
-from adhesion_node.core.methods.protocol import Context, MethodWindow, Verdict
+from adhesion_node.core.methods.particle_em.em import EStep, Identified, Search, identify
+from adhesion_node.core.methods.protocol import MethodWindow
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
@@ -309,11 +309,11 @@ def test_a_flood_takes_bounded_memory_and_work(stamps: str, pressures: bool, mon
     """No more windows than the accepted measurements allow, no more in memory than the inbox may hold."""
     evaluations = Counter[str]()
 
-    def counted(config: Config, windows: Sequence[ParticleWindow], contexts: Sequence[Context]) -> list[Verdict]:
+    def counted(e_step: EStep, search: Search) -> Identified:
         evaluations["done"] += 1
-        return evaluate(config, windows, contexts)
+        return identify(e_step, search)
 
-    monkeypatch.setattr(particle_em, "evaluate", counted)
+    monkeypatch.setattr(particle_em, "identify", counted)
     monkeypatch.setattr(stream, "MOST", 500)
     pipeline = Pipeline(Config(method="particle_em", iterations=1, particles=2, window=30, step=20), 1)
     rng = np.random.default_rng(1)

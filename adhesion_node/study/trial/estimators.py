@@ -14,7 +14,6 @@ from ...core import Config, Estimate, finish, init, step
 from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
 from ..baselines.ekf import TUNED, EkfState, Tuning, ekf_step
-from . import lockstep
 from .world import Refusal, Sent, SimulatedRun
 
 EXACT = Config(
@@ -64,7 +63,7 @@ class LaneResults(NamedTuple):
 
     results: list[LaneResult]
     window_ms: list[float]
-    """Time per window, all included, or per estimate without windows: of each lane, or of a moment's windows."""
+    """Time per window, all included, or per estimate without windows: of each lane."""
 
 
 class Estimator(NamedTuple):
@@ -157,13 +156,6 @@ def _one_by_one(run: Callable[[Estimator, Lane], LaneResult]) -> Callable[[Estim
     return tried
 
 
-def _in_lockstep(estimator: Estimator, lanes: Sequence[Lane]) -> LaneResults:
-    """All lanes side by side through the core, their windows evaluated together."""
-    window_ms = list[float]()
-    runs = [lockstep.Run(estimator.config_in(lane), estimator.seed_in(lane), lane.run.measurements) for lane in lanes]
-    return LaneResults([_estimated(estimates) for estimates in lockstep.drive(runs, window_ms)], window_ms)
-
-
 class Way(NamedTuple):
     """How an estimator runs through its lanes."""
 
@@ -171,13 +163,12 @@ class Way(NamedTuple):
     weight: float
     """Work of a lane, in that of a Kalman filter, about."""
     lanes: int = 200
-    """In a task; side by side so many still stand in a processor's cache."""
+    """In a task."""
 
 
 WAYS: Mapping[str, Way] = {
     "pipeline": Way(_one_by_one(_by_pipeline), 8.0, 10),
     "core": Way(_one_by_one(_by_core), 6.0),
     "ekf": Way(_one_by_one(_by_ekf), 1.0),
-    "lockstep": Way(_in_lockstep, 12.0),
 }
 """By name."""

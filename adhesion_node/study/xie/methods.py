@@ -25,7 +25,7 @@ PAPER = replace(EXACT, method="particle_em", window=50, step=10, particles=20, i
 METHODS: Mapping[str, Estimator] = {
     "bank": Estimator(replace(PAPER, method="bank", law_probability=Config().law_probability), "core"),
     "rail_condition": Estimator(replace(PAPER, method="rail_condition"), "core"),
-    "particle_em": Estimator(PAPER, "lockstep"),
+    "particle_em": Estimator(PAPER, "core"),
     "ekf_tuned": Estimator(PAPER, "ekf", TUNED),
     "ekf_naive": Estimator(PAPER, "ekf", NAIVE),
 }

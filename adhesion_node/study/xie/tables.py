@@ -7,7 +7,7 @@ the mean of abs(mu - true mu) over all estimates while adhesion limits, after th
 the speed at which the error, averaged over the runs, first falls below 5 %; `coverage95` the share of estimates within
 1.96 of their own standard deviations; `bound_ratio` the mean relative error over that of an estimator at the bound of
 `study bound`. The estimators know the track. `seconds` is the computing time of the scenario's runs from all starts
-in one process, `ms_per_window` that of a window among the others of its batch.
+in one process, `ms_per_window` that of a window with the measurements between two.
 """
 
 import argparse

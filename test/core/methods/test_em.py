@@ -5,9 +5,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -35,8 +34,7 @@ from adhesion_node.core.methods.particle_em.em import (
     identify,
     maximise,
 )
-from adhesion_node.core.methods.particle_em.kalman import filter_windows
-from adhesion_node.core.methods.particle_em.windows import Windows, stack
+from adhesion_node.core.methods.particle_em.kalman import filter_window
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL, Grade, Track
 from adhesion_node.core.physics.train import CRH3
@@ -51,29 +49,19 @@ def _window(mu: float = 0.06, seed: int = 10, brake: float = 0.0952) -> Window:
 
 
 def _exact(window: Window, mu: float) -> Expectation:
-    return ExactEStep(SEEN, PRIOR, window)(np.array([mu]))
+    return ExactEStep(SEEN, PRIOR, window)(mu)
 
 
 def _particles(motion: Motion, window: Window, count: int, seed: int = 0) -> ParticleEStep:
-    return ParticleEStep(motion, count, stack([PRIOR], [window]), [np.random.default_rng(seed)])
+    return ParticleEStep(motion, count, PRIOR, window, np.random.default_rng(seed))
 
 
 def _expected(used: ArrayLike, weight: ArrayLike, limit: ArrayLike) -> Expectation:
-    return Expectation(np.array([used]), np.array([weight]), np.array([limit]), np.zeros(1), np.zeros(1))
-
-
-def _maximum(expected: Expectation, lowest: float = 0.0) -> float:
-    (mu,) = maximise(expected, np.array([lowest]))
-    return float(mu)
-
-
-def _slope(expected: Expectation, mu: float) -> float:
-    (slope,) = gradient(expected, np.array([mu]))
-    return float(slope)
+    return Expectation(np.array((used, weight, limit)), 0.0, 0.0)
 
 
 def _information(window: Window, mu: float) -> float:
-    return float(filter_windows(SEEN.motion, stack([PRIOR], [window]), np.array([mu])).information[0])
+    return filter_window(SEEN.motion, PRIOR, window, mu).information
 
 
 def _best_mu(window: Window, limit: float = 0.0952) -> float:
@@ -96,9 +84,8 @@ def test_gradient_29_to_32_is_the_slope_of_i2(mu: float, track: Track) -> None:
     motion, h = Motion(CRH3, track, 0.05, 0.1), 1e-6
     window = replace(_window(), brake=np.linspace(0.04, 0.0952, 30), dt_s=np.linspace(0.05, 0.2, 30))
     e_step = _particles(motion, window, 15)
-    slope = _slope(e_step(np.array([0.05])), mu)
-    particles = e_step.filter
-    states, log_weights = particles.states[:, :, 0], particles.log_weights[:, 0]
+    slope = gradient(e_step(0.05), mu)
+    states, _, log_weights = e_step.filter.particles
     weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
     grade = 1.0 if track.sections else 0.0
     logs = [log_densities(states, motion, window, m, grade) for m in (0.05, mu - h, mu + h)]
@@ -111,23 +98,23 @@ def test_gradient_29_to_32_is_the_slope_of_i2(mu: float, track: Track) -> None:
 
 def test_gradient_by_hand() -> None:
     expected = _expected([0.05, 0.09], [2e4, 1e4], [0.08, 0.10])
-    assert _slope(expected, 0.06) == pytest.approx(2e4 * -0.01 + 1e4 * 0.03)
-    assert _slope(expected, 0.085) == pytest.approx(1e4 * 0.005)  # the first step is at its brake's limit
-    assert _slope(expected, 0.11) == 0.0
+    assert gradient(expected, 0.06) == pytest.approx(2e4 * -0.01 + 1e4 * 0.03)
+    assert gradient(expected, 0.085) == pytest.approx(1e4 * 0.005)  # the first step is at its brake's limit
+    assert gradient(expected, 0.11) == 0.0
 
 
 def test_weight_is_the_information_of_a_step() -> None:
     window = _window()
     expected = _exact(window, 0.05)
     # T = 0.1: (9.8 T)^2/(q_v T) + (9.8 T^2/2)^2/(q_s T) = 0.9604/2e-4 + 0.002401/1e-5 = 4802 + 240.1
-    assert expected.weight == pytest.approx(np.full((1, 30), 5042.1))
-    ours = _particles(SEEN.motion, window, 5)(np.array([0.05]))
+    assert expected.weight == pytest.approx(np.full(30, 5042.1))
+    ours = _particles(SEEN.motion, window, 5)(0.05)
     assert ours.weight == pytest.approx(expected.weight)
-    assert ours.limit == pytest.approx(window.brake[None])
+    assert ours.limit == pytest.approx(window.brake)
 
 
 def _q(expected: Expectation, mu: np.ndarray) -> np.ndarray:
-    used = np.minimum(mu[:, None], expected.limit)
+    used = np.minimum(np.reshape(mu, (-1, 1)), expected.limit)
     return np.asarray(-0.5 * np.sum(expected.weight * (used - expected.used) ** 2, axis=1))
 
 
@@ -143,7 +130,7 @@ def _expectations() -> Iterator[tuple[Expectation, float]]:
 def test_maximum_33_beats_a_dense_grid_and_scipy() -> None:
     at_kink = 0
     for expected, lowest in _expectations():
-        mu = _maximum(expected, lowest)
+        mu = maximise(expected, lowest)
         grid = np.linspace(lowest, 0.15, 20_001)
         values = _q(expected, grid)
         best = minimize_scalar(
@@ -160,25 +147,20 @@ def test_maximum_33_beats_a_dense_grid_and_scipy() -> None:
 
 def test_maximum_of_one_parabola_is_its_mean() -> None:
     expected = _expected([0.05, 0.07], [1.0, 3.0], [0.0952, 0.0952])
-    assert _maximum(expected) == pytest.approx(0.065)  # (0.05 + 3 x 0.07)/4
-    assert _slope(expected, _maximum(expected)) == pytest.approx(0.0, abs=1e-12)
+    assert maximise(expected, 0.0) == pytest.approx(0.065)  # (0.05 + 3 x 0.07)/4
+    assert gradient(expected, maximise(expected, 0.0)) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_maximum_never_exceeds_what_the_brake_uses_and_respects_the_lowest() -> None:
     more = _expected([0.2] * 3, [1.0] * 3, [0.05, 0.0952, 0.07])
-    assert _maximum(more) == 0.0952
+    assert maximise(more, 0.0) == 0.0952
     forward = _expected([-0.013] * 3, [1.0] * 3, [0.0952] * 3)
-    assert _maximum(forward) == 0.0
-    assert _maximum(forward, -0.05) == pytest.approx(-0.013)
+    assert maximise(forward, 0.0) == 0.0
+    assert maximise(forward, -0.05) == pytest.approx(-0.013)
 
 
 def _exact_em(window: Window, start: float, iterations: int, tolerance: float = 0.0) -> Identified:
-    def prepare(windows: Windows, rngs: Sequence[np.random.Generator]) -> ExactEStep:
-        return ExactEStep(SEEN, PRIOR, window)
-
-    searches, rngs = [Search(start, iterations, tolerance)], [np.random.default_rng(0)]
-    (found,) = identify(prepare, stack([PRIOR], [window]), searches, rngs)
-    return found
+    return identify(ExactEStep(SEEN, PRIOR, window), Search(start, iterations, tolerance))
 
 
 @pytest.mark.parametrize("start", [0.0, 0.05, 0.12])
@@ -186,7 +168,7 @@ def test_exact_em_never_lowers_the_likelihood(start: float) -> None:
     window, mu = replace(_window(), brake=np.linspace(0.03, 0.0952, 30)), start
     likelihoods = [log_likelihood(SEEN, PRIOR, window, mu)]
     for _ in range(40):
-        mu = _maximum(_exact(window, mu))
+        mu = maximise(_exact(window, mu), 0.0)
         likelihoods.append(log_likelihood(SEEN, PRIOR, window, mu))
     assert np.all(np.diff(likelihoods) >= -1e-9)
     if start < 0.0952:  # above the largest limit the likelihood is flat
@@ -243,9 +225,8 @@ def test_particle_em_is_exact_em_up_to_monte_carlo_error() -> None:
     """16 independent runs of 15 iterations: their mean within 4 standard errors of exact EM's."""
     window, runs = _window(), 16
     exact = _exact_em(window, 0.03, 15).mu
-    rngs = [np.random.default_rng(seed) for seed in range(runs)]
-    prepare, windows = partial(ParticleEStep, SEEN.motion, 150), stack([PRIOR] * runs, [window] * runs)
-    found = [one.mu for one in identify(prepare, windows, [Search(0.03, 15, 0.0)] * runs, rngs)]
+    search = Search(0.03, 15, 0.0)
+    found = [identify(_particles(SEEN.motion, window, 150, seed), search).mu for seed in range(runs)]
     error = float(np.std(found, ddof=1)) / 4.0
     assert abs(float(np.mean(found)) - exact) < 4.0 * error
     assert error < 0.05 * abs(exact - 0.03)  # it can fail
@@ -254,13 +235,13 @@ def test_particle_em_is_exact_em_up_to_monte_carlo_error() -> None:
 def test_particle_e_step_gives_the_exact_statistics() -> None:
     window = _window()
     exact = _exact(window, 0.05)
-    runs = [_particles(SEEN.motion, window, 150, seed)(np.array([0.05])) for seed in range(16)]
+    runs = [_particles(SEEN.motion, window, 150, seed)(0.05) for seed in range(16)]
     used = np.array([run.used for run in runs])
     errors = np.std(used, axis=0, ddof=1) / 4.0
     assert np.all(np.abs(used.mean(axis=0) - exact.used) < 5.0 * errors)  # 30 steps: 5 instead of 4
     ratios = np.exp([run.log_likelihood - exact.log_likelihood for run in runs])
     assert abs(np.mean(ratios) - 1.0) < 4.0 * np.std(ratios, ddof=1) / 4.0
-    assert all(1.0 <= run.ess[0] <= 150.0 for run in runs)
+    assert all(1.0 <= run.ess <= 150.0 for run in runs)
 
 
 def test_stops_at_the_tolerance_34_and_not_before() -> None:

@@ -15,9 +15,8 @@ from adhesion_node.core import Config
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.rail import ignorance
 from adhesion_node.core.belief.window import Window, WindowSample, window_of
-from adhesion_node.core.methods.particle_em.kalman import Filtered, filter_windows
+from adhesion_node.core.methods.particle_em.kalman import filter_window
 from adhesion_node.core.methods.particle_em.method import ParticleEm, ParticleWindow
-from adhesion_node.core.methods.particle_em.windows import stack
 from adhesion_node.core.methods.protocol import Context
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL
@@ -25,11 +24,6 @@ from adhesion_node.core.physics.train import CRH3
 
 PRIOR = Gaussian(np.array([100.0, 80.0]), np.array([[0.09, 0.01], [0.01, 0.04]]))
 MODELS = pytest.mark.parametrize("model", [Linear(), Linear(c0=0.79, c1=0.3)], ids=["free", "affine resistance"])
-
-
-def _filter(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Filtered:
-    """The filter of one window, without the axis of runs."""
-    return filter_windows(motion, stack([prior], [window]), np.array([mu])).of(0)
 
 
 def _uneven(window: Window, rng: np.random.Generator) -> Window:
@@ -48,10 +42,10 @@ def _uneven(window: Window, rng: np.random.Generator) -> Window:
 
 @MODELS
 @pytest.mark.parametrize("mu", [0.0, 0.05, 0.2])
-def test_filter_is_the_kalman_filter(model: Linear, mu: float) -> None:
+def test_filter_is_the_kalmanfilter_window(model: Linear, mu: float) -> None:
     rng = np.random.default_rng(2)
     window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
-    filtered, exact = _filter(model.motion, PRIOR, window, mu), rts(model, PRIOR, window, mu)
+    filtered, exact = filter_window(model.motion, PRIOR, window, mu), rts(model, PRIOR, window, mu)
     assert filtered.mean == pytest.approx(exact.filtered_mean[1:], rel=1e-10)
     assert filtered.covariance == pytest.approx(exact.filtered_cov[1:], rel=1e-8)
 
@@ -62,7 +56,7 @@ def test_information_is_the_dense_formula(model: Linear, mu: float) -> None:
     rng = np.random.default_rng(3)
     window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
     window = replace(window, speed_variance=np.full(window.steps, math.inf))
-    information = _filter(model.motion, PRIOR, window, mu).information
+    information = filter_window(model.motion, PRIOR, window, mu).information
     assert information == pytest.approx(dense_information(model, PRIOR, window, mu), rel=1e-9)
     if mu == 0.2:
         assert information == 0.0  # above every brake: nothing is seen
@@ -73,7 +67,7 @@ def test_information_is_the_curvature_of_the_log_likelihood() -> None:
     window = replace(_uneven(make_window(model, PRIOR, 0.07, rng), rng), brake=np.full(20, 0.0952))  # speeds too
     below, here, above = (rts(model, PRIOR, window, 0.05 + d).log_likelihood for d in (-h, 0.0, h))
     curvature = (below - 2 * here + above) / h**2
-    assert _filter(model.motion, PRIOR, window, 0.05).information == pytest.approx(-curvature, rel=1e-5)
+    assert filter_window(model.motion, PRIOR, window, 0.05).information == pytest.approx(-curvature, rel=1e-5)
 
 
 @MODELS
@@ -81,8 +75,8 @@ def test_information_is_the_curvature_of_the_log_likelihood() -> None:
 def test_sensitivity_by_finite_differences(model: Linear, mu: float) -> None:
     rng, h = np.random.default_rng(5), 1e-5
     window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
-    low, high = (_filter(model.motion, PRIOR, window, mu + d).mean[-1] for d in (-h, h))
-    sensitivity = _filter(model.motion, PRIOR, window, mu).sensitivity
+    low, high = (filter_window(model.motion, PRIOR, window, mu + d).mean[-1] for d in (-h, h))
+    sensitivity = filter_window(model.motion, PRIOR, window, mu).sensitivity
     assert sensitivity == pytest.approx((high - low) / (2 * h), rel=1e-6)
 
 
@@ -91,8 +85,8 @@ def test_extended_filter_with_the_published_resistance() -> None:
     motion = Motion(CRH3, LEVEL, Linear().q_s, Linear().q_v)
     rng, h = np.random.default_rng(6), 1e-5
     window = make_window(Linear(c0=13.06), PRIOR, 0.07, rng, steps=50)
-    low, high = (_filter(motion, PRIOR, window, 0.07 + d).mean[-1] for d in (-h, h))
-    filtered = _filter(motion, PRIOR, window, 0.07)
+    low, high = (filter_window(motion, PRIOR, window, 0.07 + d).mean[-1] for d in (-h, h))
+    filtered = filter_window(motion, PRIOR, window, 0.07)
     assert filtered.sensitivity == pytest.approx((high - low) / (2 * h), rel=1e-4)
     # the oracle linearised at 79 m/s: d/dv (c1 3.6 v + c2 12.96 v^2) = 0.02304 + 0.0029808 v -> 0.2585 per mille
     slope = 0.0064 * 3.6 + 2 * 0.000115 * 12.96 * 79.0
@@ -111,8 +105,8 @@ def test_the_state_of_a_window_includes_what_mu_leaves_open() -> None:
     verdict = ParticleEm().evaluate(config, ParticleWindow(prior, samples), context)
     assert verdict.mu is not None
     arrays, mu = window_of(samples), verdict.mu
-    filtered = _filter(config.motion, prior, arrays, mu)
-    moved = _filter(config.motion, prior, arrays, mu + 1e-4).mean[-1] - filtered.mean[-1]
+    filtered = filter_window(config.motion, prior, arrays, mu)
+    moved = filter_window(config.motion, prior, arrays, mu + 1e-4).mean[-1] - filtered.mean[-1]
     open_ = moved / 1e-4 * min(filtered.information**-0.5, config.unknown_std)
     expected = filtered.covariance[-1] + np.outer(open_, open_)
     assert verdict.belief.covariance == pytest.approx(expected, rel=1e-3)

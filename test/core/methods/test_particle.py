@@ -19,9 +19,9 @@ from scipy import stats
 
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.window import Window
-from adhesion_node.core.methods.particle_em.particles import ParticleFilter, systematic
-from adhesion_node.core.methods.particle_em.smoother import MarginalSmoother
-from adhesion_node.core.methods.particle_em.windows import stack
+from adhesion_node.core.methods.kernels.filtering import systematic
+from adhesion_node.core.methods.kernels.smoothing import smoothed
+from adhesion_node.core.methods.particle_em.particles import ParticleFilter
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL
 from adhesion_node.core.physics.train import CRH3
@@ -42,7 +42,7 @@ def _window() -> Window:
 
 
 class Smoothed(NamedTuple):
-    """One run's particles and weights, without the axis of runs."""
+    """A pass's particles and weights."""
 
     states: Array
     """(2, K + 1, N)."""
@@ -57,17 +57,10 @@ class Smoothed(NamedTuple):
 def _smooth(  # as `motion` steps, or as another one does
     motion: Motion, prior: Gaussian, window: Window, mu: float, count: int, seed: int, other: Motion | None = None
 ) -> Smoothed:
-    windows = stack([prior], [window])
-    particles = ParticleFilter(motion, windows, count).run(np.array([mu]), [np.random.default_rng(seed)])
-    marginal = MarginalSmoother(other or motion, windows.dt_s, count).run(particles)
-    weights = np.exp(particles.log_weights - particles.log_weights.max(axis=2, keepdims=True))
-    return Smoothed(
-        particles.states[:, :, 0],
-        (weights / weights.sum(axis=2, keepdims=True))[:, 0],
-        marginal[:, 0],
-        float(particles.log_likelihood[0]),
-        float(particles.smallest_ess[0]),
-    )
+    particles, log_likelihood, ess = ParticleFilter(motion, prior, window, count).run(mu, np.random.default_rng(seed))
+    marginal = smoothed(particles, np.sqrt(np.array((other or motion).noise(window.dt_s))))
+    weights = np.exp(particles.log_weights - particles.log_weights.max(axis=1, keepdims=True))
+    return Smoothed(particles.states, weights / weights.sum(axis=1, keepdims=True), marginal, log_likelihood, ess)
 
 
 def _within(samples: Array, exact: Array) -> None:
@@ -86,15 +79,15 @@ def _moments(weights: Array, states: Array) -> Array:
 def test_filter_and_smoother_are_exact_up_to_monte_carlo_error(mu: float) -> None:
     window, count = _window(), 400
     exact = rts(LOUD, PRIOR, window, mu)
-    filtered, smoothed, likelihood = [], [], []
+    filtered, after, likelihood = [], [], []
     for seed in range(RUNS):
         found = _smooth(LOUD.motion, PRIOR, window, mu, count, seed)
         filtered.append(_moments(found.weights, found.states))
-        smoothed.append(_moments(found.marginal, found.states))
+        after.append(_moments(found.marginal, found.states))
         likelihood.append(math.exp(found.log_likelihood - exact.log_likelihood))
     for samples, mean, cov in (
         (filtered, exact.filtered_mean, exact.filtered_cov),
-        (smoothed, exact.mean, exact.cov),
+        (after, exact.mean, exact.cov),
     ):
         diagonal = cov[:, [0, 1], [0, 1]]
         # A variance about the particles' own mean is low by about 1/ESS: allow for it, nothing more.
@@ -109,23 +102,28 @@ def test_filter_and_smoother_are_exact_up_to_monte_carlo_error(mu: float) -> Non
 def test_log_likelihood_over_many_resamplings() -> None:
     window = make_window(LOUD, PRIOR, 0.07, np.random.default_rng(9), steps=60, sigma_m=0.2)
     exact = rts(LOUD, PRIOR, window, 0.07).log_likelihood
-    windows, rngs = stack([PRIOR] * 2 * RUNS, [window] * 2 * RUNS), [np.random.default_rng(n) for n in range(2 * RUNS)]
-    runs = ParticleFilter(LOUD.motion, windows, 1000).run(np.full(2 * RUNS, 0.07), rngs)
-    ratios = np.exp(runs.log_likelihood - exact)
+    ratios, ess = _likelihoods(window, 1000, 2 * RUNS, exact)
     _within(ratios, np.array(1.0))
     assert np.std(ratios) < 0.5
-    assert runs.smallest_ess.max() < 500  # below half of them: it did resample
-    assert runs.smallest_ess.min() >= 1.0
+    assert ess.max() < 500  # below half of them: it did resample
+    assert ess.min() >= 1.0
 
 
 def test_likelihood_of_a_few_particles_is_without_bias() -> None:
     """Whatever N: so the resampling is without bias as well. 20 particles, 1000 runs."""
     window = make_window(LOUD, PRIOR, 0.07, np.random.default_rng(9), steps=6, sigma_m=0.3)
     exact = rts(LOUD, PRIOR, window, 0.07).log_likelihood
-    windows, rngs = stack([PRIOR] * 1000, [window] * 1000), [np.random.default_rng(seed) for seed in range(1000)]
-    runs = ParticleFilter(LOUD.motion, windows, 20).run(np.full(1000, 0.07), rngs)
-    _within(np.exp(runs.log_likelihood - exact), np.array(1.0))
-    assert np.mean(runs.smallest_ess < 10) > 0.5
+    ratios, ess = _likelihoods(window, 20, 1000, exact)
+    _within(ratios, np.array(1.0))
+    assert np.mean(ess < 10) > 0.5
+
+
+def _likelihoods(window: Window, count: int, runs: int, exact: float) -> tuple[Array, Array]:
+    """Likelihoods of runs over the exact one, and their smallest ESS."""
+    run = ParticleFilter(LOUD.motion, PRIOR, window, count).run
+    found = [run(0.07, np.random.default_rng(seed))[1:] for seed in range(runs)]
+    logs, ess = np.array(found).T
+    return np.exp(logs - exact), ess
 
 
 @pytest.mark.parametrize("count", [2, 6])
@@ -224,7 +222,7 @@ def test_resampling_is_systematic() -> None:
     weights, offset = np.random.default_rng(0).exponential(size=12) * (np.arange(12) % 5 != 0), 0.3
     upto = np.cumsum(weights / weights.sum())
     expected = [next(i for i in range(12) if upto[i] >= (j + offset) / 12) for j in range(12)]
-    assert systematic(weights[None], np.array([offset])).tolist() == [expected]
+    assert systematic(weights, offset).tolist() == expected
 
 
 def test_same_generator_same_particles() -> None:

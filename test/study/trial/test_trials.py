@@ -25,7 +25,7 @@ from sim_node.train.sensors import SensorSettings
 
 QUICK = Trials(
     World("tunnel_exit"),
-    Estimator(Config(method="particle_em", window=20, particles=5, iterations=2), "lockstep"),
+    Estimator(Config(method="particle_em", window=20, particles=5, iterations=2), "core"),
     starts=(0.0, 0.09),
 )
 """Trials of the paper's method in little time."""

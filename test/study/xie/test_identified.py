@@ -80,7 +80,7 @@ def test_both_methods_stand_beside_each_other_on_the_trials_of_the_tables(
         found = {}
         for key, some in wanted:
             asked.append(some)
-            scale = 0.9 if some.estimator.way == "lockstep" else 1.0
+            scale = 0.9 if some.estimator.config.method == "particle_em" else 1.0
             run = a_run(*distances.BRAKINGS[some.world.scenario], scale)
             found[key] = results([run.copy() for _ in STARTS])
         return found

@@ -5,9 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -19,8 +17,7 @@ from ...belief.regime import Regime
 from ...belief.window import WindowSample, window_of
 from ..protocol import Context, Fit, Verdict, spent
 from .em import Identified, ParticleEStep, Search, identify
-from .kalman import Filtered, filter_windows
-from .windows import stack
+from .kalman import Filtered, filter_window
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -50,21 +47,11 @@ class ParticleEm:
 
     def evaluate(self, config: Config, window: ParticleWindow, context: Context) -> Verdict:
         """Identify mu by EM from that of the last window on, and judge what limits the motion."""
-        (verdict,) = evaluate(config, [window], [context])
-        return verdict
-
-
-def evaluate(config: Config, windows: Sequence[ParticleWindow], contexts: Sequence[Context]) -> list[Verdict]:
-    """Judge windows of equal length side by side: identify mu by EM and filter the states with the result."""
-    stacked = stack([window.prior for window in windows], [window_of(window.samples) for window in windows])
-    searches = [_search(config, context) for context in contexts]
-    e_step = partial(ParticleEStep, config.motion, config.particles)
-    found = identify(e_step, stacked, searches, [context.rng for context in contexts])
-    filtered = filter_windows(config.motion, stacked, np.array([identified.mu for identified in found]))
-    return [
-        _verdict(config, window, context, identified, filtered.of(run))
-        for run, (window, context, identified) in enumerate(zip(windows, contexts, found, strict=True))
-    ]
+        prior, arrays = window.prior, window_of(window.samples)
+        e_step = ParticleEStep(config.motion, config.particles, prior, arrays, context.rng)
+        identified = identify(e_step, _search(config, context))
+        filtered = filter_window(config.motion, prior, arrays, identified.mu)
+        return _verdict(config, window, context, identified, filtered)
 
 
 def _search(config: Config, context: Context) -> Search:
@@ -81,7 +68,7 @@ def _verdict(
     holds nothing of the samples behind it, so the overlap is not counted twice.
     """
     std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
-    kept = kept_of_start(float(filtered.information), identified.weight, identified.iterations)
+    kept = kept_of_start(filtered.information, identified.weight, identified.iterations)
     start = min(_search(config, context).start, identified.limit)
     regime, rail = judge(config, Identification(identified.mu, std, start, kept), identified.limit, context)
     spread = filtered.sensitivity * min(std, config.unknown_std)

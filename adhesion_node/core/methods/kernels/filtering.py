@@ -1,0 +1,237 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""Filters of a window of K steps, by N particles and by Kalman's recursion, and what EM makes of smoothed particles.
+
+Indices are in the order (component, time, particle).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...compiled import kernel
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+GRAVITY = 9.8
+DT, APPLIED, PLACE, PLACE_VARIANCE, RATE, RATE_VARIANCE = 0, 1, 2, 3, 4, 5
+"""Rows of `Given.window`, as in `equation`."""
+
+
+class Given(NamedTuple):
+    """Train, track, the law of the first state, and what was measured."""
+
+    rotating: float
+    resistance: Array
+    """Of the speed in m/s: c0, c1, c2, N/N."""
+    breaks: Array
+    """Where the track's profile changes, m."""
+    levels: Array
+    """Its resistance before, between and behind them, N/N."""
+    mean: Array
+    covariance: Array
+    root: Array
+    """Its Cholesky factor, lower."""
+    window: Array
+    """Shape (6, K)."""
+    spread: Array
+    """Standard deviations of the process noise, shape (2, K)."""
+
+
+class Draws(NamedTuple):
+    """Random numbers of a pass: of the process noise, (2, K, N), to resample by, (K,), of the first states, (N, 2)."""
+
+    normal: Array
+    uniform: Array
+    start: Array
+
+
+class Particles(NamedTuple):
+    """The filter's particles and what the smoother takes of them."""
+
+    states: Array
+    """Positions and speeds, (2, K + 1, N)."""
+    stepped: Array
+    """Where the noise-free step leads those of the times 0..K-1, (2, K, N)."""
+    log_weights: Array
+    """Up to a constant per time, (K + 1, N)."""
+
+
+@kernel
+def _resistance(given: Given, s: float, v: float) -> float:
+    section = 0
+    while section < given.breaks.size and s >= given.breaks[section]:
+        section += 1
+    c = given.resistance
+    return float(c[0] + v * (c[1] + c[2] * v) + given.levels[section])
+
+
+@kernel
+def _limit(given: Given, k: int, resisting: float) -> float:
+    """Largest adhesion that the brake uses in a step."""
+    return float((given.window[APPLIED, k] - given.rotating * resisting) / (1.0 + given.rotating))
+
+
+@kernel
+def _moved(given: Given, mu: float, states: Array, stepped: Array, k: int) -> None:
+    """Noise-free step of the particles at time k, at adhesion `mu`."""
+    dt = given.window[DT, k]
+    for i in range(states.shape[2]):
+        s, v = states[0, k, i], states[1, k, i]
+        resisting = _resistance(given, s, v)
+        slower = v - dt * GRAVITY * (min(mu, _limit(given, k, resisting)) + resisting)
+        stepped[0, k, i], stepped[1, k, i] = s + 0.5 * dt * (v + slower), slower
+
+
+@kernel
+def systematic(weights: Array, offset: float) -> Indices:
+    """Systematic resampling by relative weights, (N,): the particles on which the numbers (j + offset)/N fall."""
+    count, upto, done, total = weights.size, 0.0, 0, weights.sum()
+    parents = np.empty(count, dtype=np.int64)
+    for i in range(count):
+        upto += weights[i]
+        reached = upto * (count / total) + (1.0 - offset)  # so many of the N numbers, rounded down
+        last = count if i == count - 1 else min(int(reached), count)
+        while done < last:
+            parents[done] = i
+            done += 1
+    return parents
+
+
+@kernel
+def filtered(given: Given, mu: float, draws: Draws, particles: Particles) -> tuple[float, float]:
+    """Fill the particles; return ln p(y_1:K) (14)(15) up to the measurements' constants, and the smallest ESS."""
+    states, stepped, logs = particles
+    window, count, (normal, uniform, start) = given.window, logs.shape[1], draws
+    for i in range(count):
+        for c in range(2):
+            states[c, 0, i] = given.mean[c] + start[i, 0] * given.root[c, 0] + start[i, 1] * given.root[c, 1]
+    logs[0] = 0.0
+    weights, themselves = np.ones(count), np.arange(count)
+    total, square, top, log_likelihood, ess = float(count), float(count), 0.0, 0.0, float(count)
+    for k in range(window.shape[1]):
+        _moved(given, mu, states, stepped, k)
+        poor = total * total < 0.5 * count * square
+        parents = systematic(weights, uniform[k]) if poor else themselves
+        if poor:
+            log_likelihood += top + math.log(total / count)
+        by_place, by_speed = -0.5 / window[PLACE_VARIANCE, k], -0.5 / window[RATE_VARIANCE, k]
+        for i in range(count):
+            s = given.spread[0, k] * normal[0, k, i] + stepped[0, k, parents[i]]
+            v = given.spread[1, k] * normal[1, k, i] + stepped[1, k, parents[i]]
+            states[0, k + 1, i], states[1, k + 1, i] = s, v
+            before = 0.0 if poor else logs[k, i]
+            logs[k + 1, i] = before + by_place * (window[PLACE, k] - s) ** 2 + by_speed * (window[RATE, k] - v) ** 2
+        top = logs[k + 1].max()
+        total, square = 0.0, 0.0
+        for i in range(count):
+            weights[i] = math.exp(logs[k + 1, i] - top)
+            total += weights[i]
+            square += weights[i] ** 2
+        ess = min(ess, total**2 / square)
+    return log_likelihood + top + math.log(total / count), ess
+
+
+@kernel
+def reduced(given: Given, mu: float, particles: Particles, marginal: Array) -> Array:
+    """The statistics of I2 (26), filtered at `mu`: adhesion used, its information and limit in each step, (3, K).
+
+    I2 is quadratic in the step's deviations and these are sums of a term in x_t and a term in x_t+1, so the
+    double sum over pairs collapses to the marginal weights (K + 1, N). As the particles' steps used
+    min(mu, limit), what the smoother adds to it is what they missed.
+    """
+    states, stepped, _ = particles
+    found = np.empty((3, stepped.shape[1]))
+    for k in range(stepped.shape[1]):
+        missed_s, missed_v, used, resisting = 0.0, 0.0, 0.0, 0.0
+        for i in range(stepped.shape[2]):
+            before, after = marginal[k, i], marginal[k + 1, i]
+            missed_s += stepped[0, k, i] * before - states[0, k + 1, i] * after
+            missed_v += stepped[1, k, i] * before - states[1, k + 1, i] * after
+            own = _resistance(given, states[0, k, i], states[1, k, i])
+            used += min(mu, _limit(given, k, own)) * before
+            resisting += own * before
+        dt = given.window[DT, k]
+        by_s, by_v = GRAVITY * 0.5 * dt**2 / given.spread[0, k] ** 2, GRAVITY * dt / given.spread[1, k] ** 2
+        weight = GRAVITY * (0.5 * dt**2 * by_s + dt * by_v)
+        found[0, k], found[1, k] = used + (by_s * missed_s + by_v * missed_v) / weight, weight
+        found[2, k] = _limit(given, k, resisting)
+    return found
+
+
+@kernel
+def maximised(found: Array, lowest: float) -> float:
+    """Adhesion of at least `lowest` that maximises Q, of `reduced` statistics: exact, also at the kink.
+
+    Between two neighbouring limits Q is a parabola; beyond the largest limit it is flat, so the answer never
+    exceeds that limit: "at least this much adhesion".
+    """
+    order = np.argsort(found[2])
+    weights, weighted, squares, kept = 0.0, 0.0, 0.0, 0.0
+    for k in range(found.shape[1]):
+        weights += found[1, k]
+        weighted += found[1, k] * found[0, k]
+        squares += found[1, k] * found[0, k] ** 2
+    best, mu, least = np.inf, lowest, lowest
+    for k in order:  # with the lower limits below mu, the further steps are active and the others keep their limit
+        used, weight, limit = found[0, k], found[1, k], max(found[2, k], lowest)
+        tried = min(max(weighted / weights, least), limit)
+        loss = kept + squares - tried * (2.0 * weighted - tried * weights)
+        if loss < best:
+            best, mu = loss, tried
+        kept, least = kept + weight * (limit - used) ** 2, limit
+        weights, weighted, squares = weights - weight, weighted - weight * used, squares - weight * used**2
+    return mu
+
+
+@kernel
+def tracked(given: Given, mu: float) -> tuple[Array, Array, Array, float]:
+    """Extended Kalman filter at an adhesion: means, covariances, and what is known of the adhesion itself.
+
+    Shapes (K, 2), (K, 2, 2); derivative of the last mean with respect to mu, (2,); observed information on mu: the
+    innovations' derivatives squared and divided by their variances, exact while adhesion limits.
+    """
+    window, count = given.window, given.window.shape[1]
+    means, covariances = np.empty((count, 2)), np.empty((count, 2, 2))
+    mean, p, sensitivity, information = given.mean.copy(), given.covariance.copy(), np.zeros(2), 0.0
+    for k in range(count):
+        dt, resisting = window[DT, k], _resistance(given, mean[0], mean[1])
+        limit, by_speed = _limit(given, k, resisting), given.resistance[1] + 2.0 * given.resistance[2] * mean[1]
+        brake_limits = limit < mu
+        kept = 1.0 - dt * GRAVITY * (by_speed / (1.0 + given.rotating) if brake_limits else by_speed)
+        half, pushed = 0.5 * dt * (1.0 + kept), 0.0 if brake_limits else -GRAVITY * dt
+        sensitivity[0] += half * sensitivity[1] + 0.5 * dt * pushed
+        sensitivity[1] = kept * sensitivity[1] + pushed
+        slower = mean[1] - dt * GRAVITY * (min(mu, limit) + resisting)
+        mean[0], mean[1] = mean[0] + 0.5 * dt * (mean[1] + slower), slower
+        p[0, 0] += half * (p[0, 1] + p[1, 0] + half * p[1, 1]) + given.spread[0, k] ** 2
+        p[0, 1] = p[1, 0] = kept * (p[0, 1] + half * p[1, 1])
+        p[1, 1] = kept**2 * p[1, 1] + given.spread[1, k] ** 2
+        for index in range(2):
+            variance = window[PLACE_VARIANCE + 2 * index, k]
+            if np.isfinite(variance):
+                total, off = p[index, index] + variance, window[PLACE + 2 * index, k] - mean[index]
+                gain, felt = p[:, index] / total, sensitivity[index]
+                information += felt**2 / total
+                sensitivity -= gain * felt
+                mean += gain * off
+                _joseph(p, gain, index, variance)
+        means[k], covariances[k] = mean, p
+    return means, covariances, sensitivity, information
+
+
+@kernel
+def _joseph(p: Array, gain: Array, index: int, variance: float) -> None:
+    """Covariance after a measurement: stays symmetric and positive however small its variance is."""
+    kept = np.eye(2)
+    kept[:, index] -= gain
+    a, b, c = p[0, 0], p[0, 1], p[1, 1]
+    for i in range(2):
+        for j in range(2):
+            first, second = kept[i, 0] * a + kept[i, 1] * b, kept[i, 0] * b + kept[i, 1] * c
+            p[i, j] = first * kept[j, 0] + second * kept[j, 1] + variance * gain[i] * gain[j]

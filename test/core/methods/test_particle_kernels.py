@@ -1,0 +1,82 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The compiled loops of the particle EM: against NumPy, to rounding."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import numpy_particles as by_numpy
+import pytest
+from oracles import Linear, make_window
+
+from adhesion_node.core.belief.gaussian import Gaussian
+from adhesion_node.core.belief.window import Window
+from adhesion_node.core.methods.kernels import filtering, smoothing
+from adhesion_node.core.methods.particle_em.em import ParticleEStep
+from adhesion_node.core.methods.particle_em.particles import ParticleFilter
+from adhesion_node.core.physics.motion import Motion
+from adhesion_node.core.physics.track import Grade, Track
+from adhesion_node.core.physics.train import Train
+
+PRIOR = Gaussian(np.array([1000.0, 75.0]), np.array([[0.04, 0.02], [0.02, 0.05]]))
+LEVEL = Linear(c0=3.0).motion
+SLOPED = Motion(Train(rotating_mass_fraction=0.08), Track((Grade(1010.0, 1400.0, 3.0),)), 0.004, 3e-4)
+
+
+def _window(steps: int = 40, outlier_m: float = 0.0) -> Window:
+    """With a brake that builds up, uneven steps and some measured speeds."""
+    window = make_window(Linear(c0=3.0), PRIOR, 0.07, np.random.default_rng(1), steps=steps)
+    return replace(
+        window,
+        brake=np.linspace(0.05, 0.1, steps),
+        dt_s=np.linspace(0.1, 0.14, steps),
+        position_m=window.position_m + outlier_m * (np.arange(steps) == 20),
+        speed_mps=np.full(steps, 74.0),
+        speed_variance=np.where(np.arange(steps) % 4 == 0, 0.5, math.inf),
+    )
+
+
+@pytest.mark.parametrize("outlier_m", [0.0, 40.0])
+@pytest.mark.parametrize("count", [2, 20, 63, 64, 150])
+@pytest.mark.parametrize("motion", [LEVEL, SLOPED], ids=["level", "profile and rotating mass"])
+def test_a_pass_of_filter_and_smoother(motion: Motion, count: int, outlier_m: float) -> None:
+    """Also of so many particles that those far away are left out, and of a position that none of them explains."""
+    window, rng = _window(outlier_m=outlier_m), np.random.default_rng(3)
+    ours = ParticleFilter(motion, PRIOR, window, count)
+    found, draws = ours.run(0.07, rng), ours.draws
+    theirs = by_numpy.filtered(motion, PRIOR, window, 0.07, draws)
+    for one, other in zip(found.particles, theirs.particles, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-10, atol=1e-9)
+    assert found.log_likelihood - ours.log_constant == pytest.approx(theirs.log_likelihood, rel=1e-10)
+    assert found.smallest_ess == pytest.approx(theirs.smallest_ess, rel=1e-8)
+    marginal = smoothing.smoothed(found.particles, ours.given.spread)
+    np.testing.assert_allclose(marginal, by_numpy.smoothed(motion, window, found.particles), rtol=1e-8, atol=1e-11)
+    np.testing.assert_allclose(marginal.sum(axis=1), 1.0, rtol=1e-11)
+    statistics = filtering.reduced(ours.given, 0.07, found.particles, marginal)
+    expected = by_numpy.reduced(motion, window, 0.07, found.particles, marginal)
+    np.testing.assert_allclose(statistics, expected, rtol=1e-10, atol=1e-11)
+
+
+def test_resampling() -> None:
+    rng = np.random.default_rng(2)
+    for count in (2, 7, 100):
+        weights, offset = rng.exponential(size=count) * (rng.random(count) < 0.7) + 1e-12, float(rng.random())
+        np.testing.assert_array_equal(filtering.systematic(weights, offset), by_numpy.systematic(weights, offset))
+
+
+@pytest.mark.parametrize("size", [1, 7, 20, 1024])
+def test_the_exponential(size: int) -> None:
+    given = np.concatenate(([0.0], np.random.default_rng(0).uniform(-300.0, 1.0, size)))
+    found = given.copy()
+    smoothing._exponential(found, np.empty(found.size))
+    np.testing.assert_allclose(found, np.exp(given), rtol=1e-13)
+
+
+def test_a_generator_gives_the_same_numbers_to_every_pass_of_its_own() -> None:
+    one, two = (ParticleEStep(SLOPED, 5, PRIOR, _window(), np.random.default_rng(7)) for _ in range(2))
+    for mu in (0.05, 0.06):
+        np.testing.assert_array_equal(one(mu).statistics, two(mu).statistics)
+    assert not np.array_equal(one(0.06).statistics, one(0.06).statistics)
