@@ -95,7 +95,7 @@ setup(
         "mutation": ["cosmic-ray>=8.4,<9", "pytest-cov>=5,<8"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
         # What `bench` measures against; particles wants numpy below 2.
-        "bench": ["filterpy>=1.4.5,<3", "particles>=0.4,<0.5", "threadpoolctl>=3.2,<4"],
+        "bench": ["filterpy>=1.4.5,<3", "particles>=0.4,<0.5", "threadpoolctl>=3.2,<4", "gtsam>=4.2,<5"],
         # colcon drives `setup.py develop`, which setuptools 80 removed.
         "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
     },

@@ -13,11 +13,11 @@ from importlib.util import find_spec
 from typing import Any
 
 from ..command.options import DONE, help_texts, json_option, report, run_tool
-from . import against, gaussian, growth, particle, step
+from . import against, gaussian, growth, normal, particle, step
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
 
-PEERS = ("filterpy", "particles", "threadpoolctl")
+PEERS = ("filterpy", "particles", "threadpoolctl", "gtsam")
 """Of the extra `bench`."""
 
 PARTICLE_STEPS, PARTICLES = 100, 200
@@ -35,6 +35,11 @@ def _particle(options: Options) -> Section:
 
 def _gaussian(options: Options) -> Section:
     rows = gaussian.compare(GAUSSIAN_STEPS, options.rounds, options.seed)
+    return {"settings": {"steps": GAUSSIAN_STEPS}, "rows": rows}
+
+
+def _normal(options: Options) -> Section:
+    rows = normal.compare(GAUSSIAN_STEPS, options.rounds, options.seed)
     return {"settings": {"steps": GAUSSIAN_STEPS}, "rows": rows}
 
 
@@ -77,8 +82,9 @@ def _against(options: Options) -> Section:
 
 
 BENCHMARKS: Mapping[str, tuple[Callable[[Options], Section], tuple[str, ...], str]] = {
-    "particle": (_particle, PEERS[1:], "particle E and M step of one window"),
+    "particle": (_particle, PEERS[1:3], "particle E and M step of one window"),
     "gaussian": (_gaussian, (PEERS[0], PEERS[2]), "Gaussian update of one window, EM converged"),
+    "normal": (_normal, PEERS[2:], "one normal equation with its linearisation"),
     "step": (_step, (), "a sample through the estimator in steady braking"),
     "memory": (_memory, (), "resident memory over a long journey"),
     "trains": (_trains, ("rclpy",), "braking trains in one process, an estimator each on one executor, through DDS"),

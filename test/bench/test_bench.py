@@ -20,7 +20,7 @@ import pytest
 from oracles import Linear, make_window, rts
 
 from adhesion_node.bench import __main__ as bench
-from adhesion_node.bench import against, gaussian, growth, particle, recording, scene, step, trains
+from adhesion_node.bench import against, gaussian, growth, normal, particle, recording, scene, step, trains
 from adhesion_node.bench.timing import Contender, figures, interleave
 from adhesion_node.core.belief.gaussian import Gaussian
 
@@ -138,6 +138,18 @@ def test_gaussian_comparison_ends_everywhere_in_the_same_adhesion() -> None:
     assert converged["ratio"] == pytest.approx(converged["median_ms"] / rows[gaussian.OURS]["median_ms"])
 
 
+def test_a_normal_equation_has_one_solution() -> None:
+    pytest.importorskip("gtsam")
+    rows = {row["method"]: row for row in normal.compare(steps=20, rounds=2, seed=1)}
+    assert list(rows) == [normal.BARE, normal.OURS, normal.SEARCHED, normal.BUILT, normal.ELIMINATED]
+    assert rows[normal.BARE]["ratio"] == 1.0
+    moves = rows[normal.OURS]["kappa_moves"]
+    assert abs(moves) > 0.01
+    for name, rounding in ((normal.BARE, 1e-10), (normal.ELIMINATED, 1e-6)):
+        assert rows[name]["kappa_moves"] == pytest.approx(moves, rel=rounding)
+    assert normal.START + rows[normal.SEARCHED]["kappa_moves"] == pytest.approx(normal.KAPPA + moves, abs=0.01)
+
+
 @pytest.mark.usefixtures("few_windows")
 def test_latency_is_that_of_steady_braking() -> None:
     row = step.latency(10.0, rounds=1, seed=1)
@@ -245,7 +257,7 @@ def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str], mon
 @pytest.mark.parametrize(
     ("args", "said"),
     [
-        (["speed"], "choose of particle, gaussian, step, memory, trains"),
+        (["speed"], "choose of particle, gaussian, normal, step, memory, trains"),
         (["against"], "name the revision, --against REV"),
         (["--against", "no-such-revision"], "give a revision, and run bench in a clone"),
         (["recording", "--hours", "0"], "hours = 0"),

@@ -16,7 +16,7 @@ from tasks import computed_here
 from adhesion_node.command.running import Arrays, Running, file_name, load, save
 from adhesion_node.core import Config
 from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning
-from adhesion_node.study.trial.estimators import WAYS, Estimator
+from adhesion_node.study.trial.estimators import WAYS, Estimator, Lane
 from adhesion_node.study.trial.trials import ROW, Trials, grouped
 from adhesion_node.study.trial.world import Refusal, World, simulate, ticks
 from adhesion_node.wire.topics import ADHESION_INPUTS
@@ -121,6 +121,14 @@ def test_a_filter_starts_where_it_is_told(tuning: Tuning) -> None:
     rows = Trials(World("tunnel_exit"), Estimator(way="ekf", tuning=tuning), starts=(0.0, 0.09)).compute()["rows"]
     low, high = (rows[rows["start"] == start] for start in (0.0, 0.09))
     assert low["mu"][0] < high["mu"][0]
+
+
+def test_the_bank_has_no_start_and_runs_once_from_all() -> None:
+    estimator, run = Estimator(Config(), "core"), simulate(World("tunnel_exit"), 1000)
+    lanes = [Lane(run, start) for start in (0.0, 0.09)]
+    together, alone = estimator.run(lanes), [estimator.run([lane]).results[0] for lane in lanes]
+    assert len(together.window_ms) == 1
+    assert together.results == alone
 
 
 def test_the_pipeline_gives_the_estimates_of_the_core_and_curves_besides() -> None:
