@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from .bank import following as bank
+from .bank.steps import Stepping
 from .bank.verdict import Findings, found
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail
@@ -51,9 +52,9 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     size_m = stepping.size_m(off.std_m)
     if size_m:
         memory, stepping = stepping.taken(config, size_m, rail)
-        return _accepted(config, state._replace(stepping=stepping), measurement, memory)
-    state = state._replace(stepping=stepping)
+        return _accepted(config, state, measurement, memory, stepping)
     if off.nearest > config.gate_sigma:
+        state = state._replace(stepping=stepping)
         detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
         behind = memory.braked and -LOST_S * state.followed_mps < off.metres < 0.0
         if state.outliers + 1 >= config.max_outliers and behind:
@@ -67,7 +68,8 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         memory = bank.followed(config, memory, measurement._replace(variance_m2=math.inf), rail)
         state = state._replace(memory=memory, outliers=state.outliers + 1)
         return state.told(Event(Outcome.OUTLIER, detail)), None
-    return _accepted(config, state, measurement, bank.followed(config, memory, measurement, rail, off.moved))
+    memory = bank.followed(config, memory, measurement, rail, off)
+    return _accepted(config, state, measurement, memory, stepping)
 
 
 def _anew(state: State, event: Event) -> State:
@@ -77,11 +79,12 @@ def _anew(state: State, event: Event) -> State:
 
 
 def _accepted(
-    config: Config, state: State, measurement: Measurement, memory: bank.Memory
+    config: Config, state: State, measurement: Measurement, memory: bank.Memory, stepping: Stepping | None = None
 ) -> tuple[State, Estimate | None]:
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
     state = state._replace(
+        stepping=state.stepping if stepping is None else stepping,
         counts=counted(state.counts, Event(Outcome.ACCEPTED if measurement.has_position else Outcome.TICK)),
         newest=measurement,
         memory=memory,
@@ -103,7 +106,7 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     nothing = unknown(config, float(mean[1]))
     before = knowledge.aged(config, newest.t_ns, belief)
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
-        before = before._replace(lower=max(before.lower, _here(config, state, newest.t_ns, belief).lower))
+        before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
     verdict = _verdict(memory, findings)._replace(changed=memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict._replace(rail=findings.known))
@@ -116,7 +119,10 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
 
 def _here(config: Config, state: State, t_ns: int, belief: Gaussian) -> Rail:
     """The rail as this train knows it, aged, and as earlier trains saw it here."""
-    rail = state.knowledge.aged(config, t_ns, belief)
+    return _informed(config, state.knowledge.aged(config, t_ns, belief), t_ns, belief)
+
+
+def _informed(config: Config, rail: Rail, t_ns: int, belief: Gaussian) -> Rail:
     if config.rail_map is None:
         return rail
     way = Way(float(belief.mean[0]), float(belief.mean[1]), t_ns)

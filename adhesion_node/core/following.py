@@ -21,10 +21,12 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         repeated = state.repeated.after(measurement, state.sure)
         if repeated.is_stuck(measurement):
             return _unseen(config, state, measurement)
-        state = state._replace(repeated=repeated, unseen=0)
+    else:
+        repeated = state.repeated
     pace = state.pace.after(measurement)
     measurement, refused = in_mps(measurement, (pace.speed_mps, math.nan if seen is None else seen.speed_mps))
-    state = state._replace(pace=pace).told(*refused)
+    unseen = 0 if measurement.has_position else state.unseen
+    state = state._replace(repeated=repeated, unseen=unseen, pace=pace).told(*refused)
     if refused and is_kmh(state.followed_mps, pace.speed_mps):
         detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
         state = state.forgotten()._replace(pace=pace).told(Event(Outcome.RESET, detail))

@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -52,7 +53,8 @@ class BrakeSeen(NamedTuple):
 
     def _pressed(self, config: Config, sample: PressureSample, demand_pa: float | None) -> BrakeSeen:
         t_ns, pressure = sample
-        recent = (*(each for each in self.recent if t_ns - RISING_NS <= each.t_ns < t_ns), sample)
+        first, end = bisect_left(self.recent, (t_ns - RISING_NS,)), bisect_left(self.recent, (t_ns,))
+        recent = (*self.recent[first:end], sample)
         empty = pressure < max(config.brake_threshold_pa, 1.0)
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
@@ -60,7 +62,7 @@ class BrakeSeen(NamedTuple):
             most = before_s * config.train.full_pressure_pa / config.brake_build_up_s
             applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
             return BrakeSeen(recent, pressure, applied, None, full_ns)
-        peak = max(_since(recent, t_ns - DUMP_NS))
+        peak = max(each.pressure_pa for each in recent[bisect_left(recent, (t_ns - DUMP_NS,)) :])
         dumped_ns = t_ns if peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak) else self.dumped_ns
         dumping = dumped_ns is not None and t_ns - dumped_ns < HELD_NS and t_ns - full_ns < EMPTY_NS
         demanded = demand_pa
@@ -86,7 +88,3 @@ class BrakeSeen(NamedTuple):
     def rising(self) -> bool:
         """Whether the brake is being applied harder."""
         return len(self.recent) > 1 and self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa
-
-
-def _since(samples: Iterable[PressureSample], from_ns: int) -> list[float]:
-    return [each.pressure_pa for each in samples if each.t_ns >= from_ns]

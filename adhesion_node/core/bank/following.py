@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 S = 1_000_000_000
 
+HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
+
 BRANCH_S = 0.5
 """How often it is asked whether rail or limit have changed."""
 
@@ -112,18 +114,21 @@ class Memory(NamedTuple):
         bank = corrected(self.bank, seen)
         total = weighing.total(bank.log_weight)
         return self._replace(
-            bank=bank._replace(log_weight=bank.log_weight - total),
+            bank=bank.believing(bank.mean, bank.covariance, bank.log_weight - total),
             fixes=self.fixes + fixes,
-            log_likelihood=self.log_likelihood + total - 0.5 * math.log(2.0 * math.pi),
+            log_likelihood=self.log_likelihood + total - HALF_LOG_2PI,
         )
 
 
-def _with_position(memory: Memory, measurement: Measurement) -> Memory:
+def _with_position(memory: Memory, measurement: Measurement, foreseen: Off | None) -> Memory:
     """Take a position in; the first one places the train, with what there is of slow error in it."""
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
-    memory = memory._replace(declared_m=declared)
+    course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
+    memory = memory._replace(declared_m=declared, course=course)
     if memory.is_placed:
-        return memory.told(position_seen(bank, measurement.position_m, declared), fixes=1)
+        known = foreseen is not None and foreseen.moved is not None and foreseen.moved.bank is bank
+        seen = foreseen.seen if foreseen is not None and known else None
+        return memory.told(seen or position_seen(bank, measurement.position_m, declared), fixes=1)
     slow = slow_variance(bank, declared)
     placed = bank.with_fresh(POSITION, measurement.position_m, np.sqrt(white_variance(bank, declared) + slow))
     placed = placed.with_fresh(OFFSET, 0.0, np.sqrt(slow))
@@ -140,7 +145,9 @@ class Off(NamedTuple):
     nearest: float
     """In standard deviations, without sign, by the hypothesis nearest."""
     moved: Memory | None = None
-    """What was foreseen."""
+    """What was foreseen, ..."""
+    seen: Observation | None = None
+    """... and the position beside it."""
 
 
 def met(config: Config, measurement: Measurement) -> Memory:
@@ -171,24 +178,24 @@ def met(config: Config, measurement: Measurement) -> Memory:
 
 
 def followed(
-    config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail], foreseen: Memory | None = None
+    config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail], foreseen: Off | None = None
 ) -> Memory:
     """The train followed up to a measurement, which is taken in.
 
-    `rail` is asked for where a braking opens; `foreseen` is the memory moved to the measurement, if that is known.
+    `rail` is asked for where a braking opens; `foreseen` is what `off` has said of the measurement, if that is known.
     """
     pressures, speeds, start = _pressures(measurement), _speeds(config, measurement), memory
     if measurement.brake_pressure_pa is None and measurement.demand_pa is None:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
     for until_ns in _steps(before_ns, measurement.t_ns, (each.t_ns for each in speeds)):
-        if foreseen is not None and memory is start and foreseen.t_ns == until_ns:
-            memory = foreseen
+        if memory is start and foreseen is not None and foreseen.moved is not None and foreseen.moved.t_ns == until_ns:
+            memory = foreseen.moved
         else:
             memory = _moved(config, memory, until_ns)
         since_ns, before_ns = before_ns, until_ns
         now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
-        memory = _felt(config, memory, now)
+        memory = _felt(config, memory, now) if now else memory
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
                 variance = config.speed_std_mps**2 if speed.variance is None else speed.variance
@@ -199,8 +206,7 @@ def followed(
         )
         memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
     if measurement.has_position and not memory.misled:
-        course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
-        memory = _with_position(memory, measurement)._replace(course=course)
+        memory = _with_position(memory, measurement, foreseen)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 
@@ -210,7 +216,7 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
         return Off(0.0, 1.0, 0.0)
     moved_on = _moved(config, memory, measurement.t_ns)
     seen = position_seen(moved_on.bank, measurement.position_m, math.sqrt(measurement.variance_m2))
-    return Off(*seen.off(moved_on.bank), moved_on)
+    return Off(*seen.off(moved_on.bank), moved_on, seen)
 
 
 def _steps(from_ns: int, to_ns: int, stamps: Iterable[int]) -> Iterator[int]:
@@ -231,9 +237,7 @@ def _moved(config: Config, memory: Memory, until_ns: int) -> Memory:
 
 
 def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample]) -> Memory:
-    """Take in the mean of accelerations."""
-    if not felt:
-        return memory
+    """Take in the mean of some accelerations."""
     mean = sum(each.acceleration_mps2 for each in felt) / len(felt)
     variances = [config.imu_std_mps2**2 if each.variance is None else each.variance for each in felt]
     variance = sum(variances) / len(felt) ** 2

@@ -56,9 +56,14 @@ class Bank(NamedTuple):
         """Whether every number is finite and no variance below 0."""
         return weighing.is_sound(self.mean, self.covariance, self.log_weight)
 
+    def believing(self, mean: Array, covariance: Array, log_weight: Array) -> Bank:
+        """With these beliefs and weights under the same labels."""
+        labels = self.noise, self.law, self.kind
+        return Bank(mean, covariance, log_weight, *labels, self.born_s, self.changed_s)
+
     def normalised(self, least: float = -math.inf) -> Bank:
         """With probabilities that sum to 1, the logarithm of each no less than `least`."""
-        return self._replace(log_weight=weighing.normalised(self.log_weight, least))
+        return self.believing(self.mean, self.covariance, weighing.normalised(self.log_weight, least))
 
     def part(self, chosen: Mask | Indices) -> Bank:
         """A copy of the chosen hypotheses, with the weights that they have."""

@@ -93,7 +93,7 @@ def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:
     """The beliefs after `dt_s`; `declared_m` is the standard deviation that the positions declare."""
     mean, covariance = moving.moved(model_of(config), bank, _step(dt_s, braking, declared_m))
-    return bank._replace(mean=mean, covariance=covariance)
+    return bank.believing(mean, covariance, bank.log_weight)
 
 
 def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.Step:

@@ -84,10 +84,8 @@ def acceleration_seen(
 
 def corrected(bank: Bank, seen: Observation) -> Bank:
     """Take an observation in; the weights are not normalised."""
-    mean, covariance, log_weight = weighing.corrected(
-        bank.mean, bank.covariance, bank.log_weight, seen.innovation, seen.slope, seen.variances, CLIPPED
-    )
-    return bank._replace(mean=mean, covariance=covariance, log_weight=log_weight)
+    before = bank.mean, bank.covariance, bank.log_weight
+    return bank.believing(*weighing.corrected(*before, seen.innovation, seen.slope, seen.variances, CLIPPED))
 
 
 def not_slower(bank: Bank, rim_mps: float, std_mps: float) -> Bank:

@@ -92,6 +92,8 @@ class WheelsSeen(NamedTuple):
 
     def share(self, now_ns: int) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
+        if not self.slid_ns:
+            return None
         slid = [each is not None and now_ns - each < SLID_NS for each in self.slid_ns]
         rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
         known = sum(one or other for one, other in zip(slid, rolled, strict=True))

@@ -55,7 +55,7 @@ class Asked(NamedTuple):
 
 @kernel
 def _quantile(weight: Array, mean: Array, std: Array, probability: float) -> float:
-    """The root of F(x) = p by Halley's steps inside a bracket that shrinks, halved where a step would leave it.
+    """The root of F(x) = p by Halley's steps, far out Newton's, in a bracket that shrinks, halved where one leaves it.
 
     It is begun at the quantile of the Gaussian with the mixture's moments (Abramowitz and Stegun 26.2.23).
     """
@@ -89,13 +89,18 @@ def _quantile(weight: Array, mean: Array, std: Array, probability: float) -> flo
             low = x
         else:
             high = x
-        step = excess * math.sqrt(2.0 * math.pi) / density if density > 0.0 else np.inf
-        weaker = 1.0 - 0.5 * step * bend / density if density > 0.0 else 1.0
-        before, x = x, x - (step / weaker if weaker > 0.5 else step)
+        tail, wanted = (below, probability) if probability < 0.5 else (whole - below, whole - probability)
+        per = math.sqrt(2.0 * math.pi) / density if density > 0.0 else np.inf
+        if 0.0 < tail < 0.5 * wanted:  # far out the logarithm of the tail is nearly straight, and the tail is not
+            step = math.copysign(tail * math.log(tail / wanted) * per, excess)
+        else:
+            weaker = 1.0 - 0.5 * excess * per * bend / density if density > 0.0 else 1.0
+            step = excess * per / (weaker if weaker > 0.5 else 1.0)
+        before, x = x, x - step
+        if abs(x - before) <= 1e-12:  # it may be an end of the bracket by now
+            break
         if not low < x < high:
             x = 0.5 * (low + high)
-        if abs(x - before) <= 1e-12:
-            break
     return x
 
 
