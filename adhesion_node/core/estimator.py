@@ -122,11 +122,13 @@ def paired(config: Config, samples: Iterable[Sample]) -> Iterator[Measurement]:
 def _passed(config: Config, state: State, pushed: gate.Pushed) -> tuple[State, tuple[Estimate, ...]]:
     """Use what the gate has let through."""
     before: tuple[Estimate, ...] = ()
-    if any(event.outcome is Outcome.RESET for event in pushed.events):
+    if pushed.events and any(event.outcome is Outcome.RESET for event in pushed.events):
         state, before = _take_all(config, state, pushed.ended)
         state, last = last_estimate(config, state)
         state, before = state.forgotten(), before + last
     state = state._replace(inbox=pushed.inbox).told(*pushed.events)
+    if not pushed.matched:
+        return state, before
     state, estimates = _take_all(config, state, pushed.matched)
     return state, before + estimates
 

@@ -33,9 +33,12 @@ class Pushed(NamedTuple):
 def push(gate: Gate, inbox: Inbox, sample: Sample) -> Pushed:
     """Take one sample; return what is complete now."""
     t_ns, now_ns, suspects = sample.t_ns, inbox.now_ns, inbox.suspects
+    believed = now_ns is None or now_ns - gate.reset_ns <= t_ns <= now_ns + gate.far_ns
+    if believed and not suspects:
+        return _take(gate, inbox, sample)
     of_kind = tuple(each for each in suspects if type(each) is type(sample))
     of_others = tuple(each for each in suspects if type(each) is not type(sample))
-    if now_ns is None or now_ns - gate.reset_ns <= t_ns <= now_ns + gate.far_ns:
+    if now_ns is None or believed:
         return _with(_strays(now_ns, of_kind), _take(gate, inbox._replace(suspects=of_others), sample))
     if any(each.t_ns == t_ns for each in of_kind):
         return Pushed(inbox, events=(_doubled(sample),))
@@ -80,7 +83,7 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
         first_ns = inbox.released_ns - gate.kept_ns
     stream = stream.since(first_ns)
     now_ns = _newest(inbox.now_ns, sample)
-    inbox = inbox._replace(now_ns=now_ns).with_stream(type(sample), stream.delayed(now_ns - sample.t_ns))
+    inbox = inbox.with_stream(type(sample), stream.delayed(now_ns - sample.t_ns), now_ns)
     return _with(overtaken, Pushed(*release(gate, inbox, inbox.anchors.excess)))
 
 
@@ -100,15 +103,15 @@ def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     if t_ns == inbox.anchored_ns:
         return Pushed(inbox, events=(_doubled(anchor),))
     now_ns = _newest(inbox.now_ns, anchor)
-    inbox = inbox._replace(anchors=inbox.anchors.delayed(now_ns - t_ns))
+    anchors = inbox.anchors.delayed(now_ns - t_ns)
     reached = [] if released_ns is None else [released_ns + 1]
     reached += [] if newest_ns is None else [newest_ns - gate.max_lag_ns]
     if t_ns < max(reached, default=t_ns):
-        return _late(gate, inbox, anchor)
-    refused = inbox.anchors.refusal(t_ns)
+        return _late(gate, inbox._replace(anchors=anchors), anchor)
+    refused = anchors.refusal(t_ns)
     if refused is not None:
-        return Pushed(inbox, events=(Event(refused, _named(anchor)),))
-    inbox = inbox._replace(now_ns=now_ns, anchors=inbox.anchors.added(anchor), late=(0, 0))
+        return Pushed(inbox._replace(anchors=anchors), events=(Event(refused, _named(anchor)),))
+    inbox = inbox._replace(now_ns=now_ns, anchors=anchors.added(anchor), late=(0, 0))
     return Pushed(*release(gate, inbox, inbox.anchors.excess))
 
 
@@ -170,4 +173,4 @@ def _strays(now_ns: int | None, suspects: Iterable[Any]) -> tuple[Event, ...]:
 
 
 def _with(events: tuple[Event, ...], pushed: Pushed) -> Pushed:
-    return pushed._replace(events=events + pushed.events)
+    return pushed._replace(events=events + pushed.events) if events else pushed

@@ -102,9 +102,9 @@ class Inbox(NamedTuple):
         """What another sensor has measured."""
         return self.others.get(kind, NOTHING)
 
-    def with_stream(self, kind: type[Any], stream: Stream) -> Inbox:
-        """The inbox with another stream in place of that sensor's."""
-        return self._replace(others=MappingProxyType({**self.others, kind: stream}))
+    def with_stream(self, kind: type[Any], stream: Stream, now_ns: int) -> Inbox:
+        """The inbox with another stream in place of that sensor's, and its newest stamp of any."""
+        return self._replace(others=MappingProxyType({**self.others, kind: stream}), now_ns=now_ns)
 
 
 def is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
@@ -123,12 +123,16 @@ def _known_ns(inbox: Inbox, source: Source, t_ns: int) -> int:
 
 def value_of(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
     """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
+    if source.kind not in inbox.others:
+        return None
     latest = inbox.stream(source.kind).latest(_known_ns(inbox, source, t_ns))
     return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest
 
 
 def each_of(inbox: Inbox, source: Source, t_ns: int) -> tuple[Any, ...]:
     """The samples of a sensor up to a time that are not used up, the newest ones where they are too many."""
+    if source.kind not in inbox.others:
+        return ()
     before_ns = t_ns if inbox.released_ns is None else min(inbox.released_ns, t_ns)
     unspent = inbox.stream(source.kind).unspent(before_ns - source.age_ns, _known_ns(inbox, source, t_ns))
     return unspent[-MOST_EACH:]

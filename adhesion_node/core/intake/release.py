@@ -33,8 +33,9 @@ def release(gate: Gate, inbox: Inbox, count: int, until_ns: int | None = None) -
         inbox, values = _given_out(gate, inbox, turn)
         matched.append(Matched(turn, values))
         taken += not isinstance(turn, Tick)
-    left = inbox.anchors._replace(samples=anchors[taken:])
-    return inbox._replace(anchors=left) if taken else inbox, tuple(matched)
+    if taken:
+        inbox = inbox._replace(anchors=inbox.anchors._replace(samples=anchors[taken:]))
+    return inbox, tuple(matched)
 
 
 def _turn(gate: Gate, inbox: Inbox, waiting: tuple[Any, ...], forced: bool, until_ns: int | None) -> Any | None:
@@ -92,19 +93,20 @@ def _is_last(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
 def _lacks(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
     """Whether a sensor that is there has not come as far as a time, and is to be waited for by the anchors' stamps."""
     newest_ns = inbox.anchors.newest_ns
-    return any(
-        (newest_ns is None or t_ns > newest_ns - source.wait_ns)
-        and not inbox.stream(source.kind).has_reached(t_ns)
-        and is_present(inbox, source, t_ns)
-        for source in gate.sources
-    )
+    for source in gate.sources:  # at every anchor: quicker than `any`
+        waits = newest_ns is None or t_ns > newest_ns - source.wait_ns
+        if waits and not inbox.stream(source.kind).has_reached(t_ns) and is_present(inbox, source, t_ns):
+            return True
+    return False
 
 
 def _next_tick_ns(gate: Gate, inbox: Inbox) -> int | None:
     """When the other sensors have something new to tell next, if no anchor comes before; None: at no time so far."""
+    before_ns = inbox.released_ns
+    if before_ns is not None and inbox.now_ns is not None and inbox.now_ns < before_ns + gate.tick_ns:
+        return None
     leading = [source for source in gate.sources if source.leads]
     streams = [inbox.stream(source.kind) for source in leading]
-    before_ns = inbox.released_ns
     if before_ns is None:
         before_ns = min((stream.samples[0].t_ns for stream in streams if stream.samples), default=None)
     if not gate.tick_ns or before_ns is None or inbox.now_ns is None or inbox.now_ns < before_ns + gate.tick_ns:

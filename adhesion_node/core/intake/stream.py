@@ -48,7 +48,7 @@ class Stream(NamedTuple):
             return self._replace(samples=(sample,), newest_ns=t_ns, allowed_ns=t_ns + INTERVAL_NS)
         if t_ns >= self.newest_ns:
             allowed_ns = max(t_ns, self.allowed_ns) + INTERVAL_NS
-            return self._replace(samples=(*self.samples, sample), newest_ns=t_ns, allowed_ns=allowed_ns)
+            return Stream((*self.samples, sample), t_ns, allowed_ns, self.spent_ns, self.lag_ns)
         samples = list(self.samples)
         insort(samples, sample)
         return self._replace(samples=tuple(samples))
@@ -60,7 +60,8 @@ class Stream(NamedTuple):
 
     def delayed(self, behind_ns: int) -> Stream:
         """The stream after a sample so far behind the newest stamp of all; the next one forgets a fifth of that."""
-        return self._replace(lag_ns=max(behind_ns * 5 // 4, self.lag_ns * 4 // 5))
+        lag_ns = max(behind_ns * 5 // 4, self.lag_ns * 4 // 5)
+        return self if lag_ns == self.lag_ns else Stream(*self[:4], lag_ns)
 
     @property
     def excess(self) -> int:
@@ -70,7 +71,7 @@ class Stream(NamedTuple):
     def since(self, first_ns: int) -> Stream:
         """Without what is older than a time or beyond the most that are kept."""
         first = max(bisect_left(self.samples, (first_ns,)), self.excess)
-        return self._replace(samples=self.samples[first:]) if first > 0 else self
+        return Stream(self.samples[first:], *self[1:]) if first > 0 else self
 
     def has_between(self, first_ns: int, last_ns: int) -> bool:
         """Whether a kept sample is stamped from the first to the last time."""

@@ -18,6 +18,9 @@ POINTS = 64
 """Points of a curve: enough for linear interpolation to 0.1 %, few enough for a message."""
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
+_GRID, _HALF = np.linspace(1.0, 0.0, POINTS), 0.5 / (POINTS - 1)
+_EVERY = np.concatenate((_GRID, ((_GRID[:-1] + _GRID[1:])[:, None] / 2 + _HALF * _NODES).ravel()))
+"""Of the speed that is lost: the points of a curve, and behind them the nodes between two of them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,20 +47,18 @@ def curve(
         raise ValueError(f"braking curve grade = {grade!r}: give a finite rise over run")
     if not callable(mu):
         _require(mu=mu)
-    speeds = np.linspace(max(speed_mps, target_mps), target_mps, POINTS)
-    half = (speeds[:-1] - speeds[1:]) / 2
-    inner = (speeds[:-1] + speeds[1:])[:, None] / 2 + half[:, None] * _NODES
-    found = _deceleration(train, np.concatenate((speeds, inner.ravel())), mu, grade)
-    at_points, slowing = found[:POINTS], found[POINTS:].reshape(inner.shape)
+    lost = max(speed_mps - target_mps, 0.0)
+    every = target_mps + lost * _EVERY
+    found = _deceleration(train, every, mu, grade)
     weakest = float(found.min())
     if not weakest > 0.0:
         raise ValueError(f"braking curve: deceleration {weakest:.4g} m/s^2 at grade {grade:g}: the train does not slow")
-    per_speed = _WEIGHTS / slowing
+    inner, slowing = every[POINTS:].reshape(-1, _NODES.size), found[POINTS:].reshape(-1, _NODES.size)
     return BrakingCurve(
-        distance_m=_cumulate(half * np.sum(inner * per_speed, axis=1)),
-        speed_mps=speeds,
-        deceleration_mps2=at_points,
-        time_s=_cumulate(half * np.sum(per_speed, axis=1)),
+        distance_m=_cumulate(inner / slowing @ (_HALF * lost * _WEIGHTS)),
+        speed_mps=every[:POINTS],
+        deceleration_mps2=found[:POINTS],
+        time_s=_cumulate(1.0 / slowing @ (_HALF * lost * _WEIGHTS)),
     )
 
 
@@ -73,7 +74,9 @@ def _deceleration(train: Train, speed: Array, mu: float | AdhesionLaw, grade: fl
 
 
 def _cumulate(steps: Array) -> Array:
-    return np.concatenate(([0.0], np.cumsum(steps)))
+    sums = np.zeros(steps.size + 1)
+    np.cumsum(steps, out=sums[1:])
+    return sums
 
 
 def _require(**values: float) -> None:

@@ -103,7 +103,7 @@ def off(
         each = foreseen[h] + variance[h]
         nearest = min(nearest, abs(innovation[h]) / math.sqrt(each))
         spread += math.exp(log_weight[h]) * (each + (innovation[h] - metres) ** 2)
-    return metres, math.sqrt(spread), nearest
+    return metres, math.sqrt(spread), nearest + 0.0 * spread  # NaN where any number has failed
 
 
 @kernel
