@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from sim_node.train.sensors import SensorSettings
 
-from ...core import Config
 from ..baselines.ekf import NAIVE, TUNED
 from ..trial.estimators import EXACT, Estimator
 from ..trial.trials import Trials
@@ -23,7 +22,7 @@ PAPER = replace(EXACT, method="particle_em", window=50, step=10, particles=20, i
 """The paper's settings at the nominal noise, those of every method in the tables."""
 
 METHODS: Mapping[str, Estimator] = {
-    "bank": Estimator(replace(PAPER, method="bank", law_probability=Config().law_probability), "core"),
+    "bank": Estimator(replace(PAPER, method="bank"), "core"),
     "rail_condition": Estimator(replace(PAPER, method="rail_condition"), "core"),
     "particle_em": Estimator(PAPER, "core"),
     "ekf_tuned": Estimator(PAPER, "ekf", TUNED),
