@@ -55,11 +55,9 @@ SLID = 0.9
 WHEEL_SHARE = 0.008
 """Error of the fastest rim's speed, relative."""
 
-UNLIKELY = 1e-3
-"""Probability below which a way that positions err is left out of a braking."""
-
-FORGOTTEN = 1e-5
-"""Least probability of how positions err while no brake is applied: sensors change."""
+FORGOTTEN = 0.02
+"""Least probability of how positions err while no brake is applied: sensors change, and unknown traction looks like an
+error that wanders."""
 
 PITCH_MEAN, PITCH_STD, BIAS_STD = 0.08, 0.08, 0.005
 """Of an accelerometer: 0.3 to 1 degree under a full brake, 0.05 m/s^2."""
@@ -290,10 +288,9 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         return memory if pressed else _led_again(memory)
     braked = pressed and bank.mean_of(SPEED) >= config.slowest_mps
     if braked and not memory.braked:
-        likely = bank.part(bank.log_weight > math.log(UNLIKELY)).normalised()
         known = rail()
         told_s = now_s + SETTLING_S + config.brake_build_up_s
-        return memory._replace(bank=opened(config, likely, known), since_s=0.0, seen=1, told_s=told_s, known=known)
+        return memory._replace(bank=opened(config, bank, known), since_s=0.0, seen=1, told_s=told_s, known=known)
     if memory.braked and not braked:
         return memory._replace(bank=closed(bank), seen=0)
     if not memory.braked:
