@@ -12,6 +12,8 @@ from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
 from .metadata import Metadata, read_metadata
 from .recordings import McapRecording, Record, Recording
+from .trajectory import TYPE as TRAJECTORY
+from .trajectory import trajectory
 from .types import same_name
 
 
@@ -50,10 +52,13 @@ class BagReader:
         return self._recording.records(chosen.__contains__)
 
     def decoded(self, names: Iterable[str]) -> Iterator[tuple[Record, Any]]:
-        """Yield the records of the topics named, each with its message; those that do not decode are left out."""
+        """Yield the records of the topics named, each with its message; those that do not decode are left out.
+
+        The points of a trajectory come as one array.
+        """
         for record in self.messages(names):
             try:
-                message = record.message
+                message = (record.type == TRAJECTORY and trajectory(record.cdr)) or record.message
             except Rejected:
                 self._undecodable.add(record)
             else:

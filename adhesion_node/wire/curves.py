@@ -4,6 +4,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -40,14 +41,13 @@ and of v^2 what rounding makes of it."""
 def read_curve(message: Any, line: Line) -> StampedCurve:
     """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected.
 
+    Its points may be decoded as one array, of (n, 4): position, velocity, acceleration, s.
     Where the chainage falls along it, its velocities are below 0 and its accelerations above, on a standing train too.
     """
     points = message.points
     if list(message.joint_names) != [TRAIN] or not 2 <= len(points) <= MOST_POINTS:
         raise Rejected(Reason.BAD_CURVE, f"braking curve joints = {list(message.joint_names)}, points = {len(points)}")
-    if any(not len(p.positions) == len(p.velocities) == len(p.accelerations) == 1 for p in points):
-        raise Rejected(Reason.BAD_CURVE, "braking curve: a point without exactly one value of each kind")
-    rows = np.array([_row(point) for point in points])
+    rows = points if isinstance(points, np.ndarray) else _rows(points)
     usable = (np.abs(rows) <= 10 * MAX_POSITION_M).all(axis=1)  # False for NaN
     if not usable.all():
         index = int(np.argmin(usable))
@@ -118,6 +118,12 @@ def write_target(new: New, t_ns: int, target: Target, frame: str = FRAME) -> Fie
 
 def _predicted(new: New, estimate: Estimate, curve: BrakingCurve | None) -> Fields | None:
     return None if curve is None else write_curve(new, estimate.t_ns, estimate.position_m, curve)
+
+
+def _rows(points: Sequence[Any]) -> Array:
+    if any(not len(p.positions) == len(p.velocities) == len(p.accelerations) == 1 for p in points):
+        raise Rejected(Reason.BAD_CURVE, "braking curve: a point without exactly one value of each kind")
+    return np.array([_row(point) for point in points])
 
 
 def _row(point: Any) -> tuple[float, float, float, float]:
