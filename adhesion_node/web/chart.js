@@ -193,8 +193,12 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     action();
   }
 
-  // uPlot wants one x for all lines; a chart without any point still has its axes.
-  const table = () => uPlot.join([[spec.x.range, [null, null]], ...spec.lines.map((line) => [line.x, line.y])]).toSpliced(1, 1);
+  // uPlot wants one x for all lines; a chart without any point still has its axes. A gap reaches to the line's own next
+  // points (2), whatever other lines have within it.
+  const table = () => {
+    const tables = [[spec.x.range, [null, null]], ...spec.lines.map((line) => [line.x, line.y])];
+    return uPlot.join(tables, tables.map(() => [2, 2])).toSpliced(1, 1);
+  };
 
   function draw(wanted = spec) {
     spec = wanted;

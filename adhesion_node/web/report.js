@@ -32,10 +32,10 @@ function fixedFrom(run, { place, speed }) {
   return { x: [place, ...x.slice(first).map((each) => each - start + place)], y: [speed, ...y.slice(first)] };
 }
 
-// Where the braking of a time, or the way after it, is: as far as the fixed worst case tells all there is to compare.
+// Where the braking of a time, or the way after it, is: to where it ended and as far as the fixed worst case tells.
 function extentAt(run, t) {
-  const [from] = run.brakings.findLast(([start]) => start <= t) ?? run.brakings[0] ?? [0], first = momentAt(run, Math.max(from, t < from ? t : from));
-  return [first.place, fixedFrom(run, first).x.at(-1)];
+  const [from, end] = run.brakings.findLast(([start]) => start <= t) ?? run.brakings[0] ?? [0, 0], first = momentAt(run, Math.max(from, t < from ? t : from));
+  return [first.place, Math.max(fixedFrom(run, first).x.at(-1), momentAt(run, end).place)];
 }
 
 function curveChart(run, moment, wide) {
@@ -54,7 +54,8 @@ function told({ regime, mu }) {
 }
 
 function readout(moment) {
-  const claim = moment.regime === "coasting" ? "" : `, saved at least ${number(moment.saved_at_least, 0)} m`;
+  const saved = moment.saved_at_least, kept = saved >= 0 ? `saved at least ${number(saved, 0)} m` : `${number(-saved, 0)} m more than the fixed`;
+  const claim = moment.regime === "coasting" || saved === null ? "" : `, ${kept}`;
   return `${number(moment.speed, 1)} km/h, ${told(moment)}, at least ${number(moment.mu_lower, 4)}, ${moment.words}; ` +
     `to ${target} km/h by μ̂ ${number(moment.distance, 0)} m, by the bound ${number(moment.longest, 0)} m${claim}`;
 }

@@ -191,6 +191,44 @@ def test_the_numbers_of_an_axis_are_whole(hour: str) -> None:
             assert size >= longest + 15.0, "ticks and their gap take 15 pixels"
 
 
+def test_a_phone_scrolls_to_columns_as_wide_as_their_heads(hour: str) -> None:
+    """Before: one of ten columns on a phone had its head in seven lines."""
+    with browser.open_page(**browser.LOOKS["phone"]) as (page, _):
+        page.goto(hour)
+        assert page.locator("table").nth(1).locator("thead").bounding_box()["height"] <= 100.0
+
+
+def test_no_line_bridges_where_it_does_not_hold(hour: str) -> None:
+    """Before: a prior went on, dotted, through what was identified, as other lines have values within its gap."""
+    with browser.open_page() as (page, _):
+        page.goto(hour)
+        page.evaluate(
+            """() => {
+              const made = [...drawn][1], dense = Array.from({ length: 201 }, (_, i) => i / 10);
+              made.draw({ title: "gap", x: { label: "time, s", range: [0, 20] }, y: { range: [0, 2] }, lines: [
+                { label: "dense", kind: "truth", x: dense, y: dense.map(() => 0.2) },
+                { label: "with a gap", kind: "sbi", x: [0, 4, 8, 12, 16, 20], y: [1, 1, null, null, 1, 1] }] });
+            }"""
+        )
+        page.wait_for_function("[...drawn][1].plot.scales.x.max === 20")
+        ends = page.evaluate("[0, 4, 15].map((x) => [...drawn][1].plot.valToPos(x, 'x'))")
+        over = page.locator(".u-over").nth(1).bounding_box()
+        picture, yellow = seen.look(page), (138, 109, 0)
+        inside, outside = (
+            picture.part((over["x"] + from_, over["y"], over["x"] + to, over["y"] + over["height"]))
+            for from_, to in ((ends[1] + 5.0, ends[2]), (ends[0], ends[1]))
+        )
+        assert (outside == yellow).all(axis=-1).sum() > 20
+        assert not (inside == yellow).all(axis=-1).any()
+
+
+def test_the_curves_are_shown_to_where_the_braking_ended(report: str) -> None:
+    """Before: on a rail worse than the worst case the chart ended before the train did."""
+    with browser.open_page() as (page, _):
+        page.goto(f"{report}#t=12")
+        assert shown_range(page, 0)[1] >= page.evaluate("runs[0].moments.at(-1).place")
+
+
 def test_gaps_are_gaps(hour: str) -> None:
     with browser.open_page() as (page, _):
         page.goto(hour)

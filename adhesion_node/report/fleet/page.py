@@ -81,7 +81,8 @@ def _findings(fleet: Fleet) -> str:
     of, rail = fleet.brakings, fleet.rail
     low, high = _track(rail)
     limited = of[of["mu"].notna()]
-    rows = [["Brakings", f"{len(of)} of {of['train'].nunique()} trains in {of['recording'].nunique()} recordings"]]
+    rows = [["Brakings", str(len(of))], ["Trains", str(of["train"].nunique())]]
+    rows.append(["Recordings", str(of["recording"].nunique())])
     rows.append(["Time", f"{of['time'].min():%Y-%m-%d %H:%M} to {of['time'].max():%Y-%m-%d %H:%M}"])
     rows.append(["Track", f"{low / 1e3:.1f} to {high / 1e3:.1f} km"])
     rows.append(["Adhesion identified", f"in {len(limited)} of {len(of)} brakings"])

@@ -23,7 +23,7 @@ def draw(found: Mapping[Case, Nominal], figures: Figures) -> None:
             std = np.interp(LOST_KMH * KMH, bound.lost_mps[braked], 100.0 * bound.mu_relative_std[braked])
             curves |= {f"positions with σ = {case.sigma_m:g} m": std} if case.scenario == scenario else {}
         title = f"What no estimator can beat: {scenario.replace('_', ' ')}, positions at 10 Hz"
-        with picture(figures.path(f"bound_{scenario}"), title) as axis:
+        with picture(figures.place(f"bound_{scenario}"), title) as axis:
             draw_lines(axis, LOST_KMH, curves)
             axis.set(xlabel="speed lost under the brake, km/h", ylabel="least σ of μ̂, %", yscale="log")
             axis.legend(loc="upper right")

@@ -89,7 +89,7 @@ def draw(thetas: Mapping[str, Array], figures: Figures) -> None:
     for panel in PANELS:
         count = thetas[panel.experiment].shape[1]
         title = f"Fig. {panel.number}: {panel.quantity}, {panel.title}; N = {count} runs"
-        with picture(figures.path(f"fig{panel.number:02d}"), title) as axis:
+        with picture(figures.place(f"fig{panel.number:02d}"), title) as axis:
             _draw_panel(axis, panel, _values(thetas[panel.experiment], panel.quantity))
 
 
@@ -129,7 +129,7 @@ def _places(panel: Panel) -> Array:
 
 
 def _draw_models(figures: Figures) -> None:
-    with picture(figures.path("fig01"), "Fig. 1: adhesion as measured, simulated") as axis:
+    with picture(figures.place("fig01"), "Fig. 1: adhesion as measured, simulated") as axis:
         truth = adhesion(CREEPS, he.SLOPE, he.DRY)
         measured = he.measure(CREEPS, he.on_one(CREEPS), 1, 1, in_mu=True).adhesion[:, 0]
         axis.plot(CREEPS, measured, color="0.0", marker="+", ls="", label="measured")
@@ -137,11 +137,11 @@ def _draw_models(figures: Figures) -> None:
             axis.plot(CREEPS, truth + sign * 2.0 * he.NOISE_STD, color=BLUE, ls="--", label=label)
         axis.set(xlabel="creep", ylabel="adhesion coefficient")
         axis.legend(loc="lower right")
-    with picture(figures.path("fig02"), "Fig. 2: Burckhardt's model, roads") as axis:
+    with picture(figures.place("fig02"), "Fig. 2: Burckhardt's model, roads") as axis:
         draw_lines(axis, CREEPS, {name: model(CREEPS) for name, model in ROADS.items()})
         axis.set(xlabel="creep", ylabel="adhesion coefficient")
         axis.legend(loc="center right")
-    with picture(figures.path("fig03"), "Fig. 3: Kiencke's curve beside Burckhardt's model, dry road") as axis:
+    with picture(figures.place("fig03"), "Fig. 3: Kiencke's curve beside Burckhardt's model, dry road") as axis:
         curves = {"Burckhardt": DRY_ROAD(CREEPS), "Kiencke": adhesion(CREEPS, DRY_ROAD.slope, like(DRY_ROAD))}
         peaked = (f"{name}: peak {mu.max():.3f} at {CREEPS[mu.argmax()]:.3f}" for name, mu in curves.items())
         draw_lines(axis, CREEPS, dict(zip(peaked, curves.values(), strict=True)))

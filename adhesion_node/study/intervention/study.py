@@ -28,7 +28,7 @@ from ...run import offline
 from ...run.pipeline import Pipeline
 from ...run.score import Truth
 from ..trial.estimators import EXACT
-from ..trial.figures import add_figure_options, figures_of
+from ..trial.figures import Place, add_figure_options, figures_of
 from ..xie.distances import BRAKINGS
 from ..xie.published import WORST
 
@@ -65,20 +65,20 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
         said = predictions(options.bags / scenario, options.seed)
         table += rows(scenario, said, options.kwet)
         if scenario == "tunnel_entry" and (figures := figures_of(options)) is not None:
-            _draw(said, figures.path(PICTURE))
+            _draw(said, figures.place(PICTURE))
     return table, "\n".join(lines(table))
 
 
-def _draw(said: list[Prediction], path: Path) -> None:
+def _draw(said: list[Prediction], place: Place) -> None:
     """Draw the limits of the braking curve on the lower bound at 200 km/h."""
     from .figure import draw
 
     last = _last(said, 200.0 * KMH)
     if last is None or last.safe is None:
-        raise ValueError(f"figures = {path.parent}: there is no braking curve at 200 km/h to draw")
+        raise ValueError(f"figures = {place.path.parent}: there is no braking curve at 200 km/h to draw")
     fixed = braking.curve(CRH3, last.estimate.speed_mps, WORST)
     title = f"Supervision limits by the lower bound of adhesion {last.estimate.mu_lower:.4f}"
-    draw(SupervisionConfig(), last.safe, fixed, title, path)
+    draw(SupervisionConfig(), last.safe, fixed, title, place)
 
 
 def predictions(bag: Path, seed: int) -> list[Prediction]:

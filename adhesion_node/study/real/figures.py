@@ -34,7 +34,7 @@ def draw_all(table: Sequence[Mapping[str, Any]], figures: Figures) -> None:
             "goal": [_times(row["goals"].get(figure, [None, None])[end], factor) for row in table],
         }
         title = f"On trains with wheels: {unit}; N = {runs} runs of each case"
-        draw_cases(figures.path(f"all_{figure.split('_')[0]}"), title, unit, names, columns)
+        draw_cases(figures.place(f"all_{figure.split('_')[0]}"), title, unit, names, columns)
 
 
 def _times(value: float | None, factor: float) -> float | None:
@@ -46,8 +46,8 @@ def draw(case: Case, found: Found, figures: Figures) -> None:
     of_run = found.of_seed(int(found.runs["seed"][0]))
     (run,) = of_run.runs
     rows = of_run.rows[(of_run.rows["out_s"] >= run["full_s"] - BEFORE_S) & (of_run.rows["t_s"] <= run["slow_s"])]
-    title = f"{case.name}: the train knew at each time what came out by then (seed {run['seed']})"
-    with panels(figures.path(case.name.replace(" ", "-")), title, 3, (9.0, 3.2)) as axes:
+    title = f"{case.name.replace('_', ' ')}: the train knew at each time what came out by then (seed {run['seed']})"
+    with panels(figures.place(case.name.replace(" ", "-")), title, 3) as axes:
         for axis, what in zip(axes, (_adhesion, _way, _speed), strict=True):
             what(axis, rows)
             for since_s, until_s, regime in _bands(rows):

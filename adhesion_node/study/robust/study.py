@@ -54,6 +54,6 @@ def _draw(name: str, table: Sequence[Mapping[str, Any]], figures: Figures) -> No
         "5 %": [row["p5_relative_error_percent"] for row in table],
         "95 % of the runs": [row["p95_relative_error_percent"] for row in table],
     }
-    draw_cases(figures.path(f"{name}_error"), title, "relative error of μ̂, %", names, error)
+    draw_cases(figures.place(f"{name}_error"), title, "relative error of μ̂, %", names, error)
     kept = [None if row["lower_bound_holds"] is None else 100.0 * row["lower_bound_holds"] for row in table]
-    draw_cases(figures.path(f"{name}_bound"), title, "lower bound kept, %", names, {"bound": kept})
+    draw_cases(figures.place(f"{name}_bound"), title, "lower bound kept, %", names, {"bound": kept})

@@ -4,7 +4,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -13,12 +13,14 @@ from matplotlib.figure import Figure
 
 from ...core.physics.train import Array
 from ...report.picture import BLACK, BLUE, GREY, ORANGE
+from .figures import Place
 
 STYLES = ((BLACK, "-"), (BLUE, "--"), (ORANGE, "-."), (GREY, ":"), ("#5b8c2a", (0, (5, 1, 1, 1, 1, 1))))
 """Colour and dashes of the lines of a picture."""
 
-COLUMN_IN, PAGE_IN = 3.5, 7.2
-"""Width of a column and of both columns, inches."""
+INCH_MM = 25.4
+TITLE_PER_IN = 15
+"""Letters of a title that stand on an inch."""
 
 LETTERS: Any = {"font.size": 8.0, "svg.fonttype": "none", "pdf.fonttype": 42}
 """Height of the letters, points; texts stay texts."""
@@ -36,23 +38,23 @@ NAMES = {
 
 
 @contextmanager
-def panels(path: Path, title: str, count: int, size: tuple[float, float] = (PAGE_IN, 3.2)) -> Iterator[list[Any]]:
-    """Give the axes of a picture of `count` panels of a size, inches; it is written when the block is done."""
-    width, height = size
+def panels(place: Place, title: str, count: int, height: float = 3.2) -> Iterator[list[Any]]:
+    """Give the axes of a picture of `count` panels of a height, inches; it is written when the block is done."""
+    width = place.width_mm / INCH_MM
     with rc_context(LETTERS):
         figure = Figure(figsize=(width, height * count + 0.4), layout="constrained")
-        figure.suptitle(title)
+        figure.suptitle(fill(title, int(TITLE_PER_IN * width)))
         axes = list(figure.subplots(count, squeeze=False)[:, 0])
         for axis in axes:
             axis.grid(alpha=0.3)
         yield axes
-        figure.savefig(path, dpi=DOTS_PER_INCH)
+        figure.savefig(place.path, dpi=DOTS_PER_INCH)
 
 
 @contextmanager
-def picture(path: Path, title: str, size: tuple[float, float] = (PAGE_IN, 3.2)) -> Iterator[Any]:
+def picture(place: Place, title: str, height: float = 3.2) -> Iterator[Any]:
     """Give the axis of a picture of one panel."""
-    with panels(path, title, 1, size) as (axis,):
+    with panels(place, title, 1, height) as (axis,):
         yield axis
 
 
@@ -66,14 +68,14 @@ def draw_lines(axis: Any, x: Array, lines: Mapping[str, Array]) -> None:
 
 
 def draw_cases(
-    path: Path, title: str, unit: str, names: Sequence[str], columns: Mapping[str, Sequence[float | None]]
+    place: Place, title: str, unit: str, names: Sequence[str], columns: Mapping[str, Sequence[float | None]]
 ) -> None:
     """Draw a row of marks for each case, one mark for each column; None is left out."""
     height, rows = 0.17 * len(names) + 0.9, np.arange(len(names))
-    with picture(path, title, (PAGE_IN, height)) as axis:
+    with picture(place, title, height) as axis:
         for (color, _), marker, (label, values) in zip(STYLES, "osx^v", columns.items(), strict=False):
             known = np.array([np.nan if value is None else value for value in values], dtype=float)
             axis.plot(known, rows, color=color, marker=marker, ms=4, ls="", label=label)
-        axis.set_yticks(rows, names)
+        axis.set_yticks(rows, [name.replace("_", " ") for name in names])
         axis.set(xlabel=unit, ylim=(len(names) - 0.5, -0.5))
         axis.legend(loc="best")

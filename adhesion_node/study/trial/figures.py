@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""Where the figures of a study go, and in which format; without what draws them."""
+"""Where the figures of a study go, in which format and how wide; without what draws them."""
 
 import argparse
 from pathlib import Path
@@ -8,25 +8,38 @@ from typing import NamedTuple
 
 FORMATS = ("png", "pdf", "svg")
 
+COLUMN_MM, PAGE_MM = 85, 170
+"""Width of a column of a journal, and of both."""
+
+
+class Place(NamedTuple):
+    """Where a figure goes, and how wide it is."""
+
+    path: Path
+    width_mm: float = PAGE_MM
+
 
 class Figures(NamedTuple):
-    """Where figures go, and in which of `FORMATS`."""
+    """Where figures go, in which of `FORMATS`, and how wide they are."""
 
     folder: Path
     ending: str = "png"
+    width_mm: float = PAGE_MM
 
-    def path(self, stem: str) -> Path:
-        """Path of a figure; the folder is made when missing."""
+    def place(self, stem: str) -> Place:
+        """Place of a figure; the folder is made when missing."""
         self.folder.mkdir(parents=True, exist_ok=True)
-        return self.folder / f"{stem}.{self.ending}"
+        return Place(self.folder / f"{stem}.{self.ending}", self.width_mm)
 
 
 def add_figure_options(parser: argparse.ArgumentParser, what: str) -> None:
     """Options of a study that draws."""
     parser.add_argument("--figures", type=Path, metavar="DIR", help=f"draw {what} into DIR")
     parser.add_argument("--format", choices=FORMATS, default="png", help="of the figures (default %(default)s)")
+    widths = "of the figures, mm: a column of a journal, or both (default %(default)s)"
+    parser.add_argument("--width", type=int, choices=(COLUMN_MM, PAGE_MM), default=PAGE_MM, help=widths)
 
 
 def figures_of(options: argparse.Namespace) -> Figures | None:
     """What the options ask for."""
-    return Figures(options.figures, options.format) if options.figures else None
+    return Figures(options.figures, options.format, options.width) if options.figures else None

@@ -7,7 +7,6 @@ error and its relative error over speed, from every start.
 """
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +15,7 @@ from ...core.physics import braking
 from ...core.physics.adhesion import DRY, WET
 from ...core.physics.train import CRH3, KMH, Array
 from ..trial.drawing import NAMES, STYLES, draw_lines, panels, picture
-from ..trial.figures import Figures
+from ..trial.figures import Figures, Place
 from ..trial.score import relative_percent
 from ..trial.trials import Results, Rows, each_trial
 from .published import BRAKING_CASES
@@ -92,13 +91,13 @@ def _draw_ends(scene: Scene, along: str, unit: str, number: int, figures: Figure
         axis.plot([], [], color="0.3", marker="x", ms=9, mew=2, ls="", label="end of the paper's braking")
         axis.set(xlabel=f"{along}, {unit}", ylabel="speed, km/h", ylim=(0.0, 1.05 * scene.from_kmh))
         axis.set_xlim(left=0.0)
-        axis.legend(loc="lower left", title="adhesion")
+        axis.legend(loc="lower left", title="adhesion", fontsize="small", title_fontsize="small")
 
 
-def _named(scene: Scene, number: int, what: str, figures: Figures) -> tuple[Path, str]:
-    """Path and title of a picture."""
+def _named(scene: Scene, number: int, what: str, figures: Figures) -> tuple[Place, str]:
+    """Place and title of a picture."""
     title = f"Fig. {number}: {scene.way}, {scene.from_kmh:g} to {scene.to_kmh:g} km/h, {what}"
-    return figures.path(f"fig{number:02}_{scene.scenario}_{what}"), title
+    return figures.place(f"fig{number:02}_{scene.scenario}_{what}"), title
 
 
 FIRST_FIGURES = {"tunnel_entry": {"particle_em": 4, "ekf": 7}, "tunnel_exit": {"particle_em": 14, "ekf": 17}}
@@ -138,12 +137,12 @@ def draw_estimates(cells: Mapping[tuple[str, str], Results], figures: Figures) -
             seeds, starts = (np.unique(some.rows[name]).size for name in ("seed", "start"))
             count = f"N = {seeds} runs from each of {starts} starts"
             for number, quantity in enumerate(QUANTITIES, first):
-                path = figures.path(f"fig{number:02}_{scenario}_{family}_{quantity.name}")
-                _draw(shown, quantity, path, f"Fig. {number}: {way}, {quantity.label}; {count}")
+                place = figures.place(f"fig{number:02}_{scenario}_{family}_{quantity.name}")
+                _draw(shown, quantity, place, f"Fig. {number}: {way}, {quantity.label}; {count}")
 
 
-def _draw(shown: Mapping[str, Results], quantity: Quantity, path: Path, title: str) -> None:
-    with panels(path, title, len(shown)) as axes:
+def _draw(shown: Mapping[str, Results], quantity: Quantity, place: Place, title: str) -> None:
+    with panels(place, title, len(shown)) as axes:
         for axis, (method, found) in zip(axes, shown.items(), strict=True):
             _draw_method(axis, found, quantity)
             axis.set(title=NAMES[method], xlabel="speed, km/h", ylabel=quantity.label)

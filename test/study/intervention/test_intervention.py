@@ -9,6 +9,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 from matplotlib.image import imread
 
@@ -16,8 +17,13 @@ from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.core.prediction import Prediction
+from adhesion_node.report.predicted import Curve, Curves
+from adhesion_node.report.run import Run
+from adhesion_node.report.series import Series
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.intervention import study as intervention
+from adhesion_node.study.intervention.figure import draw_changing
+from adhesion_node.study.trial.figures import Place
 
 
 def prediction(speed_kmh: float, mu: float, mu_lower: float) -> Prediction:
@@ -84,7 +90,7 @@ def test_the_command_prints_the_table_and_writes_json(
     for row in table:
         if row["ebi_m"] is not None:
             assert row["ebi_m"] < row["sbi_m"] < row["warning_m"] < row["permitted_m"] < row["indication_m"]
-    assert imread(tmp_path / "figures" / "supervision.png").shape[:2] == (800, 1440)
+    assert imread(tmp_path / "figures" / "supervision.png").shape[:2] == (800, 1338)
     out, err = capsys.readouterr()
     printed = out.splitlines()
     assert f"written: {tmp_path / 'figures' / 'supervision.png'}" in err.splitlines()
@@ -110,3 +116,35 @@ def test_bad_input_is_one_line_and_code_2(options: list[str], message: str, caps
     assert main(["intervention", *options]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert message in line
+
+
+BRAKED_M, LEAVES_M, STOPS_M = 400.0, 800.0, 1800.0
+DRY_MPS2, LEAVES_MPS2 = 1.0, 0.4
+
+
+def braked_onto_leaves() -> Run:
+    """A run at constant decelerations, and what was known of it: nothing, then 0.9 of what there is."""
+    place = np.arange(0.0, STOPS_M + 5.0, 5.0)
+    on_leaves = np.maximum(STOPS_M - np.maximum(place, LEAVES_M), 0.0)
+    on_dry = np.maximum(LEAVES_M - np.maximum(place, BRAKED_M), 0.0)
+    speed = np.sqrt(2.0 * (LEAVES_MPS2 * on_leaves + DRY_MPS2 * on_dry))
+    given = np.where(place < BRAKED_M, 0.2, np.where(place < LEAVES_M, DRY_MPS2, LEAVES_MPS2))
+    times = (place * 1e9).astype(np.int64)
+    curves = Curves()
+    for t_ns, at_m, from_mps, mps2 in zip(times[::10], place[::10], speed[::10], 0.9 * given[::10], strict=True):
+        speeds = np.linspace(from_mps, 0.0, 50)
+        curves.add(Curve(int(t_ns), at_m + (from_mps**2 - speeds**2) / (2.0 * mps2), speeds))
+    ways, speeds_of_it, adhesion = (Series(times, values) for values in (place, speed, given / 9.8))
+    truth = Run(true_position=ways, true_speed=speeds_of_it, true_mu=adhesion, position=ways, speed=speeds_of_it)
+    regime = Series(times, np.where(place < BRAKED_M, "COASTING", "ADHESION_LIMITED"))
+    bound = adhesion.map(lambda mu: 0.9 * mu)
+    return truth._replace(mu=adhesion, mu_lower=bound, safe=curves, regime=regime)
+
+
+def test_the_picture_says_how_far_the_limits_are_off_on_leaves(tmp_path: Path) -> None:
+    draw_changing(braked_onto_leaves(), LEAVES_M, Place(tmp_path / "changing.svg"))
+    drawn = (tmp_path / "changing.svg").read_text(encoding="utf-8")
+    true, fixed, known = (3.6 * np.sqrt(2.0 * mps2 * 700.0) for mps2 in (LEAVES_MPS2, 0.0726 * 9.8, 0.9 * LEAVES_MPS2))
+    assert f"{fixed - true:.0f} km/h too fast" in drawn
+    assert f"{true - known:.0f} km/h below what the rail allows" in drawn
+    assert all(text in drawn for text in ("dry rail", "leaves", "before the brake nothing is known"))
