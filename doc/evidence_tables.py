@@ -67,6 +67,7 @@ def parts() -> dict[str, str]:
         "faults measured": ("robust", map(_lost, faults)),
         "bound": ("bound", map(_at_speeds, files["bound"])),
         "distances": ("distances", files["distances"]),
+        "safety": ("safety", files["safety"]),
         "saved": ("distances", _saved(files["distances"])),
         "creep experiments": ("creep", (_switched(row) for row in creep if "samples" in row)),
         "creep withheld": ("creep", map(_wrong, creep[0]["withholding"])),

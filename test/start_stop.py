@@ -20,6 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import IO
 
 ROOT = Path(__file__).resolve().parent.parent
 PRIVATE = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
@@ -42,8 +43,8 @@ class Ending:
     fault: str
 
 
-def start(node: str, *arguments: str) -> subprocess.Popen[str]:
-    """Start a node and wait for its first line, which comes before its imports."""
+def start(node: str, *arguments: str, said: int | IO[str] = subprocess.PIPE) -> subprocess.Popen[str]:
+    """Start a node and wait for its first line, which comes before its imports; `said` is where its log goes."""
     code = f"import sys; from adhesion_node.main import {node}; print('up', flush=True); sys.exit({node}())"
     environment = {name: value for name, value in os.environ.items() if name not in PRIVATE}
     environment["PYTHONPATH"] = str(ROOT)
@@ -51,7 +52,7 @@ def start(node: str, *arguments: str) -> subprocess.Popen[str]:
         [sys.executable, "-c", code, *arguments],
         env=environment,
         stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
+        stderr=said,
         text=True,
     )
     assert program.stdout is not None
