@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import shutil
 import socket
+import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -93,6 +94,16 @@ def _claim_domain() -> int:
             continue
         return domain
     raise pytest.UsageError(f"all {len(DOMAINS)} ROS domains are held by other test runs: wait for one to end")
+
+
+@pytest.fixture
+def started() -> Iterator[list[subprocess.Popen[str]]]:
+    """Return a list for programs that end with the test at the latest."""
+    programs: list[subprocess.Popen[str]] = []
+    yield programs
+    for program in programs:
+        program.kill()
+        program.communicate()
 
 
 @pytest.fixture

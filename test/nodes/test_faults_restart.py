@@ -5,11 +5,9 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Iterator
 from functools import partial
 
 import messages
-import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
@@ -26,16 +24,6 @@ from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import NOMINAL
 from sim_node.train.sensors import Tick
-
-
-@pytest.fixture
-def started() -> Iterator[list[Program]]:
-    """Programs that end with the test at the latest."""
-    programs: list[Program] = []
-    yield programs
-    for program in programs:
-        program.kill()
-        program.communicate()
 
 
 def test_a_sensor_whose_process_is_killed_is_stale(

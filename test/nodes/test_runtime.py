@@ -9,7 +9,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import IO
 
@@ -86,9 +86,8 @@ Start = Callable[..., Program]
 
 
 @pytest.fixture
-def start() -> Iterator[Start]:
-    """Start the program; whatever still runs after the test is killed."""
-    running: list[Program] = []
+def start(started: list[Program]) -> Start:
+    """Return a function that starts the program; whatever still runs after the test is killed."""
 
     def _start(*args: str, **environment: str) -> Program:
         program = subprocess.Popen(
@@ -99,13 +98,10 @@ def start() -> Iterator[Start]:
             stderr=subprocess.PIPE,
             text=True,
         )
-        running.append(program)
+        started.append(program)
         return program
 
-    yield _start
-    for program in running:
-        program.kill()
-        program.communicate()
+    return _start
 
 
 def wait_for(program: Program, word: str) -> None:

@@ -10,7 +10,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from conftest import SpinUntil
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from start_stop import PRIVATE
 from test_offline import FAST, FAST_SETTINGS, Sample, samples, write_run
 
 from adhesion_node.nodes import replay
@@ -43,13 +44,11 @@ Start = Callable[..., Program]
 
 
 @pytest.fixture
-def start() -> Iterator[Start]:
+def start(started: list[Program]) -> Start:
     """Return a function that starts a program of the package; none outlives the test."""
-    running: list[Program] = []
 
     def _start(module: str, *arguments: str) -> Program:
-        private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
-        environment = {name: value for name, value in os.environ.items() if name not in private}
+        environment = {name: value for name, value in os.environ.items() if name not in PRIVATE}
         code = f"import sys; from adhesion_node.nodes.{module} import main; sys.exit(main())"
         program = subprocess.Popen(
             [sys.executable, "-c", code, *arguments],
@@ -58,13 +57,10 @@ def start() -> Iterator[Start]:
             stderr=subprocess.PIPE,
             text=True,
         )
-        running.append(program)
+        started.append(program)
         return program
 
-    yield _start
-    for program in running:
-        program.kill()
-        program.communicate()
+    return _start
 
 
 class Operator(Node):
