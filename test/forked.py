@@ -36,6 +36,8 @@ for number, (argv, environment) in enumerate(json.load(sys.stdin)):
 print(json.dumps(codes))
 """
 
+TIMEOUT_S = 300.0
+"""Of all calls together, on a busy machine."""
 
 Call = tuple[Sequence[str], Mapping[str, str]]
 """A command line, and what its environment has besides."""
@@ -49,7 +51,7 @@ class Ended(NamedTuple):
     stderr: str
 
 
-def ended(calls: Sequence[Call], folder: Path, first: str = "", timeout_s: float = 120.0) -> list[Ended]:
+def ended(calls: Sequence[Call], folder: Path, first: str = "") -> list[Ended]:
     """Run programs by their entries, one after the other in a new `folder`.
 
     `first` is run before the first fork: it imports what they share, or takes care that something is not there.
@@ -57,7 +59,7 @@ def ended(calls: Sequence[Call], folder: Path, first: str = "", timeout_s: float
     folder.mkdir()
     command = [sys.executable, "-c", NURSERY.format(first=first)]
     told = subprocess.run(
-        command, input=json.dumps(calls), stdout=subprocess.PIPE, text=True, cwd=folder, timeout=timeout_s, check=True
+        command, input=json.dumps(calls), stdout=subprocess.PIPE, text=True, cwd=folder, timeout=TIMEOUT_S, check=True
     )
     said = [[(folder / f"{n}.{stream}").read_text(encoding="utf-8") for stream in (1, 2)] for n in range(len(calls))]
     return [Ended(code, *texts) for code, texts in zip(json.loads(told.stdout), said, strict=True)]
