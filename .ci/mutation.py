@@ -33,7 +33,7 @@ MEANINGLESS = re.compile(r".*(Bit|Shift|_Mod|FloorDiv|RemoveDecorator|ExceptionR
 """Operators whose mutants fail at once, or change an annotation alone."""
 
 PYTEST = f"{sys.executable} -m pytest -q -x -p no:cacheprovider --noconftest --hypothesis-profile=ci -o addopts="
-"""Without the set-up that all tests share, which compiles kernels: what is tried here needs neither ROS nor the bank."""
+"""Without the set-up that all tests share, which compiles kernels: these need neither ROS nor the bank."""
 
 
 def main() -> int:

@@ -94,6 +94,13 @@ def test_a_page_with_another_number_is_found(tmp_path: Path) -> None:
     assert (checked.returncode, checked.stdout.split(":")[0]) == (1, "parameters.md")
 
 
+def test_the_tests_that_pages_name_are_there() -> None:
+    named = {name for page in PAGES for name in re.findall(r"`(test(?:_[a-z0-9]+){3,})`", text_of(page))}
+    written = {name for file in (ROOT / "test").rglob("*.py") for name in re.findall(r"def (test_\w+)", text_of(file))}
+    assert len(named) > 20
+    assert named <= written
+
+
 def test_the_readme_is_short() -> None:
     assert len(text_of(ROOT / "README.md").splitlines()) <= 250
 
