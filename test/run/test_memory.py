@@ -39,4 +39,4 @@ def test_memory_does_not_grow_with_the_run() -> None:
             pass
     finally:
         tracemalloc.stop()
-    assert held[-1] < held[3] + 200_000
+    assert held[-1] < held[3] + 600_000, "predictions that are kept would be twice as much"
