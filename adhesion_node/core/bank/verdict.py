@@ -54,8 +54,9 @@ BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
 
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
-BORNE_OUT_S, BORNE_OUT = 2.0, 0.1
-"""A change of the rail counts for the way ahead after so long behind its border, or once it is so probable."""
+BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.05
+"""A change of the rail counts for the way ahead after so long, or once it is so probable; before its border is passed, if
+all that say so are so probable together."""
 
 
 class Ahead(NamedTuple):
@@ -152,8 +153,9 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
 def _borne_out(memory: Memory) -> Bank:
     """Without what has only just come to mind: that the rail may change this moment is always possible."""
     bank = memory.bank
-    lasting = (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) & (bank.kind != kinds.PASSING)
-    old = lasting | (bank.weight > BORNE_OUT)
+    passing = bank.kind == kinds.PASSING
+    counts = ~passing | (bank.weight @ passing > BORDER)
+    old = counts & (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) | (bank.weight > BORNE_OUT)
     return bank._replace(log_weight=np.where(old, bank.log_weight, -np.inf)).normalised() if old.any() else bank
 
 

@@ -125,7 +125,7 @@ def test_rolling_axles_may_slide_under_the_whole_brake(share: float, counted: fl
         assert ahead.mu == pytest.approx([max(counted * used, known)] * 6, rel=0.01)
 
 
-@pytest.mark.parametrize(("probability", "counts"), [(0.05, False), (0.2, True)])
+@pytest.mark.parametrize(("probability", "counts"), [(0.04, False), (0.06, True)])
 def test_a_border_counts_for_the_way_ahead_once_it_is_probable(probability: float, counts: bool) -> None:
     steady = ahead_bank(0.05, 50.0, [2])
     passing = ahead_bank(0.01, 50.0, [PASSING])._replace(born_s=np.array([-60.0]))
