@@ -50,7 +50,7 @@ FROM_PYPI = {  # import name: (distribution, rosdep key that brings it)
     "zstandard": ("zstandard", "mcap-ros2-support"),
     "aiohttp": ("aiohttp", "python3-aiohttp"),
 }
-PEERS = {"filterpy", "particles"}
+PEERS = {"filterpy", "particles", "gtsam"}
 """What `bench` measures against: an extra, imported only by files of its own."""
 
 
