@@ -34,8 +34,8 @@ from sim_node.real.sensors.fitted import FITTED
 
 ROOT = Path(__file__).resolve().parent.parent
 BAGS, PICTURES = ROOT / "bags", ROOT / "doc" / "pictures"
-SHOWN = "SERVICE BRAKE"
-"""Level at which the live page is photographed."""
+SHOWN = ("WARNING", "EMERGENCY BRAKE")
+"""Levels in their order, at the last of which the live page is photographed: it begins in an emergency, too."""
 
 PATIENCE_MS = 90_000.0
 SENSORS = "full"
@@ -129,7 +129,9 @@ def live() -> None:
         shown.stderr.readline()  # "open http://...": it is served
         with open_page(viewport={"width": 1366, "height": 768}) as (page, _):
             page.goto(f"http://127.0.0.1:{port}/")
-            page.locator("#level").get_by_text(SHOWN).wait_for(timeout=PATIENCE_MS)
+            for level in SHOWN:
+                page.locator("#level").get_by_text(level).wait_for(timeout=PATIENCE_MS)
+            page.wait_for_timeout(3000)  # the charts follow
             page.screenshot(path=PICTURES / "live.png")
     finally:
         shown.send_signal(signal.SIGINT)
