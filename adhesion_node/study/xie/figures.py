@@ -159,9 +159,9 @@ def _draw_method(axis: Any, found: Results, quantity: Quantity) -> None:
     axis.axvline(brake_limits, color="0.6", lw=1.0, label="below this speed the brake limits")
     if quantity.name == "estimate":
         axis.plot(first["true_speed_mps"] / KMH, first["true_mu"], color="0.0", lw=3, alpha=0.35, label="true")
-    alike: dict[bytes, list[Rows]] = {}  # a method that needs no start gives the same from all of them
+    alike: dict[bytes, list[Rows]] = {}  # but for rounding, a method that needs no start gives the same from all
     for rows in of_first_seed:
-        alike.setdefault(np.asarray(quantity.of(rows)).tobytes(), []).append(rows)
+        alike.setdefault(np.round(rows["mu"], 6).tobytes(), []).append(rows)
     for same, (color, dashes) in zip(alike.values(), STYLES, strict=False):
         starts = ", ".join(f"{rows['start'][0]:g}" for rows in same)
         label = "one run, any start" if len(alike) == 1 else f"start {starts}"
