@@ -124,9 +124,21 @@ def test_a_manager_brings_a_node_up_and_takes_it_down(make_managed: Callable[...
         managed.wait_until_said(words)
         assert managed.told[-1].startswith(words)
         managed.wait(partial(managed.seen, taken, given, int(state != "unconfigured")))
-    assert not managed.change("deactivate"), "of an inactive node"
     assert managed.change("shutdown")
     assert managed.state == "finalized"
+    managed.wait_until_said("finalized: this node is at its end; start it anew")
+
+
+@pytest.mark.parametrize("asked", [Transition.TRANSITION_ACTIVATE, 77])
+def test_a_transition_that_the_state_does_not_have_is_refused_and_the_node_lives(
+    make_managed: Callable[..., Managed], capfd: pytest.CaptureFixture[str], asked: int
+) -> None:
+    managed = make_managed(AtpMonitor)
+    answer = managed.call(ChangeState, "change_state", ChangeState.Request(transition=Transition(id=asked)))
+    assert not answer.success
+    assert f"transition {asked}: not from here: ask for 4 deactivate, 7 shutdown" in capfd.readouterr().err
+    assert not managed.change("activate"), "by its label"
+    assert managed.state == "active"
 
 
 @pytest.mark.parametrize("name", NODES)

@@ -4,9 +4,11 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
+from functools import partial
 from itertools import chain
 from typing import Any
 
+from lifecycle_msgs.srv import ChangeState
 from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.lifecycle.node import LifecycleNodeMixin
 
@@ -18,6 +20,9 @@ from .params import SettingsNode
 
 UNCONFIGURED = "unconfigured: nothing is subscribed or published; configure and activate this node"
 INACTIVE = "inactive: nothing is taken in or published; activate this node"
+FINALIZED = "finalized: this node is at its end; start it anew"
+
+Change = Callable[[ChangeState.Request, ChangeState.Response], ChangeState.Response]
 
 
 class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
@@ -33,6 +38,8 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
         self._failure: Exception | None = None
         self._kept: set[Any] = set()
         """What is there in every state."""
+        service = self._service_change_state
+        service.callback = partial(self._if_possible, service.callback)
 
     def bring_up(self, values: Mapping[str, Any]) -> None:
         """Configure and activate, unless a manager does; raises what `open` does. Call at the end of `__init__`."""
@@ -60,7 +67,8 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
         """What there is to tell: while the node does not work, that it does not."""
         if self.active:
             return told()
-        return [Finding(Severity.WARN, INACTIVE if self.configured else UNCONFIGURED)], {}
+        state = FINALIZED if self._state_machine.current_state[1] == "finalized" else UNCONFIGURED
+        return [Finding(Severity.WARN, INACTIVE if self.configured else state)], {}
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open; where something stands against that the node stays as it was and says what."""
@@ -99,6 +107,16 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Give up what `open` made, if it was."""
         return self.on_cleanup(state)
+
+    def _if_possible(self, change: Change, request: ChangeState.Request, response: ChangeState.Response) -> Any:
+        """Refuse a transition that the state does not have: rclpy would let the node die of it."""
+        asked, possible = request.transition, [one[:2] for one in self._state_machine.available_transitions]
+        if asked.label or asked.id in dict(possible):  # by its label rclpy itself refuses
+            return change(request, response)
+        there = ", ".join(f"{number} {label}" for number, label in possible) or "nothing"
+        self.get_logger().warning(f"transition {asked.id}: not from here: ask for {there}")
+        response.success = False
+        return response
 
     def _entities(self) -> set[Any]:
         return set(chain(self.publishers, self.subscriptions, self.services, self.timers))
