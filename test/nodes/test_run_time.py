@@ -79,6 +79,7 @@ def test_the_bound_may_be_asked_with_more_confidence_while_the_train_brakes(line
         ({"confidence": 0.9, "window": 60}, "window = 60: fixed at start; restart the node to change it"),
         ({"confidence": 0.9, "sensor_timeout_s": -1.0}, "sensor_timeout_s"),
         ({"confidence": "much"}, "confidence = 'much': give a value of type float"),
+        ({"confidence": 0.9, "sensor_timout_s": 1.0}, "no such parameter; did you mean sensor_timeout_s?"),
     ],
 )
 def test_a_change_that_does_not_fit_changes_nothing(line: Line, values: dict[str, Any], reason: str) -> None:

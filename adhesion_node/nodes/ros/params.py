@@ -46,8 +46,10 @@ class SettingsNode(Node):
         return result
 
     def _refusal(self, change: Parameter) -> str:
-        """Say what a restart may set, where a parameter is fixed at start."""
-        if not (self.has_parameter(change.name) and self.describe_parameter(change.name).read_only):
+        """Say why a parameter may not be set: it is not there, or fixed at start."""
+        if not self.has_parameter(change.name):
+            return _no_such(self, change, self.list_parameters([], 0).names)
+        if not self.describe_parameter(change.name).read_only:
             return ""
         allowed = self.describe_parameter(change.name).additional_constraints.removesuffix(f"; {FIXED}")
         remedy = "restart the node to change it" + (f", with {allowed}" if allowed else "")
@@ -159,7 +161,7 @@ def unknown(node: Node, settings: Sequence[Setting]) -> list[str]:
     """
     names = [setting.name for setting in settings]
     return [
-        f"{name} = {node.get_parameter(name).value!r}: {node.get_name()} has no such parameter{_hint(name, names)}"
+        _no_such(node, node.get_parameter(name), names)
         for name in node.list_parameters([], 0).names
         if not name.startswith(_OF_RCLPY_QOS) and name not in (*names, *_OF_RCLPY)
     ]
@@ -171,6 +173,7 @@ def _given(node: Node, setting: Setting) -> object:
     return node.declare_parameter(setting.name, setting.default, ParameterDescriptor(dynamic_typing=True)).value
 
 
-def _hint(name: str, names: Sequence[str]) -> str:
-    close = get_close_matches(name, names, n=1)
-    return f"; did you mean {close[0]}?" if close else ""
+def _no_such(node: Node, given: Parameter, names: Sequence[str]) -> str:
+    close = get_close_matches(given.name, names, n=1)
+    hint = f"; did you mean {close[0]}?" if close else ""
+    return f"{given.name} = {given.value!r}: {node.get_name()} has no such parameter{hint}"
