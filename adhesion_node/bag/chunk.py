@@ -4,12 +4,13 @@
 
 from io import BytesIO
 from struct import Struct
+from typing import NamedTuple
+from zlib import crc32
 
 from lz4.frame import LZ4FrameDecompressor
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Chunk, McapRecord, Message
-from mcap.stream_reader import breakup_chunk
+from mcap.records import Channel, Chunk, Schema
 from zstandard import ZstdDecompressor
 
 from .metadata import LATEST_NS
@@ -21,22 +22,55 @@ MAX_CHUNK_BYTES = 32 * 2**20
 """Length of a chunk when decompressed. Writers end theirs at 64 kB to 4 MB, or with one longer message; a few bytes
 can stand for any number of them. Of the shortest messages so many make some 400 MB of objects."""
 
+_MESSAGE = Struct("<HIQQ")
+"""Channel, number, log time and time of publishing of a message; its data follow."""
 
-def unpack(opcode: int, body: bytes) -> list[McapRecord]:
-    """Return the messages, schemas and channels of a chunk; another record stands for itself.
 
+class Message(NamedTuple):
+    """What is used of a message."""
+
+    channel_id: int
+    log_ns: int
+    data: bytes
+
+
+class Content(NamedTuple):
+    """What a block holds, in the order it was written."""
+
+    messages: list[Message]
+    declared: list[Schema | Channel]
+
+
+def unpack(opcode: int, body: bytes) -> Content:
+    """Return what a chunk holds; another record stands for itself.
+
+    The library makes several objects of every number: half of what a replay took was that.
     Raises ValueError, or what the libraries raise, when the bytes are not what they seem.
     """
+    content = HEAD.pack(opcode, len(body)) + body
     if opcode == Opcode.CHUNK:
         chunk = Chunk.read(ReadDataStream(BytesIO(body)))
-        chunk.data, chunk.compression = _content(chunk), ""
-    else:
-        chunk = Chunk("", HEAD.pack(opcode, len(body)) + body, 0, 0, 0, 0)
-    records = breakup_chunk(chunk, validate_crc=True)
-    for record in records:
-        if isinstance(record, Message) and record.log_time > LATEST_NS:
-            raise ValueError(f"log time = {record.log_time} ns: beyond what a recording may hold")
-    return records
+        content = _content(chunk)
+        if chunk.uncompressed_crc and crc32(content) != chunk.uncompressed_crc:
+            raise ValueError(f"chunk of {len(content)} bytes: its checksum is another")
+    messages, declared, offset = list[Message](), list[Schema | Channel](), 0
+    while offset < len(content):
+        kind, length = HEAD.unpack_from(content, offset)
+        offset, end = offset + HEAD.size, offset + HEAD.size + length
+        if end > len(content):
+            raise ValueError(f"record of {length} bytes: ends behind its chunk")
+        if kind == Opcode.MESSAGE:
+            if length < _MESSAGE.size:
+                raise ValueError(f"message of {length} bytes: shorter than its head")
+            channel_id, _, log_ns, _ = _MESSAGE.unpack_from(content, offset)
+            if log_ns > LATEST_NS:
+                raise ValueError(f"log time = {log_ns} ns: beyond what a recording may hold")
+            messages.append(Message(channel_id, log_ns, content[offset + _MESSAGE.size : end]))
+        elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
+            read = Schema.read if kind == Opcode.SCHEMA else Channel.read
+            declared.append(read(ReadDataStream(BytesIO(content[offset:end]))))
+        offset = end
+    return Content(messages, declared)
 
 
 def _content(chunk: Chunk) -> bytes:

@@ -17,12 +17,12 @@ from typing import BinaryIO, NamedTuple
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
-from mcap.records import Channel, McapRecord, Message, Schema, Statistics
+from mcap.records import Channel, Schema, Statistics
 from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import Qos
 from zstandard import ZstdError
 
-from .chunk import HEAD, unpack
+from .chunk import HEAD, Message, unpack
 from .qos import parse
 from .types import Definition
 
@@ -67,13 +67,11 @@ class McapFile:
             self._scan(stream)
 
     def messages(self, block: Block) -> Iterator[Message]:
-        """Yield the messages of a block in the order they were written; those of nameless channels are left out."""
+        """Return the messages of a block in the order they were written; those of nameless channels are left out."""
         with self.path.open("rb") as stream:
             stream.seek(block.offset)
             body = stream.read(block.length)
-        for record in unpack(block.opcode, body):
-            if isinstance(record, Message) and record.channel_id in self.topics:
-                yield record
+        return (each for each in unpack(block.opcode, body).messages if each.channel_id in self.topics)
 
     def _scan(self, stream: BinaryIO) -> None:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -106,17 +104,16 @@ class McapFile:
         try:
             if opcode == Opcode.MESSAGE and self.blocks and self.blocks[-1].opcode == Opcode.CHUNK:
                 raise ValueError("behind a chunk comes its index, which one wrong bit makes a message")
-            records = unpack(opcode, body)
-            self._declare(records)
-            messages = [record for record in records if isinstance(record, Message)]
+            messages, declared = unpack(opcode, body)
+            self._declare(declared)
         except _UNREADABLE:
             self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
             return
         if messages:
-            self.blocks.append(Block(min(message.log_time for message in messages), offset, opcode, len(body)))
+            self.blocks.append(Block(min(message.log_ns for message in messages), offset, opcode, len(body)))
             self.counts.update(message.channel_id for message in messages)
 
-    def _declare(self, records: list[McapRecord]) -> None:
+    def _declare(self, records: list[Schema | Channel]) -> None:
         """Take over the schemas and channels.
 
         The end of a file repeats them without a checksum: what was said first, in a checked chunk, holds.
@@ -124,7 +121,7 @@ class McapFile:
         for record in records:
             if isinstance(record, Schema):
                 self._schemas.setdefault(record.id, record)
-            elif isinstance(record, Channel):
+            else:
                 schema = self._schemas.get(record.schema_id) or Schema(id=0, data=b"", encoding="", name="")
                 known_as = Definition(schema.encoding, schema.data.decode())
                 offered = parse(record.metadata.get("offered_qos_profiles", ""))

@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from mcap.records import Message
-
 from ..wire.codecs import Reason, Rejected
+from .chunk import Message
 from .mcap_file import McapFile, TopicInfo
 from .types import UnknownTypeError, deserialize
 
@@ -84,7 +83,7 @@ class McapRecording:
             file = self._files[number]
             for index, message in enumerate(file.messages(block)):
                 if wanted(file.topics[message.channel_id].name):
-                    heapq.heappush(pending, (message.log_time, number, offset, index, message))
+                    heapq.heappush(pending, (message.log_ns, number, offset, index, message))
         while pending:
             yield self._record(heapq.heappop(pending))
 
@@ -94,4 +93,4 @@ class McapRecording:
     def _record(self, entry: tuple[int, int, int, int, Message]) -> Record:
         message = entry[-1]
         info = self._files[entry[1]].topics[message.channel_id]
-        return Record(info.name, info.type, message.data, message.log_time)
+        return Record(info.name, info.type, message.data, message.log_ns)

@@ -3,6 +3,7 @@
 """Message classes, CDR and message definitions of ROS 2 Jazzy, without an installed ROS."""
 
 import struct
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -60,18 +61,23 @@ def deserialize(cdr: bytes, type_name: str) -> Any:
 
     Raises UnknownTypeError when the type is unknown, and ValueError when the bytes do not fit it.
     """
-    _require(type_name)
-    known = typestore().get_msgdef(type_name)
-    decoders = {b"\0\0": known.deserialize_cdr_be, b"\0\1": known.deserialize_cdr_le}
+    decoders, message_class = _decoders(type_name)
     try:
-        decode = decoders[bytes(cdr[:2])]
-        message, _ = decode(memoryview(cdr)[4:], 0, known.cls, typestore())
+        message, _ = decoders[bytes(cdr[:2])](memoryview(cdr)[4:], 0, message_class, typestore())
     except _UNDECODABLE as error:
         why = "no CDR" if isinstance(error, KeyError) else error
         raise ValueError(
             f"message of {len(cdr)} bytes: it does not decode as {type_name} ({why}); was another type recorded?"
         ) from error
     return message
+
+
+@cache
+def _decoders(type_name: str) -> tuple[dict[bytes, Callable[..., tuple[Any, int]]], Any]:
+    """How the bytes of a type are read, by how they are ordered, and its class; raises UnknownTypeError."""
+    _require(type_name)
+    known = typestore().get_msgdef(type_name)
+    return {b"\0\0": known.deserialize_cdr_be, b"\0\1": known.deserialize_cdr_le}, known.cls
 
 
 def definition(type_name: str) -> Definition:
