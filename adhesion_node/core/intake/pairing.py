@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from ..setting import once
 from .stream import Stream
 
 S = 1_000_000_000
@@ -57,10 +58,17 @@ class Gate(NamedTuple):
     tick_for_ns: int = 0
     """How long after the last anchor or sample of a source that `leads`."""
 
-    @property
-    def kept_ns(self) -> int:
-        """How long before the released anchors another sensor's samples may still be needed."""
-        return max((PRESENT_NS, *(source.age_ns + source.wait_ns for source in self.sources)))
+
+@once
+def kept_ns(gate: Gate) -> int:
+    """How long before the released anchors another sensor's samples may still be needed."""
+    return max((PRESENT_NS, *(source.age_ns + source.wait_ns for source in gate.sources)))
+
+
+@once
+def longest_wait_ns(gate: Gate) -> int:
+    """How long an anchor waits at most, for others of its own and for other sensors."""
+    return gate.max_lag_ns + max((source.wait_ns for source in gate.sources), default=0)
 
 
 class Tick(NamedTuple):
@@ -112,8 +120,10 @@ def is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
 
     In the beginning each may still come.
     """
-    begins = inbox.begun_ns <= t_ns <= inbox.begun_ns + source.wait_ns
-    return begins or inbox.stream(source.kind).has_between(t_ns - PRESENT_NS, t_ns - source.wait_ns)
+    if inbox.begun_ns <= t_ns <= inbox.begun_ns + source.wait_ns:
+        return True
+    stream = inbox.others.get(source.kind)
+    return stream is not None and stream.has_between(t_ns - PRESENT_NS, t_ns - source.wait_ns)
 
 
 def _known_ns(inbox: Inbox, source: Source, t_ns: int) -> int:
@@ -123,16 +133,15 @@ def _known_ns(inbox: Inbox, source: Source, t_ns: int) -> int:
 
 def value_of(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
     """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
-    if source.kind not in inbox.others:
-        return None
-    latest = inbox.stream(source.kind).latest(_known_ns(inbox, source, t_ns))
+    stream = inbox.others.get(source.kind)
+    latest = None if stream is None else stream.latest(_known_ns(inbox, source, t_ns))
     return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest
 
 
 def each_of(inbox: Inbox, source: Source, t_ns: int) -> tuple[Any, ...]:
     """The samples of a sensor up to a time that are not used up, the newest ones where they are too many."""
-    if source.kind not in inbox.others:
+    stream = inbox.others.get(source.kind)
+    if stream is None:
         return ()
     before_ns = t_ns if inbox.released_ns is None else min(inbox.released_ns, t_ns)
-    unspent = inbox.stream(source.kind).unspent(before_ns - source.age_ns, _known_ns(inbox, source, t_ns))
-    return unspent[-MOST_EACH:]
+    return stream.unspent(before_ns - source.age_ns, _known_ns(inbox, source, t_ns))[-MOST_EACH:]

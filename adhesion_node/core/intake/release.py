@@ -15,7 +15,7 @@ from collections.abc import Iterable
 from types import MappingProxyType
 from typing import Any
 
-from .pairing import PRESENT_NS, Gate, Inbox, Matched, Source, Tick, each_of, is_present, value_of
+from .pairing import PRESENT_NS, Gate, Inbox, Matched, Source, Tick, each_of, is_present, longest_wait_ns, value_of
 from .samples import Measurement
 
 NEAR_TICK = 5
@@ -48,20 +48,23 @@ def _turn(gate: Gate, inbox: Inbox, waiting: tuple[Any, ...], forced: bool, unti
     if not waiting or forced:
         return waiting[0] if waiting else None
     anchor = waiting[0]
-    begins = _begins(gate, inbox, anchor.t_ns)
-    at_turn = inbox._replace(begun_ns=anchor.t_ns) if begins else inbox
-    if gate.tick_ns and _is_past(gate, inbox, anchor.t_ns):
-        return anchor
+    ready = _is_ready(gate, inbox, anchor, near_ns) or (gate.tick_ns and _is_past(gate, inbox, anchor.t_ns))
+    return anchor if ready else None
+
+
+def _is_ready(gate: Gate, inbox: Inbox, anchor: Any, near_ns: int) -> bool:
+    """Whether the first anchor that waits has all that is to be expected of its time."""
     if not _is_last(gate, inbox, anchor.t_ns):
-        return None
+        return False
     if isinstance(anchor, Measurement):  # complete as it is
-        return anchor
+        return True
+    at_turn = inbox._replace(begun_ns=anchor.t_ns) if _begins(gate, inbox, anchor.t_ns) else inbox
     # before it, a tick may still come to be
     before_ns, ticks = inbox.released_ns, 0
     if gate.tick_ns and before_ns is not None:
         ticks = (anchor.t_ns - near_ns - 1 - before_ns) // gate.tick_ns
     may_tick = ticks > 0 and before_ns is not None and _lacks(gate, inbox, before_ns + ticks * gate.tick_ns)
-    return None if may_tick or _lacks(gate, at_turn, anchor.t_ns) else anchor
+    return not (may_tick or _lacks(gate, at_turn, anchor.t_ns))
 
 
 def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, ...]]:
@@ -95,7 +98,8 @@ def _lacks(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
     newest_ns = inbox.anchors.newest_ns
     for source in gate.sources:  # at every anchor: quicker than `any`
         waits = newest_ns is None or t_ns > newest_ns - source.wait_ns
-        if waits and not inbox.stream(source.kind).has_reached(t_ns) and is_present(inbox, source, t_ns):
+        stream = inbox.others.get(source.kind) if waits else None
+        if waits and (stream is None or not stream.has_reached(t_ns)) and is_present(inbox, source, t_ns):
             return True
     return False
 
@@ -142,7 +146,6 @@ def _is_due(gate: Gate, inbox: Inbox, tick_ns: int, near_ns: int) -> bool:
 def _is_past(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
     """Whether by the stamps of all sensors nothing more can be expected of a time: as late as any of them has been."""
     late = (stream.lag_ns for stream in inbox.others.values() if stream.lag_ns <= gate.far_ns)
-    wait_ns = gate.max_lag_ns + max((source.wait_ns for source in gate.sources), default=0)
     unheard_ns = PRESENT_NS if inbox.released_ns is None and inbox.anchors.newest_ns is None else 0
-    wait_ns = max(wait_ns, unheard_ns, inbox.anchors.lag_ns, *late)
+    wait_ns = max(longest_wait_ns(gate), unheard_ns, inbox.anchors.lag_ns, *late)
     return inbox.now_ns is not None and inbox.now_ns >= t_ns + wait_ns

@@ -35,8 +35,9 @@ class Stream(NamedTuple):
 
     def refusal(self, t_ns: int) -> Outcome | None:
         """Why a sample of that stamp may not be added; None where it may."""
-        if self.newest_ns is not None and t_ns > self.newest_ns and t_ns < self.allowed_ns - BURST_NS:
-            return Outcome.TOO_OFTEN
+        if self.newest_ns is None or t_ns > self.newest_ns:
+            too_often = self.newest_ns is not None and t_ns < self.allowed_ns - BURST_NS
+            return Outcome.TOO_OFTEN if too_often else None
         index = bisect_left(self.samples, (t_ns,))
         doubled = index < len(self.samples) and self.samples[index].t_ns == t_ns
         return Outcome.DUPLICATE if doubled else None
