@@ -134,7 +134,7 @@ def _likely(config: Config) -> tuple[Array, Array]:
 
 def pruned(bank: Bank) -> Bank:
     """Without the unlikely, and with what says the same said once: it is united, the likelier one first."""
-    return Bank(*uniting.pruned(bank, PRUNING))
+    return Bank(*uniting.pruned(bank[:], PRUNING[:]))
 
 
 def unlikely_kept(bank: Bank, least: float) -> Bank:

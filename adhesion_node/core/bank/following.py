@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -18,9 +18,18 @@ from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kernels import weighing
 from .kinds import FREE, FREE_STD, HELD, NOISES, PASSING, SLIDES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
-from .motion import Braking, moved, open_variance, resistance, slow_variance, use, white_variance
+from .motion import Braking, Foreseen, foreseen, moved, open_variance, resistance, slow_variance, use, white_variance
 from .plausible import Course
-from .seeing import Observation, acceleration_seen, corrected, not_slower, position_seen, speed_seen, wheels_seen
+from .seeing import (
+    CLIPPED,
+    Observation,
+    acceleration_seen,
+    corrected,
+    not_slower,
+    position_seen,
+    speed_seen,
+    wheels_seen,
+)
 from .wheels import WheelsSeen, told
 
 if TYPE_CHECKING:
@@ -118,20 +127,30 @@ class Memory(NamedTuple):
         )
 
 
-def _with_position(memory: Memory, measurement: Measurement, foreseen: Off | None) -> Memory:
+def _with_position(memory: Memory, measurement: Measurement, predicted: Off | None) -> Memory:
     """Take a position in; the first one places the train, with what there is of slow error in it."""
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
     course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
-    memory = memory._replace(declared_m=declared, course=course)
     if memory.is_placed:
-        known = foreseen is not None and foreseen.moved is not None and foreseen.moved.bank is bank
-        seen = foreseen.seen if foreseen is not None and known else None
-        return memory.told(seen or position_seen(bank, measurement.position_m, declared), fixes=1)
+        ahead = None if predicted is None else predicted.ahead
+        if ahead is not None and ahead.bank is bank:
+            innovation, white = ahead.innovation, ahead.white
+        else:
+            seen = position_seen(bank, measurement.position_m, declared)
+            innovation, white = seen.innovation, seen.variances
+        *beliefs, total = weighing.placed(bank.mean, bank.covariance, bank.log_weight, innovation, white, CLIPPED)
+        return memory._replace(
+            bank=bank.believing(*beliefs),
+            declared_m=declared,
+            course=course,
+            fixes=memory.fixes + 1,
+            log_likelihood=memory.log_likelihood + total - HALF_LOG_2PI,
+        )
     slow = slow_variance(bank, declared)
     placed = bank.with_fresh(POSITION, measurement.position_m, np.sqrt(white_variance(bank, declared) + slow))
     placed = placed.with_fresh(OFFSET, 0.0, np.sqrt(slow))
     placed.covariance[:, POSITION, OFFSET] = placed.covariance[:, OFFSET, POSITION] = -slow
-    return memory._replace(bank=placed, fixes=memory.fixes + 1)
+    return memory._replace(bank=placed, declared_m=declared, course=course, fixes=memory.fixes + 1)
 
 
 class Off(NamedTuple):
@@ -144,8 +163,8 @@ class Off(NamedTuple):
     """In standard deviations, without sign, by the hypothesis nearest."""
     moved: Memory | None = None
     """What was foreseen, ..."""
-    seen: Observation | None = None
-    """... and the position beside it."""
+    ahead: Foreseen | None = None
+    """... with the position beside it."""
 
 
 def met(config: Config, measurement: Measurement) -> Memory:
@@ -176,19 +195,24 @@ def met(config: Config, measurement: Measurement) -> Memory:
 
 
 def followed(
-    config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail], foreseen: Off | None = None
+    config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail], predicted: Off | None = None
 ) -> Memory:
     """The train followed up to a measurement, which is taken in.
 
-    `rail` is asked for where a braking opens; `foreseen` is what `off` has said of the measurement, if that is known.
+    `rail` is asked for where a braking opens; `predicted` is what `off` has said of the measurement, if that is known.
     """
     pressures, speeds, start = _pressures(measurement), _speeds(config, measurement), memory
     if measurement.brake_pressure_pa is None and measurement.demand_pa is None:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
-    for until_ns in _steps(before_ns, measurement.t_ns, (each.t_ns for each in speeds)):
-        if memory is start and foreseen is not None and foreseen.moved is not None and foreseen.moved.t_ns == until_ns:
-            memory = foreseen.moved
+    for until_ns in _steps(before_ns, measurement.t_ns, speeds):
+        if (
+            memory is start
+            and predicted is not None
+            and predicted.moved is not None
+            and predicted.moved.t_ns == until_ns
+        ):
+            memory = predicted.moved
         else:
             memory = _moved(config, memory, until_ns)
         since_ns, before_ns = before_ns, until_ns
@@ -204,7 +228,7 @@ def followed(
         )
         memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
     if measurement.has_position and not memory.misled:
-        memory = _with_position(memory, measurement, foreseen)
+        memory = _with_position(memory, measurement, predicted)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 
@@ -212,14 +236,16 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
     """How far the measured position lies from what was foreseen; 0 if none was."""
     if not (measurement.has_position and memory.is_placed):
         return Off(0.0, 1.0, 0.0)
-    moved_on = _moved(config, memory, measurement.t_ns)
-    seen = position_seen(moved_on.bank, measurement.position_m, math.sqrt(measurement.variance_m2))
-    return Off(*seen.off(moved_on.bank), moved_on, seen)
+    dt_s, std_m = max((measurement.t_ns - memory.t_ns) / S, 0.0), math.sqrt(measurement.variance_m2)
+    before = memory.bank, dt_s, memory.braking, memory.declared_m
+    ahead = foreseen(config, *before, measurement.position_m, std_m)
+    moved_on = memory._replace(bank=ahead.bank, t_ns=measurement.t_ns, since_s=memory.since_s + dt_s)
+    return Off(ahead.off_m, ahead.std_m, ahead.nearest, moved_on, ahead)
 
 
-def _steps(from_ns: int, to_ns: int, stamps: Iterable[int]) -> Iterator[int]:
+def _steps(from_ns: int, to_ns: int, speeds: Sequence[SpeedSample] = ()) -> Iterator[int]:
     """Ends of the steps up to a time: where speeds were measured, and no step too long."""
-    for until_ns in (*sorted({each for each in stamps if from_ns < each < to_ns}), to_ns):
+    for until_ns in (*sorted({each.t_ns for each in speeds if from_ns < each.t_ns < to_ns}), to_ns):
         count = max(math.ceil((until_ns - from_ns) / (STEP_S * S)), 1)
         for index in range(1, count + 1):
             yield from_ns + (until_ns - from_ns) * index // count
@@ -312,7 +338,7 @@ def misled(config: Config, memory: Memory) -> Memory:
     half = 0.5 * config.train.specific_brake(memory.brake.demanded_pa)
     before = memory._replace(bank=closed(bank).with_fresh(MU, half, half), t_ns=t_ns, seen=0, past=())
     ahead = before
-    for until_ns in _steps(t_ns, memory.t_ns, ()):
+    for until_ns in _steps(t_ns, memory.t_ns):
         ahead = _moved(config, ahead, until_ns)
     return ahead._replace(misled=True, since_s=0.0)
 

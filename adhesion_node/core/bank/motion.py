@@ -80,7 +80,7 @@ def resistance(config: Config, bank: Bank) -> Array:
 
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
-    return Use(*moving.used(model_of(config), bank, resisting, _step(0.0, braking, 0.0)))
+    return Use(*moving.used(model_of(config)[:], bank[:], resisting, _step(0.0, braking, 0.0)))
 
 
 def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
@@ -92,13 +92,44 @@ def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:
     """The beliefs after `dt_s`; `declared_m` is the standard deviation that the positions declare."""
-    mean, covariance = moving.moved(model_of(config), bank, _step(dt_s, braking, declared_m))
+    mean, covariance = moving.moved(model_of(config)[:], bank[:], _step(dt_s, braking, declared_m))
     return bank.believing(mean, covariance, bank.log_weight)
 
 
-def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.Step:
+class Foreseen(NamedTuple):
+    """A bank that has been moved on, and a position beside it."""
+
+    bank: Bank
+    innovation: Array
+    """Of the position under each hypothesis, m, shape (H,)."""
+    white: Array
+    """Variance of its white error, m^2, shape (H,)."""
+    off_m: float
+    """Mean innovation."""
+    std_m: float
+    """Its standard deviation over all hypotheses."""
+    nearest: float
+    """The least one, in its own standard deviations."""
+
+
+def foreseen(
+    config: Config,
+    bank: Bank,
+    dt_s: float,
+    braking: Braking,
+    declared_m: float,
+    position_m: float,
+    position_std_m: float,
+) -> Foreseen:
+    """As `moved`, and how far a position is off, whose declared standard deviation is only a hint."""
+    step = _step(dt_s, braking, declared_m)
+    found = moving.foreseen(model_of(config)[:], bank[:], step, position_m, position_std_m)
+    return Foreseen(bank.believing(*found[:2], bank.log_weight), *found[2:])
+
+
+def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.StepNumbers:
     applied, share, told = float(braking.applied), float(braking.share), float(braking.told)
-    return moving.Step(float(dt_s), applied, share, bool(braking.rising), told, float(declared_m))
+    return float(dt_s), applied, share, bool(braking.rising), told, float(declared_m)
 
 
 @once

@@ -47,10 +47,6 @@ class Observation(NamedTuple):
         same = isinstance(self.variance, float)
         return np.full(self.innovation.size, self.variance) if same else np.asarray(self.variance)
 
-    def off(self, bank: Bank) -> tuple[float, float, float]:
-        """Mean innovation, its standard deviation over all hypotheses, and the least one in standard deviations."""
-        return weighing.off(bank.log_weight, bank.covariance, self.innovation, self.slope, self.variances)
-
 
 def position_seen(bank: Bank, position_m: float, declared_m: float) -> Observation:
     """A position, whose declared standard deviation is only a hint."""

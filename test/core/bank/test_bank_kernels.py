@@ -72,16 +72,26 @@ def test_a_correction(position_m: float) -> None:
     check(seeing.corrected(BANK, seen), by_numpy.corrected(BANK, seen))
     one = seen._replace(variance=0.4)
     check(seeing.corrected(BANK, one), by_numpy.corrected(BANK, one))
+    before = BANK.mean, BANK.covariance, BANK.log_weight
+    *beliefs, total = weighing.placed(*before, seen.innovation, seen.variances, seeing.CLIPPED)
+    check(BANK.believing(*beliefs), by_numpy.normalised(by_numpy.corrected(BANK, seen)))
+    assert total == pytest.approx(float(np.logaddexp.reduce(by_numpy.corrected(BANK, seen).log_weight)), rel=1e-12)
 
 
 @pytest.mark.parametrize("position_m", [500.0, 540.0])
 def test_how_far_a_position_is_off(position_m: float) -> None:
-    seen, bank = seeing.position_seen(BANK, position_m, 1.3), BANK.normalised()
+    ours = motion.foreseen(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9, position_m, 1.3)
+    bank = motion.moved(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9)
+    for one, other in zip(ours.bank, bank, strict=True):
+        np.testing.assert_array_equal(one, other)
+    seen = seeing.position_seen(bank, position_m, 1.3)
+    np.testing.assert_array_equal(ours.innovation, seen.innovation)
+    np.testing.assert_array_equal(ours.white, seen.variance)
     variance = np.einsum("hi,hij,hj->h", seen.slope, bank.covariance, seen.slope) + seen.variance
     mean = float(bank.weight @ seen.innovation)
     spread = float(bank.weight @ (variance + np.square(seen.innovation - mean)))
     nearest = float((np.abs(seen.innovation) / np.sqrt(variance)).min())
-    assert seen.off(bank) == pytest.approx((mean, np.sqrt(spread), nearest), rel=1e-12)
+    assert (ours.off_m, ours.std_m, ours.nearest) == pytest.approx((mean, np.sqrt(spread), nearest), rel=1e-12)
 
 
 @pytest.mark.parametrize("held", [HELD, PASSING])

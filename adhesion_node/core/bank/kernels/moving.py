@@ -5,18 +5,20 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import kernel
 
-if TYPE_CHECKING:
-    from ..layout import Bank
-
 Array = NDArray[np.float64]
+Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
+Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
+"""A bank as a plain tuple, as the next two are: one with names takes numba 20 times as long to look at."""
+ModelNumbers = tuple[float, Array, Array, Array, Array, Array, Array, Array, Array, Array, float, float, float]
+StepNumbers = tuple[float, float, float, bool, float, float]
 
 GRAVITY = 9.8
 POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10
@@ -98,32 +100,36 @@ def _used(
 
 
 @kernel
-def used(model: Model, bank: Bank, resisting: Array, step: Step) -> tuple[Array, Array, Mask]:
+def used(
+    model_numbers: ModelNumbers, bank: Columns, resisting: Array, step_numbers: StepNumbers
+) -> tuple[Array, Array, Mask]:
     """Adhesion used, shape (H,), its derivatives, shape (H, SIZE), and whether the adhesion limits, shape (H,)."""
-    count = resisting.size
+    model, step = Model(*model_numbers), Step(*step_numbers)
+    count, mean, kind = resisting.size, bank[0], bank[5]
     value, slope, slides = np.empty(count), np.zeros((count, SIZE)), np.empty(count, dtype=np.bool_)
     for h in range(count):
-        u = _used(model, bank.mean[h], bank.kind[h], resisting[h], step)
+        u = _used(model, mean[h], kind[h], resisting[h], step)
         value[h], slides[h] = u[0], u[1]
         slope[h, MU], slope[h, ROUGH], slope[h, BRAKE], slope[h, SPEED] = u[2], u[3], u[4], u[5]
     return value, slope, slides
 
 
 @kernel
-def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
+def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers) -> tuple[Array, Array]:
     """Means and covariances after a step: x' = f(x), P' = F P F^T + Q.
 
     F is diagonal, what lasts of each component, but for the rows of speed and position.
     """
-    dt, mean, covariance = step.dt_s, bank.mean, bank.covariance
+    model, step = Model(*model_numbers), Step(*step_numbers)
+    dt, (mean, covariance, _, noise, law, kind, _, _) = step.dt_s, bank
     means, covariances = np.empty_like(mean), np.empty_like(covariance)
     lasting, added = np.ones(SIZE), np.zeros(SIZE)
     fall, by_fall, by_way = np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
     free = math.exp(-dt / model.free[1])
     added[POSITION], added[BRAKE], added[BIAS] = dt * model.rates[0], dt * model.rates[1], dt * model.rates[2]
-    for h in range(bank.kind.size):
-        x, p, k = mean[h], covariance[h], bank.kind[h]
-        v, n = x[SPEED], model.noises[bank.noise[h]]
+    for h in range(kind.size):
+        x, p, k = mean[h], covariance[h], kind[h]
+        v, n = x[SPEED], model.noises[noise[h]]
         resisting, basic = _resistance(model, x[POSITION], v), _basic(model, v)
         u, _, by_mu, by_rough, by_brake, by_speed = _used(model, x, k, resisting, step)
         slower = v - dt * GRAVITY * (u + resisting + x[GRADE])
@@ -131,7 +137,7 @@ def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
         if k == 0:
             lasting[MU], added[MU] = free, model.free[0] ** 2 * (1.0 - free**2)
         else:
-            bent = _law(model, bank.law[h], slower) / _law(model, bank.law[h], v)
+            bent = _law(model, law[h], slower) / _law(model, law[h], v)
             lasting[MU] = bent if model.kinds[k, 0] > 0.0 else 1.0
             added[MU] = (model.kinds[k, 1] * x[MU]) ** 2 * dt
         lasting[ROUGH], lasting[GRADE] = math.exp(-way_m / model.lengths[0]), math.exp(-way_m / model.lengths[1])
@@ -172,3 +178,29 @@ def moved(model: Model, bank: Bank, step: Step) -> tuple[Array, Array]:
         for i in range(SIZE):
             covariances[h, i, i] += added[i]
     return means, covariances
+
+
+@kernel
+def foreseen(
+    model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers, position_m: float, declared_m: float
+) -> tuple[Array, Array, Array, Array, float, float, float]:
+    """Means and covariances after a step, and how far a position lies off what they foresee.
+
+    That is its innovation and the variance of its white error under each hypothesis, shape (H,); the mean innovation,
+    its standard deviation over all hypotheses, and the least one in its own.
+    """
+    means, covariances = moved(model_numbers, bank, step_numbers)
+    noises, log_weight, noise = model_numbers[6], bank[2], bank[3]
+    innovation, white = np.empty(noise.size), np.empty(noise.size)
+    metres, spread, nearest = 0.0, 0.0, np.inf
+    for h in range(noise.size):
+        innovation[h] = position_m - (means[h, POSITION] + means[h, OFFSET])
+        white[h] = max(noises[noise[h], 0] * declared_m, noises[noise[h], 1]) ** 2
+        metres += math.exp(log_weight[h]) * innovation[h]
+    for h in range(noise.size):
+        p = covariances[h]
+        each = p[POSITION, POSITION] + p[POSITION, OFFSET] + p[OFFSET, POSITION] + p[OFFSET, OFFSET] + white[h]
+        nearest = min(nearest, abs(innovation[h]) / math.sqrt(each))
+        spread += math.exp(log_weight[h]) * (each + (innovation[h] - metres) ** 2)
+    # NaN where any number has failed
+    return means, covariances, innovation, white, metres, math.sqrt(spread), nearest + 0.0 * spread

@@ -5,15 +5,12 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...compiled import kernel
-
-if TYPE_CHECKING:
-    from ..layout import Bank
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
@@ -90,11 +87,11 @@ def _order(log_weight: Array) -> Labels:
 
 
 @kernel
-def pruned(bank: Bank, rule: Pruning) -> Columns:
-    """The hypotheses that are left, their weights normalised."""
-    mean, covariance, log_weight = bank.mean, bank.covariance, bank.log_weight
+def pruned(bank: Columns, numbers: tuple[float, int, float, float]) -> Columns:
+    """The hypotheses that are left by the numbers of a `Pruning`, their weights normalised."""
+    rule, (mean, covariance, log_weight, noise, law, kind, born_s, changed_s) = Pruning(*numbers), bank
     count = log_weight.size
-    order, label = _order(log_weight), (bank.noise * 64 + bank.law) * 64 + bank.kind
+    order, label = _order(log_weight), (noise * 64 + law) * 64 + kind
     std, weight = np.empty((count, 2)), np.empty(count)
     for h in range(count):
         weight[h] = math.exp(log_weight[h]) if log_weight[h] > rule.least else 0.0
@@ -130,5 +127,5 @@ def pruned(bank: Bank, rule: Pruning) -> Columns:
     kept, weights = kept[:left], np.log(sums[:left] / sums[:left].sum())
     return (
         *(means[:left].copy(), covariances[:left].copy(), weights),
-        *(bank.noise[kept], bank.law[kept], bank.kind[kept], bank.born_s[kept], bank.changed_s[kept]),
+        *(noise[kept], law[kept], kind[kept], born_s[kept], changed_s[kept]),
     )

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-SIZE = 10
+POSITION, OFFSET, SIZE = 0, 6, 10
 
 
 @kernel
@@ -91,22 +91,6 @@ def variances(slope: Array, covariance: Array) -> Array:
 
 
 @kernel
-def off(
-    log_weight: Array, covariance: Array, innovation: Array, slope: Array, variance: Array
-) -> tuple[float, float, float]:
-    """Mean of the innovations, their standard deviation over all hypotheses, and the least one in its own."""
-    metres, nearest = 0.0, np.inf
-    for h in range(log_weight.size):
-        metres += math.exp(log_weight[h]) * innovation[h]
-    foreseen, spread = variances(slope, covariance), 0.0
-    for h in range(log_weight.size):
-        each = foreseen[h] + variance[h]
-        nearest = min(nearest, abs(innovation[h]) / math.sqrt(each))
-        spread += math.exp(log_weight[h]) * (each + (innovation[h] - metres) ** 2)
-    return metres, math.sqrt(spread), nearest + 0.0 * spread  # NaN where any number has failed
-
-
-@kernel
 def corrected(
     mean: Array, covariance: Array, log_weight: Array, innovation: Array, slope: Array, variance: Array, clipped: float
 ) -> tuple[Array, Array, Array]:
@@ -133,3 +117,16 @@ def corrected(
             for j in range(SIZE):
                 covariances[h, i, j] = covariance[h, i, j] - pull * gain[j]
     return means, covariances, weights
+
+
+@kernel
+def placed(
+    mean: Array, covariance: Array, log_weight: Array, innovation: Array, variance: Array, clipped: float
+) -> tuple[Array, Array, Array, float]:
+    """`corrected` by a position, of which place and slow error are seen, its weights normalised; ln of their sum."""
+    slope = np.zeros(mean.shape)
+    slope[:, POSITION] = 1.0
+    slope[:, OFFSET] = 1.0
+    means, covariances, weights = corrected(mean, covariance, log_weight, innovation, slope, variance, clipped)
+    whole = total(weights)
+    return means, covariances, weights - whole, whole
