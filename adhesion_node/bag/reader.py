@@ -12,8 +12,8 @@ from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
 from .metadata import Metadata, read_metadata
 from .recordings import McapRecording, Record, Recording
-from .trajectory import TYPE as TRAJECTORY
-from .trajectory import trajectory
+from .statuses import TYPE as DIAGNOSTICS
+from .statuses import statuses
 from .types import same_name
 
 
@@ -51,14 +51,14 @@ class BagReader:
         chosen = set(self.topics) if names is None else {self.resolve(name) for name in names}
         return self._recording.records(chosen.__contains__)
 
-    def decoded(self, names: Iterable[str]) -> Iterator[tuple[Record, Any]]:
-        """Yield the records of the topics named, each with its message; those that do not decode are left out.
+    def decoded(self, records: Iterable[Record]) -> Iterator[tuple[Record, Any]]:
+        """Yield records, each with its message; those that do not decode are left out.
 
-        The points of a trajectory come as one array.
+        The values of a status come as one dict.
         """
-        for record in self.messages(names):
+        for record in records:
             try:
-                message = (record.type == TRAJECTORY and trajectory(record.cdr)) or record.message
+                message = (record.type == DIAGNOSTICS and statuses(record.cdr)) or record.message
             except Rejected:
                 self._undecodable.add(record)
             else:

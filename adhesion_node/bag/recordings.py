@@ -2,13 +2,14 @@
 
 """A recording of one or more files as one stream of records in the order of (log time, arrival)."""
 
-import heapq
+from bisect import bisect_left
 from collections.abc import Callable, Iterator, Sequence
+from itertools import zip_longest
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
 from ..wire.codecs import Reason, Rejected
-from .chunk import Message
 from .mcap_file import McapFile, TopicInfo
 from .types import UnknownTypeError, deserialize
 
@@ -76,21 +77,17 @@ class McapRecording:
             for number, file in enumerate(self._files)
             for block in file.blocks
         )
-        pending: list[tuple[int, int, int, int, Message]] = []
-        for start_ns, number, offset, block in blocks:
-            while pending and pending[0][0] < start_ns:
-                yield self._record(heapq.heappop(pending))
+        pending: list[tuple[int, int, int, int, Record]] = []
+        for (_, number, offset, block), following in zip_longest(blocks, blocks[1:]):
             file = self._files[number]
-            for index, message in enumerate(file.messages(block)):
-                if wanted(file.topics[message.channel_id].name):
-                    heapq.heappush(pending, (message.log_ns, number, offset, index, message))
-        while pending:
-            yield self._record(heapq.heappop(pending))
+            for index, (channel, log_ns, cdr) in enumerate(file.messages(block)):
+                info = file.topics[channel]
+                if wanted(info.name):
+                    pending.append((log_ns, number, offset, index, Record(info.name, info.type, cdr, log_ns)))
+            pending.sort()
+            ready = bisect_left(pending, following[:1]) if following else len(pending)
+            yield from map(itemgetter(4), pending[:ready])
+            del pending[:ready]
 
     def close(self) -> None:
         """Nothing stays open."""
-
-    def _record(self, entry: tuple[int, int, int, int, Message]) -> Record:
-        message = entry[-1]
-        info = self._files[entry[1]].topics[message.channel_id]
-        return Record(info.name, info.type, message.data, message.log_ns)

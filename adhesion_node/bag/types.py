@@ -8,12 +8,13 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 from rosbags.typesys.store import Typestore
 
 from ..wire.topics import Topic
 
-_UNDECODABLE = (struct.error, ValueError, IndexError, KeyError, OverflowError, MemoryError)
+_UNDECODABLE = (SerdeError, struct.error, ValueError, IndexError, KeyError, OverflowError, MemoryError)
 """What the decoders raise on bytes that are not what they seem."""
 
 

@@ -5,6 +5,8 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
+import numpy as np
+
 from ..bag import BagReader
 from ..command.options import progress
 from ..core import Prediction
@@ -17,7 +19,7 @@ from ..wire.codecs import Line, Rejected
 from ..wire.settings import Setup
 from ..wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH, Frame
 from .findings import listed
-from .predicted import Curve, Curves
+from .predicted import Curves
 from .run import Inputs, Run
 from .series import Numbers, Texts, read_topics, sample_of
 
@@ -45,7 +47,8 @@ def estimate_run(
         changes.add(e.t_ns, str(e.changes))
         for curves, curve in ((safe, made.safe), (nominal, made.nominal)):
             if curve is not None:
-                curves.add(Curve(e.t_ns, e.position_m + curve.distance_m, curve.speed_mps))
+                places = e.position_m + curve.distance_m
+                curves.add(np.array([e.t_ns]), places[np.newaxis], curve.speed_mps[np.newaxis])
     if pipeline.last is None:
         dropped = listed(pipeline.dropped) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")

@@ -140,6 +140,8 @@ def listed(counts: Mapping[str, int]) -> str:
 
 def _error(run: Run, config: Config) -> float | None:
     """The score of an offline replay; None where the recording holds no truth of the estimates' stamps."""
+    if not run.true_mu.t_ns.size:
+        return None
     pressure_pa = run.pressure.by_time()
     truth = Truth(mu=run.true_mu.by_time(), speed_mps=run.true_speed.by_time(), pressure_pa=pressure_pa)
     return mean_relative_error_percent(config, truth, [Point(*row) for row in run.mu.by_time().items()])

@@ -61,10 +61,14 @@ def draw(
             kept = peaks(whole.values, MOST_POINTS)
             axis.plot(run.seconds(whole.t_ns[kept]), whole.values[kept], label=line.label, **STYLES[line.kind])
         upright = axis.get_xaxis_transform()
-        for known, shades, part in ((said, SHADES, (0.0, 1.0)), (truth, TRUE_SHADES, (1.0 - STRIP, STRIP))):
+        for known, shades, foot_at in ((said, SHADES, 0.0), (truth, TRUE_SHADES, 1.0 - STRIP)):
             for regime, shade in shades.items():
-                spans = [(band.start_s, band.end_s - band.start_s) for band in known if band.regime == regime]
-                axis.broken_barh(spans, part, color=shade, lw=0, zorder=0, transform=upright)
+                # one shape for all: the legend looks for a free place among the shapes
+                edges = [edge for band in known if band.regime == regime for edge in (band.start_s, band.end_s)]
+                if edges:
+                    tops = [1.0, foot_at] * (len(edges) // 2)
+                    look: dict[str, Any] = {"color": shade, "lw": 0, "zorder": 0, "transform": upright}
+                    axis.stairs(tops[:-1], edges, baseline=foot_at, fill=True, **look)
         axis.sharex(axes[0])
         axis.set(xlabel="time, s", ylabel=chart.title, ylim=chart.range)
     _draw_curves(last, run)

@@ -6,13 +6,14 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterable
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import Array
-from .series import Series
+from .series import Series, Times
 
 MOST_CURVES = 8192
 """Curves that are kept: all of the first hour; of a longer run evenly spread ones, half as many at least."""
@@ -25,10 +26,6 @@ class Curve(NamedTuple):
     position_m: Array
     speed_mps: Array
 
-    def distance_to(self, target_mps: float) -> float:
-        """Distance, m, from the start of the curve to where the train has the target speed; 0 where it is slower."""
-        return abs(float(np.interp(-target_mps, -self.speed_mps, self.position_m) - self.position_m[0]))
-
     @property
     def braking(self) -> BrakingCurve:
         """The curve from its first place, constant in its deceleration from point to point."""
@@ -38,31 +35,55 @@ class Curve(NamedTuple):
         return BrakingCurve(way, speed, np.append(slowing, slowing[-1]), times)
 
 
+def distances_to(target_mps: float, position_m: Array, speed_mps: Array) -> Array:
+    """Distances, m, from the starts of curves, of (..., n), to where the train has the target speed; shape (...).
+
+    0 where it is slower.
+
+    >>> distances_to(5.0, np.array([100.0, 200.0, 260.0]), np.array([[20.0, 10.0, 0.0], [4.0, 2.0, 0.0]])).tolist()
+    [130.0, 0.0]
+    """
+    before = np.clip((speed_mps >= target_mps).sum(axis=-1, keepdims=True) - 1, 0, speed_mps.shape[-1] - 2)
+    columns = np.broadcast_arrays(position_m, speed_mps)
+    (here, fast), (there, slow) = (
+        tuple(np.take_along_axis(column, at, axis=-1)[..., 0] for column in columns) for at in (before, before + 1)
+    )
+    share = np.where(fast > slow, (fast - target_mps) / np.where(fast > slow, fast - slow, 1.0), fast >= target_mps)
+    share = np.clip(share, 0.0, 1.0)
+    return np.asarray(np.abs(here + share * (there - here) - position_m[..., 0]))
+
+
 class Curves:
     """Braking curves, at most one for each estimate; of all of them the distances to some `targets`, m/s, are kept."""
 
     def __init__(self, targets: Iterable[float] = ()) -> None:
-        self.kept: list[Curve] = []
+        self._kept: list[Curve] = []
         self._t_ns, self._lengths = array("q"), {target: array("d") for target in targets}
         self._stride = 1
 
-    def add(self, curve: Curve) -> None:
-        """Take a curve."""
+    def add(self, t_ns: Times, position_m: Array, speed_mps: Array) -> None:
+        """Take curves, of (k,) and (k, n)."""
         for target, lengths in self._lengths.items():
-            lengths.append(curve.distance_to(target))
-        if len(self._t_ns) % self._stride == 0:
-            self.kept.append(curve)
-        self._t_ns.append(curve.t_ns)
-        if len(self.kept) > MOST_CURVES:
-            self._stride *= 2
-            self.kept = self.kept[::2]
+            lengths.frombytes(distances_to(target, position_m, speed_mps).tobytes())
+        for stamp, *curve in zip(t_ns.tolist(), position_m, speed_mps, strict=True):
+            if len(self._t_ns) % self._stride == 0:
+                self._kept.append(Curve(stamp, *(column.copy() for column in curve)))
+            self._t_ns.append(stamp)
+            if len(self._kept) > MOST_CURVES:
+                self._stride *= 2
+                self._kept = self._kept[::2]
+
+    @property
+    def kept(self) -> list[Curve]:
+        """Those that are kept, by their times."""
+        return sorted(self._kept, key=attrgetter("t_ns"))
 
     def lengths(self, target_mps: float) -> Series:
         """Distance, m, to the target speed by their times; of another target than was asked for by those kept alone."""
         if target_mps in self._lengths:
             t_ns, found = np.array(self._t_ns, dtype=np.int64), np.array(self._lengths[target_mps])
         else:
-            t_ns = np.array([curve.t_ns for curve in self.kept], dtype=np.int64)
-            found = np.array([curve.distance_to(target_mps) for curve in self.kept])
+            t_ns = np.array([curve.t_ns for curve in self._kept], dtype=np.int64)
+            found = np.array([float(distances_to(target_mps, *curve[1:])) for curve in self._kept])
         order = np.argsort(t_ns, kind="stable")
         return Series(t_ns[order], found[order])

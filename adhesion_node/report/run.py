@@ -21,7 +21,7 @@ from ..wire.results import Status
 from ..wire.topics import Topic
 from .ahead import TOLD
 from .creep import CreepCurves, CreepTaken
-from .predicted import Curve, Curves
+from .predicted import Curves
 from .series import NONE, Keyed, Numbers, Sample, Series, Take, Texts, Times, read_topics, with_key
 
 FIXED_MU = 0.0726
@@ -234,7 +234,8 @@ class _Told:
 def _curve_taker(curves: Curves) -> Take:
     def take(sample: Sample) -> None:
         if sample.read is not None:
-            curves.add(Curve(sample.read.t_ns, sample.read.places_m, sample.read.curve.speed_mps))
+            t_ns, places = np.atleast_1d(sample.read.t_ns), np.atleast_2d(sample.read.places_m)
+            curves.add(t_ns, places, np.atleast_2d(sample.read.curve.speed_mps))
 
     return take
 

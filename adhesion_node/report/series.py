@@ -7,20 +7,23 @@ from __future__ import annotations
 import math
 import sys
 from array import array
-from collections.abc import Callable, Iterable
-from itertools import chain
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..bag import BagReader
+from ..bag import BagReader, Record
+from ..bag.together import together
 from ..core.physics.train import Array
-from ..wire.codecs import NOMINAL, Line, Rejected, stamp_ns
+from ..wire.codecs import NOMINAL, Line, Rejected, stamp_ns, stamps_ns
 from ..wire.results import Status
 from ..wire.topics import Frame, Topic
 
 Times = NDArray[np.int64]
+
+MOST_TOGETHER = 256
+"""Messages that are read together: what is theirs stays in the processor's cache."""
 
 
 class Series(NamedTuple):
@@ -54,10 +57,13 @@ NONE = Series(np.array([], dtype=np.int64), np.array([]))
 
 
 class Sample(NamedTuple):
-    """What was read of one message; None where it was refused. `t_ns` is its stamp, or the log time without one."""
+    """What was read of one message; None where it was refused. `t_ns` is its stamp, or the log time without one.
 
-    log_ns: int
-    t_ns: int
+    Of a topic whose messages are read together, it is of many: the numbers are arrays, NaN where one was refused.
+    """
+
+    log_ns: Any
+    t_ns: Any
     read: Any
 
 
@@ -68,16 +74,37 @@ Take = Callable[[Sample], None]
 def read_topics(reader: BagReader, takes: Iterable[tuple[Topic, Take]], line: Line = NOMINAL) -> None:
     """Hand over what is read of every message, whatever its frame, in one pass; one that does not decode is left out.
 
-    A topic may be taken several times; one that the recording lacks is not.
+    A topic may be taken several times; one that the recording lacks is not. Messages that are read together come in
+    their order where they are of one length.
     """
     taken: dict[str, tuple[Topic, list[Take]]] = {}
     for topic, take in takes:
         if (name := reader.resolve(topic.name)) is not None:
             taken.setdefault(name, (topic._replace(frame=Frame.ANY), []))[1].append(take)
-    for record, message in reader.decoded(taken):
+    waiting: dict[tuple[str, int], list[Record]] = {}
+    for record in reader.messages(taken):
         topic, each = taken[record.topic]
-        sample = sample_of(topic, message, record.log_ns, line)
-        for take in each:
+        if topic.codec is None or topic.codec.together is None:
+            _hand_over(reader, topic, [record], line, each)
+            continue
+        alike = waiting.setdefault((record.topic, len(record.cdr)), [])
+        alike.append(record)
+        if len(alike) == MOST_TOGETHER:
+            _hand_over(reader, topic, alike, line, each)
+            alike.clear()
+    for (name, _), alike in waiting.items():
+        _hand_over(reader, taken[name][0], alike, line, taken[name][1])
+
+
+def _hand_over(reader: BagReader, topic: Topic, records: Sequence[Record], line: Line, takes: Iterable[Take]) -> None:
+    message = together([record.cdr for record in records], topic.type) if len(records) > 1 else None
+    if message is None:
+        samples = [sample_of(topic, one, record.log_ns, line) for record, one in reader.decoded(records)]
+    else:
+        log_ns = np.array([record.log_ns for record in records], dtype=np.int64)
+        samples = [_samples_of(topic, message, log_ns, line)]
+    for sample in samples:
+        for take in takes:
             take(sample)
 
 
@@ -91,16 +118,36 @@ def sample_of(topic: Topic, message: Any, log_ns: int, line: Line) -> Sample:
         return Sample(log_ns, t_ns, None)
 
 
+def _samples_of(topic: Topic, message: Any, log_ns: Times, line: Line) -> Sample:
+    """Read many messages that stand as one."""
+    header = getattr(message, "header", None)
+    t_ns = log_ns if header is None else stamps_ns(header)
+    try:
+        return Sample(log_ns, t_ns, topic.together(message, line))
+    except Rejected:
+        return Sample(log_ns, t_ns, None)
+
+
+def _itself(read: Any) -> Any:
+    return read
+
+
 class Numbers:
     """`value` of all that is read of a topic, NaN where a message was refused."""
 
-    def __init__(self, value: Callable[[Any], float] = float) -> None:
+    def __init__(self, value: Callable[[Any], Any] = _itself) -> None:
         self._value = value
         self._t_ns, self._log_ns, self._values = array("q"), array("q"), array("d")
 
     def take(self, sample: Sample) -> None:
-        """Take a sample."""
-        self.add(sample.t_ns, math.nan if sample.read is None else self._value(sample.read), sample.log_ns)
+        """Take a sample, of one message or of many."""
+        value = math.nan if sample.read is None else self._value(sample.read)
+        if isinstance(sample.t_ns, np.ndarray):
+            self._t_ns.frombytes(sample.t_ns.tobytes())
+            self._log_ns.frombytes(sample.log_ns.tobytes())
+            self._values.frombytes(np.broadcast_to(np.float64(value), sample.t_ns.shape).tobytes())
+        else:
+            self.add(sample.t_ns, value, sample.log_ns)
 
     def add(self, t_ns: int, value: float, log_ns: int = 0) -> None:
         """Take a value."""
@@ -121,13 +168,16 @@ class Numbers:
         What is published together is logged together, so a lost message leaves a gap and moves no other one. Of several
         that would take one stamp the nearest in log time does. Empty when either is missing.
         """
-        anchors = sorted(chain.from_iterable(zip(one._log_ns, one._t_ns, strict=True) for one in beside))
+        logged, stamps = (
+            np.concatenate([np.array(column, dtype=np.int64) for column in columns])
+            for columns in zip(*((one._log_ns, one._t_ns) for one in beside), strict=True)
+        )
         values, log_ns = np.array(self._values), np.array(self._log_ns, dtype=np.int64)
         known = np.isfinite(values)
-        if not (anchors and known.any()):
+        if not (logged.size and known.any()):
             return NONE
-        values, log_ns = values[known], log_ns[known]
-        logged, stamps = np.array(anchors, dtype=np.int64).T
+        values, log_ns, by_log = values[known], log_ns[known], np.lexsort((stamps, logged))
+        logged, stamps = logged[by_log], stamps[by_log]
         after = np.searchsorted(logged, log_ns)
         candidates = np.clip([after - 1, after], 0, logged.size - 1)
         distances = np.abs(logged[candidates] - log_ns)
@@ -170,17 +220,19 @@ class Texts:
     """Texts at their times."""
 
     def __init__(self) -> None:
-        self._rows: list[tuple[int, str]] = []
+        self._t_ns, self._texts = array("q"), list[str]()
 
     def add(self, t_ns: int, text: str) -> None:
         """Take a text; most are said again and again."""
-        self._rows.append((t_ns, sys.intern(text)))
+        self._t_ns.append(t_ns)
+        self._texts.append(sys.intern(text))
 
     @property
     def series(self) -> Series:
         """The texts by their times."""
-        ordered = sorted(self._rows, key=lambda row: row[0])
-        return Series(np.array([t for t, _ in ordered], dtype=np.int64), np.array([text for _, text in ordered]))
+        t_ns, texts = np.array(self._t_ns, dtype=np.int64), np.array(self._texts, dtype=object)
+        order = np.argsort(t_ns, kind="stable")
+        return Series(t_ns[order], texts[order])
 
 
 def with_key(key: str, take: Callable[[int, Status], None]) -> Take:
@@ -195,7 +247,7 @@ def with_key(key: str, take: Callable[[int, Status], None]) -> Take:
     return taken
 
 
-def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], float], line: Line = NOMINAL) -> Series:
+def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any] = _itself, line: Line = NOMINAL) -> Series:
     """Take `value` of all that is read of a topic, by its stamp or log time. Empty when the recording lacks it."""
     numbers = Numbers(value)
     read_topics(reader, [(topic, numbers.take)], line)

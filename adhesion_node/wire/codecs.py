@@ -137,6 +137,8 @@ class Codec(NamedTuple):
 
     read: Callable[[Any, Line], Any]
     write: Callable[..., Fields | None]
+    together: Callable[[Any, Line], Any] | None = None
+    """Reads one message that stands for many, its numbers being arrays: NaN for those that `read` refuses."""
 
 
 def plain(type_name: str, /, **fields: Any) -> SimpleNamespace:
@@ -208,6 +210,11 @@ def stamp_ns(header: Any) -> int:
     return nanoseconds(header.stamp)
 
 
+def stamps_ns(header: Any) -> Any:
+    """Return the stamps of messages that are one, in nanoseconds; shape (k,)."""
+    return header.stamp.sec.astype(np.int64) * NS + header.stamp.nanosec
+
+
 def header(new: New, t_ns: int, frame: str = FRAME) -> Any:
     """Build a header."""
     return new("std_msgs/msg/Header", stamp=moment(new, t_ns), frame_id=frame)
@@ -262,6 +269,11 @@ def plausible(what: str, value: Any, reason: Reason, most: float, least: float |
     if not (-most if least is None else least) <= number <= most:
         raise Rejected(reason, f"{what} = {number:g}")
     return number
+
+
+def within(values: Array, most: float, least: float | None = None) -> Any:
+    """Return those numbers that `plausible` returns, NaN in the place of others."""
+    return np.where((values >= (-most if least is None else least)) & (values <= most), values, np.nan)
 
 
 def variance_of(covariance: Sequence[float]) -> float | None:

@@ -4,10 +4,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import fields
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.atp.received import StampedCurve
 from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
@@ -27,6 +30,7 @@ from .codecs import (
     header,
     plausible,
     stamp_ns,
+    stamps_ns,
 )
 
 if TYPE_CHECKING:  # see results.py
@@ -41,22 +45,49 @@ and of v^2 what rounding makes of it."""
 def read_curve(message: Any, line: Line) -> StampedCurve:
     """Read a braking curve, its distance from 0 on, from a JointTrajectory; raises Rejected.
 
-    Its points may be decoded as one array, of (n, 4): position, velocity, acceleration, s.
     Where the chainage falls along it, its velocities are below 0 and its accelerations above, on a standing train too.
     """
-    points = message.points
-    if list(message.joint_names) != [TRAIN] or not 2 <= len(points) <= MOST_POINTS:
-        raise Rejected(Reason.BAD_CURVE, f"braking curve joints = {list(message.joint_names)}, points = {len(points)}")
-    rows = points if isinstance(points, np.ndarray) else _rows(points)
-    usable = (np.abs(rows) <= 10 * MAX_POSITION_M).all(axis=1)  # False for NaN
+    _check_form(message.joint_names, len(message.points))
+    rows = _rows(message.points)
+    usable = _usable(rows)
     if not usable.all():
         index = int(np.argmin(usable))
         raise Rejected(Reason.NOT_FINITE, f"braking curve point {index} = {rows[index].tolist()}")
     sign = -1 if rows[0, 2] > 0 else 1
-    place, velocity, acceleration, time = np.ascontiguousarray(rows.T) * [[sign], [sign], [sign], [1]]
-    curve = BrakingCurve(place - place[0], velocity, -acceleration, time)
-    _check_course(curve)
+    curve = _along(rows, sign)
+    for reason, wrong, told in _faults(curve):
+        if wrong.any():
+            raise Rejected(reason, f"braking curve: {told(int(np.argmax(wrong)))}")
     return StampedCurve(stamp_ns(message.header), float(line.sign * rows[0, 0]), curve, line.sign * sign)
+
+
+def _read_curves(message: Any, line: Line) -> StampedCurve:
+    """Read many at once, those that are not refused: stamps of (k,), places and signs of (k, 1), curves of (k, n)."""
+    _check_form(message.joint_names, message.points.shape[1])
+    usable = _usable(message.points).all(axis=1)
+    rows, stamps = message.points[usable], stamps_ns(message.header)[usable]
+    sign = np.where(rows[:, :1, 2] > 0, -1, 1)
+    curve = _along(rows, sign)
+    fine = ~np.any([wrong.any(axis=1) for _, wrong, _ in _faults(curve)], axis=0)
+    kept = BrakingCurve(*(getattr(curve, field.name)[fine] for field in fields(BrakingCurve)))
+    place: Any = line.sign * rows[fine, :1, 0]
+    return StampedCurve(stamps[fine], place, kept, line.sign * sign[fine])
+
+
+def _check_form(joints: Sequence[str], points: int) -> None:
+    if list(joints) != [TRAIN] or not 2 <= points <= MOST_POINTS:
+        raise Rejected(Reason.BAD_CURVE, f"braking curve joints = {list(joints)}, points = {points}")
+
+
+def _usable(rows: Array) -> NDArray[np.bool_]:
+    """Whether every number of a point is finite, and not beyond all."""
+    return np.asarray((np.abs(rows) <= 10 * MAX_POSITION_M).all(axis=-1))  # False for NaN
+
+
+def _along(rows: Array, sign: Any) -> BrakingCurve:
+    """The curve of points, of (..., 4), as the train runs."""
+    place, velocity, acceleration, time = np.moveaxis(rows, -1, 0)
+    return BrakingCurve(sign * (place - place[..., :1]), sign * velocity, -sign * acceleration, time)
 
 
 def write_curve(new: New, t_ns: int, position_m: float, curve: BrakingCurve) -> Fields:
@@ -131,34 +162,31 @@ def _row(point: Any) -> tuple[float, float, float, float]:
     return point.positions[0], point.velocities[0], point.accelerations[0], after.sec + after.nanosec / NS
 
 
-def _check_course(curve: BrakingCurve) -> None:
-    courses: tuple[tuple[str, Array], ...] = (
-        ("position", np.diff(curve.distance_m)),
-        ("time", np.diff(curve.time_s)),
-        ("speed", -np.diff(curve.speed_mps)),
-    )
-    for what, steps in courses:
-        if steps.min() < 0:
-            raise Rejected(Reason.BAD_CURVE, f"braking curve: {what} turns at point {int(np.argmin(steps)) + 1}")
-    if curve.speed_mps[-1] < 0 or curve.deceleration_mps2.min() <= 0:
-        raise Rejected(Reason.BAD_CURVE, "braking curve: a negative speed or no deceleration")
-    _check_ways(curve)
+def _turn(what: str, at: int) -> str:
+    return f"{what} turns at point {at + 1}"
 
 
-def _check_ways(curve: BrakingCurve) -> None:
-    """Between two points v^2 falls by 2 a ds, with a between their decelerations."""
-    way, slowing = np.diff(curve.distance_m), curve.deceleration_mps2
-    weaker, stronger = np.minimum(slowing[:-1], slowing[1:]), np.maximum(slowing[:-1], slowing[1:])
-    lost = -np.diff(np.square(curve.speed_mps))
+def _faults(curve: BrakingCurve) -> Iterator[tuple[Reason, NDArray[np.bool_], Callable[[int], str]]]:
+    """Why a course is impossible, at which of its points, and in words of one; arrays of (..., n)."""
+    way, slowing, lost = np.diff(curve.distance_m), curve.deceleration_mps2, -np.diff(np.square(curve.speed_mps))
+    for what, steps in (("position", way), ("time", np.diff(curve.time_s)), ("speed", -np.diff(curve.speed_mps))):
+        yield Reason.BAD_CURVE, steps < 0, partial(_turn, what)
+    wrong = (curve.speed_mps[..., -1:] < 0) | (slowing.min(axis=-1, keepdims=True) <= 0)
+    yield Reason.BAD_CURVE, wrong, lambda _: "a negative speed or no deceleration"
+    # between two points v^2 falls by 2 a ds, with a between their decelerations
+    weaker, stronger = np.minimum(slowing[..., :-1], slowing[..., 1:]), np.maximum(slowing[..., :-1], slowing[..., 1:])
     least, most = 2.0 * weaker * way * (1.0 - STEP_TOLERANCE), 2.0 * stronger * way * (1.0 + STEP_TOLERANCE)
     wrong = (lost < least - ROUNDING_M2_PER_S2) | (lost > most + ROUNDING_M2_PER_S2)
-    if wrong.any():
-        at = int(np.argmax(wrong))
-        told = f"v^2 falls by {lost[at]:.4g} m^2/s^2 from point {at} to {at + 1}"
-        given = f"{way[at]:.4g} m at {weaker[at]:.4g} to {stronger[at]:.4g} m/s^2"
-        raise Rejected(Reason.IMPLAUSIBLE_CURVE, f"braking curve: {told}, on {given}")
+    yield (
+        Reason.IMPLAUSIBLE_CURVE,
+        wrong,
+        lambda at: (
+            f"v^2 falls by {lost[at]:.4g} m^2/s^2 from point {at} to {at + 1}, "
+            f"on {way[at]:.4g} m at {weaker[at]:.4g} to {stronger[at]:.4g} m/s^2"
+        ),
+    )
 
 
 TARGET = Codec(read_target, write_target)
-SAFE = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.safe))
-NOMINAL = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.nominal))
+SAFE = Codec(read_curve, lambda new, made: _predicted(new, made.estimate, made.safe), _read_curves)
+NOMINAL = SAFE._replace(write=lambda new, made: _predicted(new, made.estimate, made.nominal))

@@ -12,14 +12,19 @@ from collections.abc import Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from ..core.atp.received import TrainState
-from ..core.intake.samples import MIN_VARIANCE_M2
-from ..core.physics.train import GRAVITY
+from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MIN_VARIANCE_M2
+from ..core.physics.train import GRAVITY, Array
 from . import codecs
-from .codecs import TRAIN, Codec, Fields, Line, New, Reason, Rejected, finite, header, stamp_ns
+from .codecs import TRAIN, Codec, Fields, Line, New, Reason, Rejected, finite, header, stamp_ns, stamps_ns, within
 
 if TYPE_CHECKING:  # the simulator uses these codecs, too, and must not know the estimators
     from ..core.prediction import Prediction
+
+MOST = float(np.finfo(np.float64).max)
+"""Every number that is one."""
 
 
 class Deceleration(NamedTuple):
@@ -53,11 +58,23 @@ def read_number(message: Any, _line: Line) -> float:
     return finite("data", message.data)
 
 
+def _numbers(message: Any, _line: Line) -> Any:
+    """Read many at once."""
+    return within(message.data, MOST)
+
+
 def read_deceleration(message: Any, _line: Line) -> Deceleration:
     """Read an acceleration along the track from an AccelWithCovarianceStamped; raises Rejected."""
     accel = message.accel
     along, variance = finite("accel x", accel.accel.linear.x), finite("accel covariance[0]", accel.covariance[0])
     return Deceleration(stamp_ns(message.header), along, variance)
+
+
+def _decelerations(message: Any, _line: Line) -> Deceleration:
+    """Read many at once."""
+    along, variance = message.accel.accel.linear.x, message.accel.covariance[0]
+    known = np.isfinite(along) & np.isfinite(variance)
+    return Deceleration(stamps_ns(message.header), _where(known, along), _where(known, variance))
 
 
 def write_deceleration(new: New, prediction: Prediction, *, lower: bool = False) -> Fields | None:
@@ -87,6 +104,19 @@ def read_state(message: Any, line: Line, least: float = 0.0) -> TrainState:
     return TrainState(stamp_ns(message.header), place, speed, *deviations)
 
 
+def _states(message: Any, line: Line, least: float = 0.0) -> TrainState:
+    """Read many states at once."""
+    place = line.sign * within(message.pose.pose.position.x, MAX_POSITION_M)
+    speed = within(message.twist.twist.linear.x, MAX_SPEED_MPS)
+    variances = within(np.array([message.pose.covariance[0], message.twist.covariance[0]]), MOST, least)
+    known = np.isfinite([place, speed, *variances]).all(axis=0)
+    return TrainState(stamps_ns(message.header), *(_where(known, one) for one in (place, speed, *np.sqrt(variances))))
+
+
+def _where(known: Any, values: Array) -> Any:
+    return np.where(known, values, np.nan)
+
+
 def read_estimated_state(message: Any, line: Line) -> TrainState:
     """Read a state that was estimated: none is exact, a variance of 0 was left out. Raises Rejected."""
     return read_state(message, line, MIN_VARIANCE_M2)
@@ -111,13 +141,13 @@ def write_estimated_state(new: New, prediction: Prediction) -> Fields:
 
 
 def read_statuses(message: Any, _line: Line) -> Statuses:
-    """Read all entries of a DiagnosticArray."""
+    """Read all entries of a DiagnosticArray, whose values may be decoded as a dict."""
     entries = (
         Status(
             entry.name,
             entry.level[0] if isinstance(entry.level, bytes) else int(entry.level),
             entry.message,
-            {pair.key: pair.value for pair in entry.values},
+            entry.values if isinstance(entry.values, dict) else {pair.key: pair.value for pair in entry.values},
             entry.hardware_id,
         )
         for entry in message.status
@@ -132,14 +162,15 @@ def write_status(new: New, t_ns: int, status: Status) -> Fields:
     return {"header": header(new, t_ns), "status": [new("diagnostic_msgs/msg/DiagnosticStatus", **fields)]}
 
 
-NUMBER = Codec(read_number, lambda _, value: {"data": value})
-MU = Codec(read_number, lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu})
-MU_LOWER = Codec(read_number, lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu_lower})
+NUMBER = Codec(read_number, lambda _, value: {"data": value}, _numbers)
+MU = NUMBER._replace(write=lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu})
+MU_LOWER = NUMBER._replace(write=lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu_lower})
 CREEP_MU_MAX = Codec(read_number, lambda _, found: {"data": found.mu_max} if found.known else None)
 CREEP_LAMBDA_M = Codec(read_number, lambda _, found: {"data": found.lambda_m} if found.known else None)
-DECELERATION = Codec(read_deceleration, write_deceleration)
-DECELERATION_LOWER = Codec(read_deceleration, partial(write_deceleration, lower=True))
-STATE, ESTIMATED_STATE = Codec(read_state, write_state), Codec(read_estimated_state, write_estimated_state)
+DECELERATION = Codec(read_deceleration, write_deceleration, _decelerations)
+DECELERATION_LOWER = DECELERATION._replace(write=partial(write_deceleration, lower=True))
+STATE = Codec(read_state, write_state, _states)
+ESTIMATED_STATE = Codec(read_estimated_state, write_estimated_state, partial(_states, least=MIN_VARIANCE_M2))
 STATUS = Codec(read_statuses, write_status)
 CLOCK = Codec(
     lambda message, _: codecs.nanoseconds(message.clock), lambda new, t_ns: {"clock": codecs.moment(new, t_ns)}

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.intake import samples
 from . import codecs
-from .codecs import FRAME, Codec, Fields, Line, New, Reason, Rejected, header, plausible, stamp_ns
+from .codecs import FRAME, Codec, Fields, Line, New, Reason, Rejected, header, plausible, stamp_ns, stamps_ns
 
 
 def read_brake_pressure(message: Any, line: Line) -> samples.PressureSample:
@@ -31,6 +31,12 @@ def _gauge_pa(message: Any, line: Line) -> float:
     limits = codecs.MAX_ABSOLUTE_PA, codecs.MIN_ABSOLUTE_PA
     absolute = plausible("fluid_pressure", message.fluid_pressure, Reason.IMPLAUSIBLE_PRESSURE, *limits)
     return max(absolute - line.ambient_pressure_pa, 0.0)
+
+
+def _gauge_together(message: Any, line: Line) -> samples.PressureSample:
+    """Read many of either at once."""
+    absolute = codecs.within(message.fluid_pressure, codecs.MAX_ABSOLUTE_PA, codecs.MIN_ABSOLUTE_PA)
+    return samples.PressureSample(stamps_ns(message.header), np.maximum(absolute - line.ambient_pressure_pa, 0.0))
 
 
 def read_speed(message: Any, _line: Line) -> samples.SpeedSample:
@@ -109,8 +115,8 @@ def _force(new: New, force_n: Sequence[float], _variance: float) -> Fields:
     return {"wrench": new("geometry_msgs/msg/Wrench", **wrench)}
 
 
-BRAKE_PRESSURE = Codec(read_brake_pressure, writer(_pressure))
-BRAKE_DEMAND = Codec(read_brake_demand, writer(_pressure))
+BRAKE_PRESSURE = Codec(read_brake_pressure, writer(_pressure), _gauge_together)
+BRAKE_DEMAND = Codec(read_brake_demand, writer(_pressure), _gauge_together)
 SPEED = Codec(read_speed, writer(lambda new, speed, variance: {"twist": codecs.twist(new, speed[0], variance)}))
 IMU = Codec(read_imu, writer(_imu))
 WHEEL_SPEED = Codec(read_wheel_speed, writer(_wheels))

@@ -63,6 +63,10 @@ class Topic(NamedTuple):
             raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}, frame = {line.frame!r}")
         return self._codec.read(message, line)
 
+    def together(self, message: Any, line: Line = NOMINAL) -> Any:
+        """Read one message that stands for many, whatever its frame; raises Rejected where that refuses them all."""
+        return self._codec.together and self._codec.together(message, line)
+
     def build(self, new: New, *values: Any) -> Any:
         """Build the message of what the codec's writer takes; None where there is nothing to publish."""
         fields = self._codec.write(new, *values)

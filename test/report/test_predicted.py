@@ -8,20 +8,22 @@ import numpy as np
 import pytest
 
 from adhesion_node.report import predicted
-from adhesion_node.report.predicted import Curve, Curves
+from adhesion_node.report.predicted import Curves, distances_to
+
+SPEEDS = np.array([40.0, 30.0, 20.0, 0.0])
 
 
-def curve(t_ns: int) -> Curve:
-    """From 40 m/s to a standstill within as many metres as its stamp has nanoseconds, at v^2 over the way."""
-    speeds = np.array([40.0, 30.0, 20.0, 0.0])
-    return Curve(t_ns, 1e6 + t_ns * (1.0 - speeds / 40.0), speeds)
+def add(curves: Curves, *t_ns: int) -> None:
+    """Add curves from 40 m/s to a standstill within as many metres as their stamps have nanoseconds."""
+    stamps = np.array(t_ns)
+    curves.add(stamps, 1e6 + stamps[:, np.newaxis] * (1.0 - SPEEDS / 40.0), np.tile(SPEEDS, (stamps.size, 1)))
 
 
 def test_a_long_run_keeps_curves_of_all_of_it_and_every_distance(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(predicted, "MOST_CURVES", 8)
     curves = Curves(targets=(0.0, 20.0))
-    for t_ns in range(1, 101):
-        curves.add(curve(t_ns))
+    for t_ns in range(1, 101, 20):
+        add(curves, *range(t_ns, t_ns + 20))
         assert len(curves.kept) <= 8
     kept = [each.t_ns for each in curves.kept]
     assert kept[0] == 1
@@ -37,7 +39,17 @@ def test_a_long_run_keeps_curves_of_all_of_it_and_every_distance(monkeypatch: py
 def test_a_short_run_keeps_all_of_them_in_the_order_of_their_stamps() -> None:
     curves = Curves()
     for t_ns in (3, 1, 2):
-        curves.add(curve(t_ns))
-    assert [each.t_ns for each in curves.kept] == [3, 1, 2]
+        add(curves, t_ns)
+    assert [each.t_ns for each in curves.kept] == [1, 2, 3]
     assert curves.lengths(50.0).t_ns.tolist() == [1, 2, 3]
     assert curves.lengths(50.0).values.tolist() == [0.0] * 3
+
+
+@pytest.mark.parametrize("target", [0.0, 5.0, 20.0, 39.9, 40.0, 60.0])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_distance_is_that_of_an_interpolation_over_the_speed(target: float, sign: int) -> None:
+    rng = np.random.default_rng(1)
+    speeds = -np.sort(-rng.uniform(3.0, 50.0, (20, 30)), axis=1)
+    places = 1e4 + sign * np.cumsum(rng.uniform(0.0, 9.0, (20, 30)), axis=1)
+    expected = [abs(np.interp(-target, -v, x) - x[0]) for v, x in zip(speeds, places, strict=True)]
+    assert distances_to(target, places, speeds) == pytest.approx(np.array(expected))

@@ -51,7 +51,7 @@ def test_the_stamp_counts_before_the_log_time(tmp_path: Path) -> None:
 def test_without_a_header_the_log_time_counts(tmp_path: Path) -> None:
     path = write(tmp_path / "bag", (MU, Float64(data=0.08), 5 * S), (MU, Float64(data=0.09), 7 * S))
     with BagReader(path) as reader:
-        series = read_series(reader, MU, float)
+        series = read_series(reader, MU)
     assert (series.t_ns.tolist(), series.values.tolist()) == ([5 * S, 7 * S], [0.08, 0.09])
 
 
@@ -68,7 +68,7 @@ def test_times_increase_even_where_messages_came_late(tmp_path: Path) -> None:
 def test_only_the_topic_that_was_asked_for(tmp_path: Path) -> None:
     path = write(tmp_path / "bag", (MU, Float64(data=0.08), S), (MU_LOWER, Float64(data=0.05), S))
     with BagReader(path) as reader:
-        assert read_series(reader, MU_LOWER, float).values.tolist() == [0.05]
+        assert read_series(reader, MU_LOWER).values.tolist() == [0.05]
 
 
 def test_a_topic_that_is_not_there_is_empty(tmp_path: Path) -> None:

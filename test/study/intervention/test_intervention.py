@@ -17,7 +17,7 @@ from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.core.prediction import Prediction
-from adhesion_node.report.predicted import Curve, Curves
+from adhesion_node.report.predicted import Curves
 from adhesion_node.report.run import Run
 from adhesion_node.report.series import Series
 from adhesion_node.study.__main__ import main
@@ -133,7 +133,8 @@ def braked_onto_leaves() -> Run:
     curves = Curves()
     for t_ns, at_m, from_mps, mps2 in zip(times[::10], place[::10], speed[::10], 0.9 * given[::10], strict=True):
         speeds = np.linspace(from_mps, 0.0, 50)
-        curves.add(Curve(int(t_ns), at_m + (from_mps**2 - speeds**2) / (2.0 * mps2), speeds))
+        places = at_m + (from_mps**2 - speeds**2) / (2.0 * mps2)
+        curves.add(np.array([t_ns]), places[np.newaxis], speeds[np.newaxis])
     ways, speeds_of_it, adhesion = (Series(times, values) for values in (place, speed, given / 9.8))
     truth = Run(true_position=ways, true_speed=speeds_of_it, true_mu=adhesion, position=ways, speed=speeds_of_it)
     regime = Series(times, np.where(place < BRAKED_M, "COASTING", "ADHESION_LIMITED"))
