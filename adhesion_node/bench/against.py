@@ -3,6 +3,9 @@
 """The default method beside that of another revision, which is checked out for the time of the measurement.
 
 Both follow the same measurements, in turns, each in a process of its own, through the public `init` and `step`.
+
+Three ratios, as the methods differ in when they work: a method of windows updates what it believes of the adhesion with
+each of its estimates, every L measurements; the bank with every measurement, and tells an estimate every `estimate_s`.
 """
 
 import json
@@ -34,16 +37,19 @@ from adhesion_node.core import Config, Measurement, init, step
 config = Config()
 rows = [Measurement(t_ns, place, variance, pressure) for t_ns, place, variance, pressure in json.load(sys.stdin)]
 for _ in range(2):  # once to warm up
-    state, took, estimates = init(config, 1), 0.0, 0
+    state, took, updates, estimates = init(config, 1), 0.0, 0, 0
     for row in rows:
         started = time.process_time()
-        state, estimate = step(config, state, row)
+        before, (state, estimate) = getattr(state, "memory", None), step(config, state, row)
         if row.brake_pressure_pa:
             took += time.process_time() - started
             estimates += estimate is not None
-print(json.dumps([1e3 * took, sum(row.brake_pressure_pa > 0.0 for row in rows), estimates]))
+            updates += estimate is not None if before is None else state.memory.bank is not before.bank
+print(json.dumps([1e3 * took, sum(row.brake_pressure_pa > 0.0 for row in rows), updates, estimates]))
 """
-"""Processor time, ms, of the measurements under the brake, their number, and that of the estimates."""
+"""Processor time, ms, of the measurements under the brake; their number, and those of updates and of estimates."""
+
+PER = ("measurement", "update", "estimate")
 
 
 def compare(revision: str, rounds: int, rate_hz: float, seed: int) -> list[dict[str, Any]]:
@@ -58,18 +64,19 @@ def compare(revision: str, rounds: int, rate_hz: float, seed: int) -> list[dict[
             for name, tree in trees.items():
                 found[name].append(_followed(tree, given))
     medians = {name: np.median(rows, axis=0) for name, rows in found.items()}
-    ours = medians["this tree"][0]
-    return [
-        {
-            "revision": name,
-            "rounds": rounds,
-            "ms_per_measurement": float(took / measurements),
-            "ms_per_estimate": float(took / estimates) if estimates else math.nan,
-            "estimates": int(estimates),
-            "ratio": float(took / ours),
-        }
-        for name, (took, measurements, estimates) in medians.items()
-    ]
+    ours = _per(*medians["this tree"])
+    rows = []
+    for name, (took, *counts) in medians.items():
+        per = _per(took, *counts)
+        ms = {f"ms_per_{what}": each for what, each in zip(PER, per, strict=True)}
+        ratios = {f"ratio_{what}": each / own for what, each, own in zip(PER, per, ours, strict=True)}
+        rows.append({"revision": name, "rounds": rounds, "updates": int(counts[1]), **ms, **ratios})
+    return rows
+
+
+def _per(took_ms: float, *counts: float) -> list[float]:
+    """ms for each of what was counted; NaN where there was none."""
+    return [float(took_ms / count) if count else math.nan for count in counts]
 
 
 def _check_out(revision: str, folder: str) -> None:

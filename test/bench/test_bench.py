@@ -204,14 +204,14 @@ def step(config, state, measurement): return state + 1, state % 2 or None
 
 
 def test_another_revision_follows_the_same_measurements(tmp_path: Path) -> None:
-    _, braked, estimates = against._followed(str(against.ROOT), BRAKED)
-    assert braked == 90
+    _, braked, updates, estimates = against._followed(str(against.ROOT), BRAKED)
+    assert (braked, updates) == (90, 90), "the bank is updated at every position"
     assert 17 <= estimates <= 19
     package = tmp_path / "adhesion_node"
     package.mkdir()
     (package / "__init__.py").write_text("")
     (package / "core.py").write_text(OTHER)
-    assert against._followed(str(tmp_path), BRAKED)[1:] == [90, 45]
+    assert against._followed(str(tmp_path), BRAKED)[1:] == [90, 45, 45], "a window with its estimates alone"
     (package / "core.py").write_text("raise ImportError('of long ago')")
     with pytest.raises(ValueError, match=r"does not run here: .*of long ago"):
         against._followed(str(tmp_path), BRAKED)
