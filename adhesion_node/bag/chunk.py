@@ -44,7 +44,7 @@ class Content(NamedTuple):
 def unpack(opcode: int, body: bytes) -> Content:
     """Return what a chunk holds; another record stands for itself.
 
-    The library makes several objects of every number: half of what a replay took was that.
+    The library makes several objects of every number, which takes twice as long.
     Raises ValueError, or what the libraries raise, when the bytes are not what they seem.
     """
     content = HEAD.pack(opcode, len(body)) + body

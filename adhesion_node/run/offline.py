@@ -108,9 +108,10 @@ def predictions(
     for sample, outputs, took_s in feed(pipeline, noted, ADHESION_INPUTS, line):
         if truth is not None and isinstance(sample, PressureSample):
             truth.pressure_pa[sample.t_ns] = sample.pressure_pa
-        if any(prediction.estimate.window >= pipeline.config.window for prediction in outputs):
-            window_ms.append(1e3 * took_s)
-        yield from outputs
+        if outputs:
+            if any(prediction.estimate.window >= pipeline.config.window for prediction in outputs):
+                window_ms.append(1e3 * took_s)
+            yield from outputs
     yield from pipeline.finish()
 
 
@@ -123,10 +124,12 @@ def feed(
     for name, message, _ in recorded:
         if isinstance(message, Rejected):
             pipeline.refuse(name, message.reason)
-        if isinstance(message, Rejected) or name not in topics:
+            continue
+        topic = topics.get(name)
+        if topic is None:
             continue
         try:
-            sample = reader.read(topics[name], message)
+            sample = reader.read(topic, message)
         except Rejected as refusal:
             pipeline.refuse(name, refusal.reason)
         else:

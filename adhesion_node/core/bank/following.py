@@ -216,8 +216,9 @@ def followed(
         else:
             memory = _moved(config, memory, until_ns)
         since_ns, before_ns = before_ns, until_ns
-        now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
-        memory = _felt(config, memory, now) if now else memory
+        if measurement.imu:
+            now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
+            memory = _felt(config, memory, now) if now else memory
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
                 variance = config.speed_std_mps**2 if speed.variance is None else speed.variance
@@ -245,6 +246,9 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
 
 def _steps(from_ns: int, to_ns: int, speeds: Sequence[SpeedSample] = ()) -> Iterator[int]:
     """Ends of the steps up to a time: where speeds were measured, and no step too long."""
+    if not speeds and to_ns - from_ns <= STEP_S * S:
+        yield to_ns
+        return
     for until_ns in (*sorted({each.t_ns for each in speeds if from_ns < each.t_ns < to_ns}), to_ns):
         count = max(math.ceil((until_ns - from_ns) / (STEP_S * S)), 1)
         for index in range(1, count + 1):

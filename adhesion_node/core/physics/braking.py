@@ -75,7 +75,7 @@ def _deceleration(train: Train, speed: Array, mu: float | AdhesionLaw, grade: fl
 
 def _cumulate(steps: Array) -> Array:
     sums = np.zeros(steps.size + 1)
-    np.cumsum(steps, out=sums[1:])
+    np.add.accumulate(steps, out=sums[1:])  # what np.cumsum calls
     return sums
 
 
