@@ -9,6 +9,7 @@ from typing import Any
 
 import messages
 import pytest
+import yaml
 from conftest import SpinUntil
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
@@ -118,9 +119,11 @@ def test_a_sensor_is_switched_off_and_on_while_the_train_brakes(line: Line) -> N
 
 
 def test_its_own_dump_is_loaded_without_a_complaint(line: Line) -> None:
-    """As `ros2 param load` does, parameter by parameter."""
+    """As `ros2 param load` does, parameter by parameter, through YAML: 1e-06 becomes a text by that."""
     names = line.estimator.list_parameters([], 0).names
-    dump = [parameter.to_parameter_msg() for parameter in line.estimator.get_parameters(names)]
+    loaded = {one.name: yaml.safe_load(str(one.value)) or one.value for one in line.estimator.get_parameters(names)}
+    assert loaded["tolerance"] == "1e-06"
+    dump = [parameter.to_parameter_msg() for parameter in given(**loaded)]
     assert {"use_sim_time", "window", "qos_overrides./position.subscription.depth"} <= set(names)
     answer = call(line, SetParameters, "/estimator/set_parameters", SetParameters.Request(parameters=dump))
     assert [result.reason for result in answer.results if not result.successful] == []

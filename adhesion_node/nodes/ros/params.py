@@ -37,7 +37,7 @@ class SettingsNode(Node):
     """A node whose parameters are settings: those that it has already it accepts, whether or not they may change."""
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
-        """Set parameters together, an integer for a float included, or none of them."""
+        """Set parameters together, an integer or a text such as 1e-06 for a float included, or none of them."""
         changes = [change for change in map(self._typed, parameter_list) if not self._has(change)]
         refused = [refusal for refusal in map(self._refusal, changes) if refusal]
         if refused or not changes:
@@ -56,8 +56,13 @@ class SettingsNode(Node):
         return f"{change.name} = {change.value}: {FIXED}; {remedy}"
 
     def _typed(self, change: Parameter) -> Parameter:
-        is_float = self.has_parameter(change.name) and type(self.get_parameter(change.name).value) is float
-        return Parameter(change.name, value=float(change.value)) if is_float and type(change.value) is int else change
+        """As a float where that is one: `ros2 param` reads 1e-06, its own way to write it, as a text."""
+        if not self.has_parameter(change.name) or type(self.get_parameter(change.name).value) is not float:
+            return change
+        try:
+            return Parameter(change.name, value=float(change.value)) if type(change.value) in (int, str) else change
+        except ValueError:
+            return change
 
     def _has(self, change: Parameter) -> bool:
         if not self.has_parameter(change.name):
