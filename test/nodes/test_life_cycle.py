@@ -7,6 +7,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import messages
@@ -201,6 +202,18 @@ def test_what_stands_against_a_configuration_is_told_and_the_node_stays_as_it_wa
     assert managed.state == "unconfigured"
     assert "not configured: step = 10: choose less than the window, 5" in capfd.readouterr().err
     managed.wait_until_said("unconfigured")
+
+
+def test_a_node_is_configured_once_what_stood_against_it_is_mended(
+    make_managed: Callable[..., Managed], tmp_path: Path
+) -> None:
+    way = tmp_path / "line.csv"
+    managed = make_managed(Estimator, autostart=False, track_line=str(way))
+    assert not managed.change("configure")
+    assert managed.there(topics.FIX, topics.STATE) == (0, 0), "nothing is left of the attempt"
+    way.write_text("lat,lon\n50.0,8.0\n50.1,8.0\n")
+    assert managed.change("configure")
+    assert managed.change("activate")
 
 
 def test_parameters_that_change_may_do_so_before_and_hold_after_a_configuration(

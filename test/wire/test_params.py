@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
-from adhesion_node.nodes.ros.params import SettingsNode, declare, unknown
+from adhesion_node.nodes.ros.params import SettingsNode, declare, misplaced, unknown
 
 SPECS = (
     Setting("start_mu", 0.09, "first guess of the adhesion coefficient", low=0.0, high=0.5),
@@ -235,6 +235,34 @@ def test_a_typo_is_named_with_the_nearest_parameter(make: Make) -> None:
         "start_nu = 0.1: probe has no such parameter; did you mean start_mu?",
         "zzz = 1: probe has no such parameter",
     ]
+
+
+@pytest.mark.parametrize(
+    ("topic", "told"),
+    [
+        ("/train1/position", []),
+        ("/train1/gnss", []),
+        ("/clock", []),
+        ("/position", ["/position: probe has no such topic; did you mean /train1/position?"]),
+        (
+            "/train1/brake_presure",
+            ["/train1/brake_presure: probe has no such topic; did you mean /train1/brake_pressure?"],
+        ),
+    ],
+)
+def test_a_quality_of_service_for_no_topic_is_told(context: Context, topic: str, told: list[str]) -> None:
+    """By its whole name, after namespace and remapping."""
+    name = f"qos_overrides.{topic}.subscription.deadline"
+    node = SettingsNode(
+        "probe",
+        context=context,
+        namespace="train1",
+        cli_args=["--ros-args", "-r", "odometry:=gnss"],
+        automatically_declare_parameters_from_overrides=True,
+        parameter_overrides=[Parameter(name, value=1)],
+    )
+    assert misplaced(node) == [one.replace(topic, name, 1) for one in told]
+    node.destroy_node()
 
 
 def test_the_effective_configuration_is_logged_once(make: Make, capfd: pytest.CaptureFixture[str]) -> None:

@@ -7,6 +7,7 @@ changed together or none.
 """
 
 import math
+import re
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
@@ -16,12 +17,14 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
+from adhesion_node.wire.topics import TOPICS
 
 _INT64_MAX = 2**63 - 1
 
 _USE_SIM_TIME = Setting("use_sim_time", False, "Follow /clock")
 _OF_RCLPY = ("use_sim_time", "start_type_description_service")
 _OF_RCLPY_QOS = "qos_overrides."
+_QOS = re.compile(r"qos_overrides\.(.+)\.(?:publisher|subscription)(?:_\w+)?\.\w+")
 
 
 Preset = Callable[[Sequence[Setting], Mapping[str, Any]], Sequence[Setting]]
@@ -120,7 +123,7 @@ def declare(
         node.set_descriptor(setting.name, descriptor(setting))
     if change is not None:
         _let_change(node, settings, change)
-    for message in unknown(node, settings):
+    for message in unknown(node, settings) + ([] if quiet else misplaced(node)):
         node.get_logger().warning(message)
     told = [f"{name} = {value}" for name, value in values.items() if value != defaults[name]]
     if quiet and not told:
@@ -172,6 +175,20 @@ def unknown(node: Node, settings: Sequence[Setting]) -> list[str]:
     ]
 
 
+def misplaced(node: Node) -> list[str]:
+    """Return one message for each quality of service that was given for a topic which the package does not have.
+
+    It goes by the whole name, with its namespace and remapped: by another one it would be of no effect.
+    """
+    names = [node.resolve_topic_name(topic.name) for topic in TOPICS]
+    given = ((name, _QOS.fullmatch(name)) for name in node.list_parameters([], 0).names)
+    return [
+        f"{name}: {node.get_name()} has no such topic{_hint(topic[1], names)}"
+        for name, topic in given
+        if topic and topic[1] not in names
+    ]
+
+
 def _given(node: Node, setting: Setting) -> object:
     if node.has_parameter(setting.name):  # declared from what the node was given
         return node.get_parameter(setting.name).value
@@ -179,6 +196,9 @@ def _given(node: Node, setting: Setting) -> object:
 
 
 def _no_such(node: Node, given: Parameter, names: Sequence[str]) -> str:
-    close = get_close_matches(given.name, names, n=1)
-    hint = f"; did you mean {close[0]}?" if close else ""
-    return f"{given.name} = {given.value!r}: {node.get_name()} has no such parameter{hint}"
+    return f"{given.name} = {given.value!r}: {node.get_name()} has no such parameter{_hint(given.name, names)}"
+
+
+def _hint(name: str, names: Sequence[str]) -> str:
+    close = get_close_matches(name, names, n=1)
+    return f"; did you mean {close[0]}?" if close else ""
