@@ -9,11 +9,17 @@ Simulator, estimator, ATP monitor and recorder run as processes; this one kills 
 floods and flaps their topics and sets /clock, by a script that the seed makes. It ends with a table: *told*, time from
 what makes the train's state unsafe to know until `atp/status` says EMERGENCY_BRAKE; *recovered*, time from its end
 until the train is let go; *pause*, longest time between two `atp/status` of a monitor that lives. Then what recordings
-lack of what was sent, and the growth of memory. Exit code 1 when something was silent, lost or unbounded.
+lack of what was heard, and the growth of memory. Exit code 1 when something was silent, lost or unbounded.
+
+Of every life of a publisher a recording must hold all that was published from the first to the last message that it has
+of it: what lies between and is not there is *lost*. What lies before came while the recorder did not know of the
+publisher yet, which each subscriber finds out for itself; nobody can record that. What lies behind was not saved when
+the recorder was killed. Both times are told, and bounded.
 """
 
 from __future__ import annotations
 
+import math
 import os
 import random
 import signal
@@ -22,7 +28,7 @@ import sys
 import tempfile
 import time
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -35,14 +41,15 @@ from adhesion_node.core.atp.supervision import Level
 from adhesion_node.wire import topics
 from adhesion_node.wire.codecs import stamp_ns
 
-TOLD_S, RECOVERED_S, PAUSE_S = 6.0, 60.0, 5.0
+TOLD_S, RECOVERED_S, PAUSE_S = 10.0, 120.0, 10.0
 """Longest times. A state is valid for 2 s, /clock may stand for 2 s, and this machine may be busy."""
 
 STARTED_S = 300.0
 """Until the first supervised train: an estimator that has never run compiles its loops."""
 
-SAVED_S = 1.0
-"""What is younger may be lost when a recorder is killed."""
+FOUND_S, UNSAVED_S = 30.0, 10.0
+"""Longest times until a recorder has begun and found a publisher, and from what it saved last until it is killed. That
+is a second where it is given the processor."""
 
 WARM_S, GROWTH_MB = 20.0, 40.0
 """Memory counts from so long after a start on, and may grow by so much."""
@@ -63,10 +70,13 @@ class Process:
     def __init__(self, name: str, folder: Path, *arguments: str) -> None:
         self.name, self.arguments, self._folder, self._starts = name, arguments, folder, 0
         self.memory_mb: dict[int, list[float]] = defaultdict(list)
+        self.begun_s: list[float] = []
+        """When its lives began."""
         self.begin()
 
     def begin(self, *more: str) -> None:
         self._starts += 1
+        self.begun_s.append(time.time())
         self.log = self._folder / f"{self.name}_{self._starts}.log"
         with self.log.open("w") as said:
             self.program = start(self.name, *self.arguments, *more, said=said)
@@ -108,14 +118,15 @@ class Process:
 
 
 Sent = dict[str, list[tuple[float, int]]]
-"""When which stamps were heard, by topic."""
+"""What was heard: when it was published, and its stamp, by topic."""
 
 
 class Recorded(NamedTuple):
     """A life of the recorder."""
 
     bag: Path
-    until_s: float | None
+    begun_s: float
+    until_s: float = math.inf
 
 
 @dataclass
@@ -155,10 +166,11 @@ class Line:
     def processes(self) -> tuple[Process, ...]:
         return self.simulator, self.estimator, self.monitor, self.recorder
 
-    def _receiver(self, topic: topics.Topic) -> Callable[[Any], None]:
-        def receive(message: Any) -> None:
+    def _receiver(self, topic: topics.Topic) -> Callable[..., None]:
+        def receive(message: Any, info: Mapping[str, int]) -> None:
             now_s = time.time()
-            self.sent[topic.name].append((now_s, stamp_ns(message.header)))
+            if stamp := stamp_ns(message.header):  # those of our own floods have none
+                self.sent[topic.name].append((info["source_timestamp"] / 1e9, stamp))
             if topic is topics.ATP_STATUS:
                 (status,) = message.status
                 self.seen.append((now_s, next(pair.value for pair in status.values if pair.key == "level")))
@@ -180,7 +192,7 @@ class Line:
         return next((at_s for at_s, level in self.seen if at_s > since_s and (level == brake) == braked), None)
 
     def _next_bag(self) -> Path:
-        self.recorded.append(Recorded(self.folder / f"bag_{len(self.recorded)}", None))
+        self.recorded.append(Recorded(self.folder / f"bag_{len(self.recorded)}", time.time()))
         return self.recorded[-1].bag
 
     def begin_recorder(self) -> None:
@@ -335,28 +347,55 @@ def run(line: Line, minutes: float) -> list[Done]:
     return done
 
 
-def lost(sent: Sent, recordings: Iterable[Recorded]) -> tuple[list[str], int]:
-    """Which messages that were heard the recordings lack, and of how many.
+class Kept(NamedTuple):
+    """What a recording holds of a life of a publisher."""
 
-    A recording answers for what came after its own first message of a topic, and `SAVED_S` before it was killed.
-    """
-    missing: list[str] = []
-    asked = 0
+    topic: str
+    bag: str
+    asked: int
+    """Messages that were heard and that it must hold."""
+    lost_s: tuple[float, ...] = ()
+    """When those were published that it lacks, before its last one."""
+    found_s: float = 0.0
+    """Until it held the first, from when the publisher was first heard and the recorder started."""
+    unsaved_s: float = 0.0
+    """From its last until the last that was heard of that life while the recorder lived."""
+
+    @property
+    def faults(self) -> list[str]:
+        """What is wrong with it."""
+        found = [f"lost: {self.topic}, {before_s:.2f} s before the last of {self.bag}" for before_s in self.lost_s]
+        if self.found_s > FOUND_S:
+            found.append(f"{self.topic}: {self.bag} began {self.found_s:.1f} s late")
+        if self.unsaved_s > UNSAVED_S:
+            found.append(f"{self.topic}: {self.bag} lacks the last {self.unsaved_s:.1f} s")
+        return found
+
+
+def kept(sent: Sent, lives: Mapping[str, Sequence[float]], recordings: Iterable[Recorded]) -> Iterator[Kept]:
+    """Yield what the recordings hold of each life of the publishers, which began at `lives`, by topic."""
     for recorded in recordings:
+        stamps: dict[str, set[int]] = defaultdict(set)
         with BagReader(recorded.bag) as bag:
-            held: dict[str, list[tuple[int, int]]] = defaultdict(list)
             for record in bag.messages():
-                name = record.topic.lstrip("/")
-                if name in sent:
-                    held[name].append((record.log_ns, stamp_ns(record.message.header)))
-        for name, stamps in held.items():
-            begun_s, end_s = stamps[0][0] / 1e9, recorded.until_s or sent[name][-1][0] + SAVED_S
-            wanted = [one for one in sent[name] if begun_s + 0.5 < one[0] <= end_s - SAVED_S]
-            kept = {stamp for _, stamp in stamps}
-            gone = [at_s for at_s, stamp in wanted if stamp not in kept]
-            missing += [f"{name}, {end_s - at_s:.2f} s before the end of {recorded.bag.name}" for at_s in gone]
-            asked += len(wanted)
-    return missing, asked
+                if (name := record.topic.lstrip("/")) in sent:
+                    stamps[name].add(stamp_ns(record.message.header))
+        for name, began in lives.items():
+            for from_s, to_s in pairwise([*began, math.inf]):
+                heard = [one for one in sorted(sent[name]) if from_s <= one[0] < min(to_s, recorded.until_s)]
+                if heard and heard[-1][0] > recorded.begun_s:
+                    yield _kept(name, recorded, heard, stamps[name])
+
+
+def _kept(name: str, recorded: Recorded, heard: Sequence[tuple[float, int]], stamps: set[int]) -> Kept:
+    since_s, until_s = max(heard[0][0], recorded.begun_s), heard[-1][0]
+    held_s = [at_s for at_s, stamp in heard if stamp in stamps]
+    if not held_s:
+        return Kept(name, recorded.bag.name, 0, (), until_s - since_s)
+    first_s, last_s = held_s[0], held_s[-1]
+    wanted = [one for one in heard if first_s <= one[0] <= last_s]
+    lost_s = tuple(last_s - at_s for at_s, stamp in wanted if stamp not in stamps)
+    return Kept(name, recorded.bag.name, len(wanted), lost_s, max(first_s - since_s, 0.0), until_s - last_s)
 
 
 def table(done: list[Done]) -> Iterator[str]:
@@ -391,13 +430,19 @@ def main(arguments: list[str]) -> int:
             for process in line.processes:
                 process.kill()
         faults += [f"{process.name}: a traceback" for process in line.processes if process.traceback]
-        missing, asked = lost(line.sent, line.recorded)
+        lives = {topics.STATE.name: line.estimator.begun_s, topics.ATP_STATUS.name: line.monitor.begun_s}
+        held = list(kept(line.sent, lives, line.recorded))
         grown = {process.name: process.grown_mb for process in line.processes}
-    faults += [f"lost: {one}" for one in missing] if asked else ["nothing was recorded"]
+    faults += [fault for one in held for fault in one.faults]
+    asked, missing = sum(one.asked for one in held), sum(len(one.lost_s) for one in held)
+    faults += [] if asked else ["nothing was recorded"]
     faults += [f"{name} grew by {mb:.0f} MB" for name, mb in grown.items() if mb > GROWTH_MB]
     print(f"seed {seed}, {minutes:g} minutes, {len(done)} deeds")
     print("\n".join(table(done)))
-    print(f"lost: {len(missing)} of {asked} messages in {len(line.recorded)} recordings")
+    found_s = max((one.found_s for one in held), default=0.0)
+    unsaved_s = max((one.unsaved_s for one in held), default=0.0)
+    print(f"lost: {missing} of {asked} messages in {len(line.recorded)} recordings")
+    print(f"until a recorder found a publisher: {found_s:.1f} s; not saved before it was killed: {unsaved_s:.1f} s")
     print("grown by, MB: " + ", ".join(f"{name} {mb:.1f}" for name, mb in grown.items()))
     print("\n".join(faults) or "nothing silent, lost or unbounded")
     return 1 if faults else 0

@@ -8,6 +8,7 @@ A dataclass declares its settings as fields made by `setting`; `settings_of` lis
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import Field, field, fields
+from functools import cache
 from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeVar
 
@@ -113,6 +114,7 @@ def make(kind: type[Made], values: Mapping[str, Any], prefix: str = "", **others
     return kind(**{field: values[name] for field, name in own.items() if name in values}, **others)
 
 
+@cache
 def _declared(item: Field[Any]) -> Setting:
     default: Any = item.default
     return Setting(item.name, default, **item.metadata)

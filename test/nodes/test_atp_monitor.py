@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import messages
@@ -116,7 +116,7 @@ class Line:
 
     def tick_twice(self, offset_s: float) -> DiagnosticStatus:
         """Let the watchdog pass by once and then speak, 1.2 s behind `offset_s`; return what it says."""
-        self.monitor._known = replace(self.monitor._known, judged=True)
+        self.monitor._known = self.monitor._known._replace(judged=True)
         self.set_time(START_S + offset_s + 0.6)
         self.spin_until(self.executor, lambda: not self.monitor._known.judged)
         return self.next_status(lambda: self.set_time(START_S + offset_s + 1.2))

@@ -4,13 +4,14 @@
 
 from __future__ import annotations
 
+import math
 import random
 from itertools import islice
 from pathlib import Path
 
 import messages
 import pytest
-from chaos import DEEDS, SAVED_S, Done, Recorded, lost, script, table
+from chaos import DEEDS, Done, Kept, Recorded, kept, script, table
 from rclpy.serialization import serialize_message
 
 from adhesion_node.bag import BagWriter
@@ -33,23 +34,41 @@ SENT = {STATE.name: [(float(second), second * S) for second in range(100, 120)]}
 
 
 @pytest.mark.parametrize(
-    ("kept", "until_s", "found"),
+    ("held", "until_s", "lost_s", "found_s", "unsaved_s"),
     [
-        (range(100, 120), None, (0, 19)),
-        (range(105, 120), None, (0, 14)),  # it came later: its own first one counts
-        ([*range(100, 110), *range(112, 120)], None, (2, 19)),
-        (range(100, 115), None, (5, 19)),
-        (range(100, 115), 115.0 + SAVED_S / 2, (0, 14)),  # killed: what is younger than a second may be lost
-        (range(100, 112), 115.0 + SAVED_S / 2, (3, 14)),
+        (range(100, 120), math.inf, (), 0.0, 0.0),
+        (range(105, 120), math.inf, (), 5.0, 0.0),  # it found its publisher later: nobody can record what was before
+        ([*range(100, 110), *range(112, 120)], math.inf, (9.0, 8.0), 0.0, 0.0),
+        (range(100, 115), math.inf, (), 0.0, 5.0),
+        (range(100, 115), 116.5, (), 0.0, 2.0),
+        ([100, 101, 105], 108.5, (3.0, 2.0, 1.0), 0.0, 3.0),
+        ([], math.inf, (), 19.0, 0.0),
     ],
 )
 def test_what_a_recording_lacks_is_counted(
-    tmp_path: Path, kept: list[int], until_s: float | None, found: tuple[int, int]
+    tmp_path: Path, held: list[int], until_s: float, lost_s: tuple[float, ...], found_s: float, unsaved_s: float
 ) -> None:
-    recorded(tmp_path / "bag", list(kept))
-    missing, asked = lost(SENT, [Recorded(tmp_path / "bag", until_s)])
-    assert (len(missing), asked) == found
-    assert all(one.startswith("adhesion/state, ") and one.endswith(" s before the end of bag") for one in missing)
+    recorded(tmp_path / "bag", list(held))
+    (found,) = kept(SENT, {STATE.name: [50.0]}, [Recorded(tmp_path / "bag", 0.0, until_s)])
+    assert (found.lost_s, found.found_s, found.unsaved_s) == (lost_s, found_s, unsaved_s)
+    assert len(found.faults) == len(lost_s)
+
+
+def test_each_life_of_a_publisher_and_of_a_recorder_is_looked_at_alone(tmp_path: Path) -> None:
+    recorded(tmp_path / "one", [100, 101, 102, 108, 109])
+    recorded(tmp_path / "two", [113, 114, 116, 119])
+    recordings = [Recorded(tmp_path / "one", 0.0, 109.5), Recorded(tmp_path / "two", 110.5)]
+    found = list(kept(SENT, {STATE.name: [100.0, 105.0]}, recordings))
+    assert [(one.bag, one.asked, one.lost_s, one.found_s, one.unsaved_s) for one in found] == [
+        ("one", 3, (), 0.0, 2.0),
+        ("one", 2, (), 3.0, 0.0),
+        ("two", 7, (4.0, 2.0, 1.0), 2.5, 0.0),
+    ]
+
+
+def test_a_publisher_that_is_never_found_and_an_end_that_is_never_saved_are_faults() -> None:
+    assert Kept("topic", "bag", 1, found_s=31.0).faults == ["topic: bag began 31.0 s late"]
+    assert Kept("topic", "bag", 1, unsaved_s=11.0).faults == ["topic: bag lacks the last 11.0 s"]
 
 
 def test_a_seed_makes_the_script_and_every_deed_has_its_turn() -> None:

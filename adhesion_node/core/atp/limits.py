@@ -37,6 +37,9 @@ GRID = 1001
 """Speeds at which the limits are tabulated, about 0.1 m/s apart; what lies between is on the safe side."""
 
 
+FADING_MPS = 10.0
+"""Adhesion falls by a share of 1/(v + this) per m/s at most: of the laws in `core.physics` by 1/(v + 33)."""
+
 LEAST_SHARE = 0.25
 """Of the weakest deceleration of a curve: what it counts as, at least, at speeds above the curve's first one."""
 
@@ -59,10 +62,11 @@ def distance_between(braking: BrakingCurve, speed_mps: Array, foot_mps: float) -
     """Distance, m, along the curve from each speed to `foot_mps`; negative from a lower one.
 
     Between two points the deceleration counts as constant (3.13.8.1.3). A speed above the curve's first one is
-    braked down to it at the curve's weakest deceleration, less what that falls by as it does at the curve's beginning:
-    adhesion is lower the faster a train is.
+    braked down to it at the curve's weakest deceleration, less what that falls by: adhesion is lower the faster a train
+    is, and what a curve says of lower speeds may have been limited by the brake.
     """
-    return _along(braking, np.asarray(foot_mps)) - _along(braking, speed_mps)
+    places = _along(braking, np.append(speed_mps, foot_mps))
+    return np.asarray(places[-1] - places[:-1])
 
 
 def _along(braking: BrakingCurve, speed_mps: Array) -> Array:
@@ -76,9 +80,22 @@ def _along(braking: BrakingCurve, speed_mps: Array) -> Array:
 
 
 def _fading(braking: BrakingCurve) -> float:
-    """By how much the deceleration falls with the speed where the curve begins, m/s^2 per m/s; 0 where it rises."""
-    (first, second), (faster, slower) = braking.deceleration_mps2[:2], braking.speed_mps[:2]
-    return max(float((second - first) / (faster - slower)), 0.0) if faster > slower else 0.0
+    """By how much the deceleration falls with the speed above the curve's first one, m/s^2 per m/s.
+
+    As it does where the curve begins; at least by a share of 1/(v + `FADING_MPS`), which no adhesion law exceeds.
+    """
+    slowing, speed = braking.deceleration_mps2, braking.speed_mps
+    least = float(slowing.min()) / (FADING_MPS + float(speed[0]))
+    return max(float((slowing[1] - slowing[0]) / (speed[0] - speed[1])), least) if speed[0] > speed[1] else least
+
+
+def _between_points(braking: BrakingCurve) -> float:
+    """Way, m, by which a curve may err at a speed between two of its points, where v^2 falls in proportion to the way.
+
+    Where v^2 falls by q at a deceleration from a to b, it is q (1/a - 1/b)/8 at most, if that falls first at a, then b.
+    """
+    slowing, squares = braking.deceleration_mps2, braking.speed_mps**2
+    return float(np.max((squares[:-1] - squares[1:]) * np.abs(np.diff(1.0 / slowing)))) / 8.0
 
 
 def service_curve(braking: BrakingCurve, deceleration_mps2: float) -> BrakingCurve:
@@ -97,6 +114,7 @@ def service_curve(braking: BrakingCurve, deceleration_mps2: float) -> BrakingCur
 def distances(config: SupervisionConfig, braking: BrakingCurve, speed_mps: Array) -> Limits:
     """How far, m, before the target the max safe front end of a train at each speed meets each limit.
 
+    What the curve may err by between its points counts twice: at the speed, and at the target's.
     They do not fall below 0: beyond the target the ceiling limits hold. `braking` must reach down to the target speed.
     """
     target = config.target_speed_mps
@@ -105,7 +123,7 @@ def distances(config: SupervisionConfig, braking: BrakingCurve, speed_mps: Array
     pulling = np.maximum(speed_mps + config.speed_margin_mps + pulled / 2.0, target)
     cut_off = np.maximum(speed_mps + config.speed_margin_mps + pulled, target)
     build_up = pulling * config.traction_s + (cut_off + coasted / 2.0) * config.coasting_s
-    ebi = distance_between(braking, cut_off + coasted, foot) + build_up
+    ebi = distance_between(braking, cut_off + coasted, foot) + build_up + 2.0 * _between_points(braking)
     sbi = ebi + speed_mps * config.service_build_up_s
     if target == 0.0:
         service = service_curve(braking, config.service_deceleration_mps2)

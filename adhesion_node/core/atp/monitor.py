@@ -14,7 +14,6 @@ No trick of time makes what is known younger. The clock counts as the latest tim
 by more, all that was heard is forgotten. A message older than the one before it is not taken in.
 """
 
-from dataclasses import dataclass, field, replace
 from enum import Enum, auto
 from typing import NamedTuple
 
@@ -69,8 +68,7 @@ class Rules(NamedTuple):
     clock_timeout_s: float
 
 
-@dataclass(frozen=True, slots=True)
-class Known:
+class Known(NamedTuple):
     """What a monitor remembers."""
 
     moved_ns: int
@@ -79,7 +77,7 @@ class Known:
     """The latest time that the ROS clock has shown."""
     state: TrainState | Unavailable = SILENCE
     curve: StampedCurve | Unavailable = SILENCE
-    course: Course = field(default_factory=Course)
+    course: Course = Course()
     refused_target: str = ""
     level: Level | None = None
     judged: bool = False
@@ -95,24 +93,24 @@ def step(rules: Rules, known: Known, event: Event, now: Now) -> tuple[Known, Dec
     due = went_back
     match event:
         case Tick.ROS:
-            due, known = due or not known.judged, replace(known, judged=False)
+            due, known = due or not known.judged, known._replace(judged=False)
         case Tick.STEADY:
             due = due or stands_s(known, now) > rules.clock_timeout_s
         case Tick.RULES:
             due = True
         case Tick.TARGET:
-            due, known = True, replace(known, refused_target="")
+            due, known = True, known._replace(refused_target="")
         case Refused(Part.TARGET, why):
-            due, known = True, replace(known, refused_target=why)
+            due, known = True, known._replace(refused_target=why)
         case _:
             known = _heard(rules.supervision, known, event)
             apart = _apart(known)
             due = due or not apart
-            known = replace(known, apart=apart, judged=known.judged or (apart and not known.apart))
+            known = known._replace(apart=apart, judged=known.judged or (apart and not known.apart))
     if not due:
         return known, None
     decision = judge(rules, known, now)
-    return replace(known, level=decision.level, judged=event is not Tick.ROS), decision
+    return known._replace(level=decision.level, judged=event is not Tick.ROS), decision
 
 
 def stands_s(known: Known, now: Now) -> float:
@@ -135,7 +133,7 @@ def _at(known: Known, now: Now, went_back: bool) -> Known:
         lost = Unavailable(f"none since the clock went back by {gone_s:.3g} s; is there one publisher of /clock?")
         return Known(now.steady_ns, now.ros_ns, lost, lost, refused_target=known.refused_target, level=known.level)
     if now.ros_ns > known.latest_ns:
-        return replace(known, latest_ns=now.ros_ns, moved_ns=now.steady_ns)
+        return known._replace(latest_ns=now.ros_ns, moved_ns=now.steady_ns)
     return known
 
 
@@ -148,22 +146,24 @@ def _heard(config: SupervisionConfig, known: Known, event: Event) -> Known:
             late = newest is not None and event.t_ns <= newest
             return known if late else _state_heard(config, known, event, event.t_ns > horizon_ns)
         case StampedCurve():
-            late = isinstance(known.curve, StampedCurve) and event.t_ns < known.curve.t_ns <= horizon_ns
-            return known if late else replace(known, curve=event)
+            late = isinstance(known.curve, StampedCurve) and event.t_ns < known.curve.t_ns
+            ahead = event.t_ns > horizon_ns
+            curve = Unavailable(out_of_date(config, event.age_s(known.latest_ns))) if ahead else event
+            return known if late else known._replace(curve=curve)
         case Refused(Part.STATE, why):
-            return replace(known, state=Unavailable(f"refused: {why}"))
+            return known._replace(state=Unavailable(f"refused: {why}"))
         case Refused(Part.CURVE, why):
-            return replace(known, curve=Unavailable(f"refused: {why}"))
+            return known._replace(curve=Unavailable(f"refused: {why}"))
     return known
 
 
 def _state_heard(config: SupervisionConfig, known: Known, state: TrainState, ahead: bool) -> Known:
     """Hold a state against those before; one ahead of the clock is none of them, or no later one would be newer."""
     if ahead:
-        return replace(known, state=Unavailable(out_of_date(config, state.age_s(known.latest_ns))))
+        return known._replace(state=Unavailable(out_of_date(config, state.age_s(known.latest_ns))))
     course = known.course.after(state)
     complaint = course.complaint(config)
-    return replace(known, course=course, state=Unavailable(complaint) if complaint else state)
+    return known._replace(course=course, state=Unavailable(complaint) if complaint else state)
 
 
 def _apart(known: Known) -> bool:

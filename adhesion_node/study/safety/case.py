@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -16,14 +16,13 @@ from ...core.atp.received import NS_PER_S, StampedCurve, TrainState
 from ...core.physics.braking import BrakingCurve
 from ...wire.codecs import NOMINAL, Rejected, plain
 from ...wire.curves import read_curve, write_curve
-from .truth import POINTS, Brake, Train, allowed
+from .truth import Brake, Train, allowed
 
 EPOCH_NS = 10**12
 """Of a run's time 0, by the ROS clock."""
 
-BETWEEN_POINTS_M = 2.0
-"""Between two of a curve's points its deceleration counts as constant: that is too good by v dv^2/(8 v0 a0) at most,
-1.7 m for the trains that are drawn."""
+ROUNDING_M = 0.01
+"""Of ways of up to 100 km."""
 
 FREE_S, FAR_M = 0.3, 1e5
 """So long, s, the target is still far ahead, m: a monitor begins with the emergency brake, and has to let go."""
@@ -35,10 +34,14 @@ WORST = (-1.0, -1.0)
 
 
 class Target(NamedTuple):
-    """Holds from a time on, s."""
+    """Holds from a time on, s, with the settings and the brake of that time."""
 
     from_s: float
     place_m: float
+    changes: Mapping[str, float] = {}
+    """Of the settings."""
+    brake: Brake | None = None
+    """Where it is another than the train's at first."""
 
 
 class Message(NamedTuple):
@@ -74,6 +77,10 @@ class Case:
     noise: Noise
     share: float
     """What of the true deceleration the braking curves count on."""
+    points: int
+    """Of a braking curve."""
+    down_to_mps: float
+    """Where a braking curve ends."""
     made_s: tuple[float, ...]
     """When states and curves are made."""
     onset_s: float
@@ -90,18 +97,25 @@ class Case:
     """When the clocks of all are set, s, and by how much."""
     worse: tuple[float, float] = (np.inf, 1.0)
     """When the rail gets worse, s, and what is left of the deceleration."""
+    down_s: tuple[float, float] = (np.inf, 0.0)
+    """From when until when there is no monitor: it was killed, and begins anew."""
     faults: tuple[str, ...] = field(default=())
-
-    @property
-    def allowed_mps(self) -> float:
-        """How fast the train may pass the target."""
-        return allowed(self.config.target_speed_mps)
 
     def placed(self, train: Train) -> Case:
         """The case of another train, which needs all the way that it has left at the onset, too."""
-        speed_mps = np.asarray(train.speed(self.onset_s))
-        place_m = float(train.place(self.onset_s) + train.brake.needed(speed_mps, self.allowed_mps))
+        speed_mps, allowed_mps = np.asarray(train.speed(self.onset_s)), allowed(self.config.target_speed_mps)
+        place_m = float(train.place(self.onset_s) + train.brake.needed(speed_mps, allowed_mps))
         return replace(self, train=train, targets=(Target(0.0, place_m + FAR_M), Target(FREE_S, place_m)))
+
+    def changed(self, from_s: float, by_m: float = 0.0, brake: Brake | None = None, **changes: float) -> Case:
+        """The case whose target is moved, or whose settings change, while it runs."""
+        last = self.targets[-1]
+        new = Target(max(from_s, last.from_s), last.place_m + by_m, {**last.changes, **changes}, brake or last.brake)
+        return replace(self, targets=(*self.targets, new))
+
+    def supervised(self, target: Target) -> SupervisionConfig:
+        """What the monitor is set to while a target holds."""
+        return replace(self.config, target_position_m=target.place_m, **target.changes)
 
     def stamp_ns(self, t_s: float) -> int:
         """What is stamped at a time."""
@@ -132,13 +146,17 @@ def draw(rng: Rng) -> Case:
         position_margin_m=5.0 if margins else 0.0,
         margin_sigma=rng.uniform(1.0, 4.0),
         valid_for_s=rng.uniform(0.5, 3.0),
+        max_ahead_s=rng.choice([0.0, 0.1, 0.3]),
     )
-    brake = Brake(
-        config.traction_s, config.coasting_s, rng.uniform(0.2, 1.6), rng.choice([60.0, 1e9]), config.acceleration_mps2
-    )
-    least = max(allowed(config.target_speed_mps) + 1.0, 12.0)
+    least = allowed(config.target_speed_mps) + 0.5
+    speed_mps = rng.uniform(max(least, 12.0), 97.0) if often(rng) else rng.uniform(least, least + 12.0)
+    standing_mps2, fading_mps = rng.uniform(0.2, 1.6), rng.choice([20.0, 60.0, 1e9, -300.0])
+    knee_mps = speed_mps * rng.choice([rng.uniform(0.0, 1.0), rng.uniform(0.94, 1.02)])
+    most_mps2 = 10.0 if rng.integers(2) else standing_mps2 / (1.0 + knee_mps / fading_mps)
     train = Train(
-        rng.uniform(least, 97.0), config.acceleration_mps2 * (1.0 if often(rng) else rng.uniform(-0.3, 1.0)), brake
+        speed_mps,
+        config.acceleration_mps2 * (1.0 if often(rng) else rng.uniform(-0.3, 1.0)),
+        Brake(config.traction_s, config.coasting_s, standing_mps2, fading_mps, most_mps2, config.acceleration_mps2),
     )
     period_s, onset_s, check_s = rng.uniform(0.2, 0.8), rng.uniform(0.5, 1.5), rng.uniform(0.1, 0.3)
     stated_s = TICKS * check_s + config.max_ahead_s
@@ -150,11 +168,13 @@ def draw(rng: Rng) -> Case:
         train,
         Noise(10.0 ** rng.uniform(-1.0, 1.25), 10.0 ** rng.uniform(-1.3, 0.3), WORST if often(rng) else None),
         1.0 if often(rng) else rng.uniform(0.7, 1.0),
+        64 if often(rng) else round(2.0 * 10.0 ** rng.uniform(0.0, 2.0)),
+        0.0 if often(rng) else rng.uniform(0.0, 1.0) * config.target_speed_mps,
         tuple(np.arange(0.0, end_s, period_s).tolist()),
         onset_s,
         end_s,
         stated_s,
-        BETWEEN_POINTS_M,
+        ROUNDING_M,
         (),
     ).placed(train)
 
@@ -167,16 +187,16 @@ def estimated(case: Case, rng: Rng, t_s: float, noise: Noise | None = None) -> T
     return TrainState(
         case.stamp_ns(t_s),
         case.train.place(t_s) + sigma * wrong[0] * noise.position_std_m,
-        max(case.train.speed(t_s) + sigma * wrong[1] * noise.speed_std_mps, 0.5),
+        case.train.speed(t_s) + sigma * wrong[1] * noise.speed_std_mps,
         noise.position_std_m,
         noise.speed_std_mps,
     )
 
 
 def curve_of(case: Case, state: TrainState, made_s: float = 0.0) -> StampedCurve:
-    """The braking of a state to a standstill, by the true law of the time when it is made, and no better."""
+    """The braking of a state, by the true law of the time when it is made, and no better."""
     brake = (case.train.brake if made_s < case.worse[0] else worse_brake(case)).times(case.share)
-    speed = np.linspace(state.speed_mps, 0.0, POINTS)
+    speed = np.linspace(max(abs(state.speed_mps), case.down_to_mps), case.down_to_mps, case.points)
     slowing, left = brake.slowing(speed), brake.way(speed)
     time = np.concatenate(([0.0], np.cumsum(2.0 * -np.diff(speed) / (slowing[1:] + slowing[:-1]))))
     return StampedCurve(state.t_ns, state.position_m, BrakingCurve(left[0] - left, speed, slowing, time))

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...core.atp.monitor import Part, Refused
 from ...core.atp.received import StampedCurve, TrainState
-from .case import FREE_S, Case, Message, Noise, Rng, Segment, Target, curve_of, estimated, in_units, told
+from .case import FREE_S, Case, Message, Noise, Rng, Segment, curve_of, estimated, in_units, told
 
 Faulty = tuple[Case, list[Message]]
 Fault = Callable[[Rng, Case, list[Message]], Faulty]
@@ -29,6 +29,9 @@ MISLED_NOISE = Noise(2.0, 0.3, None)
 
 UNSURE = Noise(5.0, 5.0, None)
 """Of the first estimate after a start."""
+
+DELAY_S = 0.22
+"""Longest time that a message takes, where nothing is said of it."""
 
 BLIND_MPS2 = 3.0
 """By which the standard deviation of the speed grows where no sensor is believed."""
@@ -132,12 +135,60 @@ def all_clocks(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
 
 
 def target(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
-    """A nearer target; or one that is not understood, and the same again."""
-    from_s = rng.uniform(0.3, case.onset_s + 0.5)
-    if rng.integers(2):
-        nearer = case.targets[-1].place_m - 10.0 ** rng.uniform(0.0, 3.0)
-        return replace(case, targets=(*case.targets, Target(from_s, nearer))), messages
+    """A nearer target, a slower one, one that is moved on and back; or one that is not understood, and the same again."""
+    from_s, by_m = rng.uniform(FREE_S, case.onset_s + 0.5), 10.0 ** rng.uniform(0.0, 3.0)
+    kind = rng.integers(4)
+    if kind == 0:
+        return case.changed(from_s, -by_m), messages
+    if kind == 1:
+        return case.changed(from_s, target_speed_kmh=case.config.target_speed_kmh * rng.uniform(0.0, 1.0)), messages
+    if kind == 2:
+        return case.changed(from_s, by_m).changed(from_s + rng.uniform(0.0, 1.5), -by_m), messages
     return case, [*messages, Message(from_s, Refused(Part.TARGET, "points = 0"))]
+
+
+def settings(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
+    """A brake that takes longer to build up, and the settings that say so; or a lower speed on the line."""
+    from_s, before = rng.uniform(FREE_S, case.onset_s + 0.5), case.config
+    if rng.integers(2):
+        line_kmh = max(case.train.speed(from_s) * 3.6 * rng.uniform(0.5, 1.0), before.target_speed_kmh, 1.0)
+        return case.changed(from_s, line_speed_kmh=line_kmh), messages
+    slower = {
+        "emergency_build_up_s": before.emergency_build_up_s + rng.uniform(0.0, 5.0),
+        "traction_cut_off_s": before.traction_cut_off_s + rng.uniform(0.0, 5.0),
+    }
+    after = replace(before, **slower)
+    brake = replace(case.train.brake, pulling_s=after.traction_s, coasting_s=after.coasting_s)
+    return case.changed(from_s, brake=brake, **slower), messages
+
+
+def reboot(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
+    """The monitor is killed and begins anew, with the last curve at once; who listens takes its silence for the brake."""
+    del messages
+    from_s = rng.uniform(FREE_S, 1.0)
+    until_s = from_s + rng.uniform(0.35, 3.0)
+    onset_s = until_s + rng.uniform(0.0, 4.0)
+    end_s = onset_s + case.stated_s + 0.5
+    case = replace(case, onset_s=onset_s, end_s=end_s, down_s=(from_s, until_s)).placed(case.train)
+    case = replace(case, made_s=tuple(np.arange(0.0, end_s, case.made_s[1]).tolist()))
+    messages = [one for pair in told(case, rng, [estimated(case, rng, t_s) for t_s in case.made_s]) for one in pair]
+    curves = [one for one in messages if one.at_s < until_s and isinstance(one.event, StampedCurve)]
+    return case, [*messages, *(one._replace(at_s=until_s) for one in curves[-1:])]
+
+
+def ahead(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
+    """States, curves or both are stamped ahead of the time, and for a while of all: by what the delay hides at most."""
+    by_ns = round(10.0 ** rng.uniform(-2.0, 0.7) * 1e9)
+    which = ((TrainState,), (StampedCurve,), (TrainState, StampedCurve))[rng.integers(3)]
+    from_s, until_s = rng.choice([0.0, case.onset_s]), rng.choice([case.onset_s, np.inf])
+    late_s = case.config.max_ahead_s + DELAY_S
+    case = replace(case, stated_s=case.stated_s + late_s, end_s=case.end_s + late_s, stated_m=np.inf)
+    return case, [
+        one._replace(event=one.event._replace(t_ns=one.event.t_ns + by_ns))
+        if isinstance(one.event, which) and from_s <= one.at_s < until_s
+        else one
+        for one in messages
+    ]
 
 
 def worse(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
@@ -147,7 +198,7 @@ def worse(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
     case = replace(
         case,
         worse=(from_s, rng.uniform(0.5, 0.9)),
-        targets=tuple(Target(since_s, place_m + further_m) for since_s, place_m in case.targets),
+        targets=tuple(one._replace(place_m=one.place_m + further_m) for one in case.targets),
         stated_s=stated_s,
         end_s=from_s + stated_s + 0.5,
         stated_m=np.inf,
@@ -201,9 +252,12 @@ FAULTS: dict[str, Sequence[Fault]] = {
     "curve in other units": (units,),
     "monitor's clock": (clock,),
     "all clocks set": (all_clocks,),
+    "monitor restarted": (reboot,),
+    "stamps ahead": (ahead,),
     "target": (target,),
+    "settings": (settings,),
     "rail gets worse": (worse,),
     "states that mislead": (misled,),
-    "several at once": (lost, late, twice, frozen, restart, units, clock, target),
+    "several at once": (reboot, lost, late, twice, frozen, restart, units, clock, target, settings),
 }
 """The faults of each row of the table; where there are more than one, two of them are drawn."""

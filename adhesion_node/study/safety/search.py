@@ -6,17 +6,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core.atp.config import SupervisionConfig
 from ...core.atp.monitor import Event, Known, Now, Rules, Tick, step
 from ...core.atp.received import NS_PER_S
 from ...core.atp.supervision import Level
 from ...core.physics.train import Array
-from .case import EPOCH_NS, FREE_S, Case, draw, estimated, told, worse_brake
+from .case import EPOCH_NS, FREE_S, Case, Target, draw, estimated, told
 from .faults import FAULTS
+from .truth import allowed
 
 GRID_S = 0.01
 """At which times the truth is looked at."""
@@ -63,7 +64,7 @@ def case_of(seed: int, number: int) -> Case:
 def happenings(case: Case) -> Iterator[tuple[float, Event]]:
     """Yield all that happens to the monitor in the order of time."""
     events: list[tuple[float, Event]] = [(one.at_s, one.event) for one in case.messages]
-    events += [(target.from_s, Tick.TARGET) for target in case.targets[1:]]
+    events += [(later.from_s, _told_of(earlier, later)) for earlier, later in pairwise(case.targets)]
     events += [(t_s, Tick.STEADY) for t_s in np.arange(0.37 * case.check_s, case.end_s, case.check_s).tolist()]
     ends = [*(segment.from_s for segment in case.clock[1:]), case.end_s]
     for segment, end_s in zip(case.clock, ends, strict=True):
@@ -84,11 +85,17 @@ def clock_ns(case: Case, t_s: float) -> int:
 
 def decided(case: Case) -> tuple[list[tuple[float, bool]], float]:
     """When the monitor decided, and whether on the emergency brake; and until when, no further than is needed."""
-    known, said, t_s = Known(0), [(0.0, True)], 0.0
-    configs = [(target.from_s, _with(case.config, target.place_m)) for target in case.targets]
+    known, said, (down_s, up_s) = Known(0), [(0.0, True)], case.down_s
+    configs = [(target.from_s, case.supervised(target)) for target in case.targets]
     braked_s: float | None = 0.0
     """Since when it has been braked without a pause."""
     for t_s, event in happenings(case):
+        if down_s <= t_s < up_s:
+            known = Known(round(up_s * NS_PER_S))
+            if braked_s is None:
+                braked_s = down_s
+                said.append((down_s, True))
+            continue
         config = next(config for from_s, config in reversed(configs) if from_s <= t_s)
         now = Now(clock_ns(case, t_s), round(t_s * NS_PER_S))
         known, decision = step(Rules(config, case.clock_timeout_s), known, event, now)
@@ -98,7 +105,7 @@ def decided(case: Case) -> tuple[list[tuple[float, bool]], float]:
                 braked_s = None
             elif braked_s is None:
                 braked_s = t_s
-        if braked_s is not None and t_s > max(braked_s, case.onset_s) + AFTER_S:
+        if braked_s is not None and t_s > max(braked_s, case.onset_s, up_s) + AFTER_S:
             return said, t_s
     return said, case.end_s
 
@@ -126,13 +133,25 @@ def outcome(case: Case) -> Outcome:
 
 
 def _excess(case: Case, t_s: Array) -> Array:
-    """Way, m, that the train needs at each time above what is left to the target then in force."""
-    begins = np.array([target.from_s for target in case.targets])
-    target_m = np.array([target.place_m for target in case.targets])[np.searchsorted(begins, t_s, side="right") - 1]
-    speed = case.train.speed(t_s)
-    needed = [brake.needed(speed, case.allowed_mps) for brake in (case.train.brake, worse_brake(case))]
-    return np.asarray(case.train.place(t_s) + np.where(t_s < case.worse[0], *needed) - target_m)
+    """Way, m, that the train needs at each time above what is left: to the target, and none above the line's speed."""
+    excess = np.full(len(t_s), -np.inf)
+    begins = np.array([*(target.from_s for target in case.targets), np.inf])
+    for index, target in enumerate(case.targets):
+        settings = {"target_speed_kmh": case.config.target_speed_kmh} | dict(target.changes)
+        brake = target.brake or case.train.brake
+        for worse in (False, True):
+            now = (t_s >= begins[index]) & (t_s < begins[index + 1]) & ((t_s >= case.worse[0]) == worse)
+            if now.any():
+                speed, here = case.train.speed(t_s[now]), brake.times(case.worse[1]) if worse else brake
+                needed = here.needed(speed, allowed(settings["target_speed_kmh"] / 3.6))
+                excess[now] = case.train.place(t_s[now]) + needed - target.place_m
+                if "line_speed_kmh" in settings:
+                    on_the_line = here.needed(speed, allowed(settings["line_speed_kmh"] / 3.6))
+                    excess[now] = np.maximum(excess[now], on_the_line)
+    return excess
 
 
-def _with(config: SupervisionConfig, place_m: float) -> SupervisionConfig:
-    return replace(config, target_position_m=place_m)
+def _told_of(earlier: Target, later: Target) -> Tick:
+    """What a node makes of other settings."""
+    same = earlier.place_m == later.place_m and "target_speed_kmh" not in later.changes
+    return Tick.RULES if same else Tick.TARGET

@@ -3,7 +3,8 @@
 """A train before a target, by the equations of motion alone: it shares no code with what supervises it.
 
 The train runs with a constant acceleration and is never braked, whatever is told. Its brake would slow it by
-a(v) = a0/(1 + v/v0), as adhesion falls with speed: from v to u on (F(v) - F(u))/a0 with F(v) = v^2/2 + v^3/(3 v0).
+a(v) = a0/(1 + v/v0), as adhesion falls with speed, or as drag rises where v0 < 0: from v to u on (F(v) - F(u))/a0 with
+F(v) = v^2/2 + v^3/(3 v0); but nowhere by more than its force gives.
 """
 
 from dataclasses import dataclass, replace
@@ -15,8 +16,8 @@ from ...core.physics.train import Array
 
 Number = TypeVar("Number", float, Array)
 
-POINTS = 64
-"""Of a braking curve."""
+BEYOND_MPS = 1000.0
+"""No train is as fast."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,21 +31,31 @@ class Brake:
     standing_mps2: float
     """Deceleration when nearly at a stand."""
     fading_mps: float
-    """Speed at which the deceleration is half of that."""
+    """Speed at which the deceleration is half of that; where it is below 0, it rises with speed."""
+    most_mps2: float
+    """Deceleration that the brake gives at most, whatever the rail would bear."""
     pull_mps2: float
     """Acceleration while pulling; at most 0.4 while coasting, down a grade."""
 
     def times(self, share: float) -> "Brake":
         """A brake that slows so much less."""
-        return replace(self, standing_mps2=self.standing_mps2 * share)
+        return replace(self, standing_mps2=self.standing_mps2 * share, most_mps2=self.most_mps2 * share)
 
     def slowing(self, speed_mps: Array) -> Array:
         """Deceleration, m/s^2, at each speed."""
-        return self.standing_mps2 / (1.0 + speed_mps / self.fading_mps)
+        return np.minimum(self.standing_mps2 / (1.0 + speed_mps / self.fading_mps), self.most_mps2)
 
-    def way(self, speed_mps: Number) -> Number:
+    def way(self, speed_mps: Array) -> Array:
         """Way, m, to a standstill of a train whose brake is built up."""
+        knee = min(max(self.fading_mps * (self.standing_mps2 / self.most_mps2 - 1.0), 0.0), BEYOND_MPS)
+        below, above = (self._by_force, self._by_rail) if self.fading_mps > 0.0 else (self._by_rail, self._by_force)
+        return below(np.minimum(speed_mps, knee)) + above(np.maximum(speed_mps, knee)) - above(np.asarray(knee))
+
+    def _by_rail(self, speed_mps: Array) -> Array:
         return (speed_mps**2 / 2.0 + speed_mps**3 / (3.0 * self.fading_mps)) / self.standing_mps2
+
+    def _by_force(self, speed_mps: Array) -> Array:
+        return speed_mps**2 / (2.0 * self.most_mps2)
 
     def needed(self, speed_mps: Array, allowed_mps: float) -> Array:
         """Way, m, from the command to brake until the train is no faster than allowed; -inf where it is not now."""
@@ -52,7 +63,8 @@ class Brake:
         off = speed_mps + self.pull_mps2 * self.pulling_s
         built_up = off + rolling * self.coasting_s
         before = (speed_mps + off) / 2.0 * self.pulling_s + (off + built_up) / 2.0 * self.coasting_s
-        return np.where(speed_mps > allowed_mps, before + self.way(built_up) - self.way(allowed_mps), -np.inf)
+        slowing = self.way(built_up) - self.way(np.asarray(allowed_mps))
+        return np.where(speed_mps > allowed_mps, before + slowing, -np.inf)
 
 
 @dataclass(frozen=True, slots=True)

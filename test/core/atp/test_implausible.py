@@ -28,8 +28,8 @@ def test_a_train_may_be_three_standard_deviations_ahead_and_faster() -> None:
     unsure = TrainState(NOW_NS, position, 40.0, position_std_m=4.0, speed_std_mps=0.5)
     decision = decide(CONFIG, NOW_NS, unsure, CURVE._replace(position_m=position))
     assert decision.reading is not None
-    # 40 to 41.5 m/s: (41.5^2 - 1600)/1.6 = 76.4 m more, 2 s of build-up 3 m more, 12 m further ahead.
-    assert decision.reading.margin_m == pytest.approx(500.0 - 76.40625 - 3.0 - 12.0)
+    # 40 to 41.5 m/s: (41.5^2 - 1600)/1.6/(1 - 1.5/50) = 78.8 m more, 2 s of build-up 3 m more, 12 m further ahead.
+    assert decision.reading.margin_m == pytest.approx(500.0 - 78.769 - 3.0 - 12.0, abs=1e-3)
     assert decision.reading.supervised_mps == 41.5
     assert decision.reading.distance_to_target_m == 5000.0 - position
 
@@ -41,8 +41,8 @@ def test_since_its_state_a_train_may_have_accelerated() -> None:
     assert decision.reading is not None
     assert decision.reading.supervised_mps == 41.0
     assert state.at_most(config, NOW_NS) == (1040.5, 41.0)
-    # 0.5 m further, and (41.0 + 0.8)^2/1.6 + (41.0 + 0.4) 2 s instead of what 40 m/s need.
-    needed = 41.8**2 / 1.6 + 41.4 * 2.0
+    # 0.5 m further, and 1600/1.6, above that (41.8^2 - 1600)/1.6/(1 - 1.8/50), and (41.0 + 0.4) 2 s.
+    needed = 1000.0 + (41.8**2 - 1600.0) / 1.6 / (1.0 - 1.8 / 50.0) + 41.4 * 2.0
     assert decision.reading.margin_m == pytest.approx(5000.0 - 1040.5 - 10.0 - needed, abs=0.5)
 
 

@@ -99,6 +99,17 @@ def test_a_state_ahead_of_the_clock_does_not_stand_above_those_that_come_later()
     assert said[-1][1].level is Level.NORMAL
 
 
+def test_a_curve_ahead_of_the_clock_is_not_used_once_the_clock_gets_there() -> None:
+    curve = pair(5.0, 200.0)[0]
+    later = [one for number in range(1, 12) for one in at(number / 2, pair(number / 2, 20.0 * number)[1], Tick.ROS)]
+    _, said = run([*at(0.1, curve), *later], SUPERVISED)
+    assert {one.level for _, one in said} == {Level.EMERGENCY_BRAKE}
+    assert "braking curve: is stamped 4.9 s ahead of the clock" in said[-1][1].message
+    assert (
+        run(at(5.6, *pair(5.6, 224.0)), run([*at(0.1, curve), *later], SUPERVISED)[0])[1][-1][1].level is Level.NORMAL
+    )
+
+
 def stepped(known: Known, event: Event, ros_s: float, steady_s: float) -> tuple[Known, Decision | None]:
     now = Now(NOW_NS + round(ros_s * SECOND_NS), round(steady_s * SECOND_NS))
     return step(RULES, known, event, now)
