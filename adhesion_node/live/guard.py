@@ -3,10 +3,13 @@
 """Who may connect to the live page: bounded in number and in the time that a request takes, and by a name of ours."""
 
 import asyncio
+import errno
+import logging
 import socket
 from contextlib import suppress
 from ipaddress import ip_address
-from typing import cast
+from math import inf
+from typing import Any, cast
 
 from aiohttp import web
 
@@ -17,12 +20,17 @@ REQUEST_S = 5.0
 """Longest time from the connection to the whole request, and of a connection that asks for nothing more."""
 
 
+TELL_S = 60.0
+"""Time between two lines about missing file descriptors."""
+
+
 class Guard:
     """Makes the protocol of every connection to a server."""
 
     def __init__(self, server: web.Server) -> None:
         self._server = server
         self._silent: set[asyncio.BaseProtocol] = set()
+        self._told_s = -inf
 
     def __call__(self) -> asyncio.BaseProtocol:
         """Answer a new connection, which is closed if it does not ask for anything in time."""
@@ -36,6 +44,15 @@ class Guard:
     def asked(self, request: web.Request) -> None:
         """A whole request has come."""
         self._silent.discard(request.protocol)
+
+    def fault(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
+        """Tell what goes wrong in the loop; in a line where no connection can be taken, which is tried every second."""
+        error = context.get("exception")
+        if not isinstance(error, OSError) or error.errno not in (errno.EMFILE, errno.ENFILE):
+            loop.default_exception_handler(context)
+        elif loop.time() - self._told_s > TELL_S:
+            self._told_s = loop.time()
+            logging.getLogger(__name__).warning("no connection is taken: %s; see ulimit -n", error.strerror)
 
     def _close_idle(self, protocol: web.RequestHandler) -> None:
         if protocol in self._silent:

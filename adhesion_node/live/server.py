@@ -70,6 +70,7 @@ class Server:
         await runner.setup()
         assert runner.server is not None
         loop, self._guard = asyncio.get_running_loop(), Guard(runner.server)
+        loop.set_exception_handler(self._guard.fault)
         try:
             listening = await loop.create_server(self._guard, host, port)
         except OSError as error:

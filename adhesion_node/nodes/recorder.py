@@ -7,6 +7,8 @@ import math
 import sys
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +28,7 @@ from .offers import offered
 from .ros import runtime
 from .ros.diagnostics import Diagnostics, Finding, Told
 from .ros.params import SettingsNode, declare
-from .ros.qos import subscribe
+from .ros.qos import PROFILES, subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
@@ -51,10 +53,14 @@ MAX_DURATION_S = 1800.0
 
 LIMITS = Limits(span_ns=SPAN_NS, min_free_bytes=MIN_FREE_MB * MB)
 
+DEPTH = 2000
+"""Messages of a topic that wait while the recorder is not given the processor: 20 s of 100 Hz. DDS does not tell of
+those beyond, but of those that a publisher has given up meanwhile; it keeps 100 for a recorder that is stopped."""
+
 LATCHED_SUBSCRIPTION = QoSProfile(
-    depth=100, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
+    depth=DEPTH, reliability=ReliabilityPolicy.RELIABLE, durability=DurabilityPolicy.TRANSIENT_LOCAL
 )
-"""Also receives the curve published before the recorder came; deep, so that the next ones do not displace it."""
+"""Also receives the curve published before the recorder came."""
 
 
 class _Message(NamedTuple):
@@ -101,10 +107,13 @@ class Recorder(SettingsNode):
         self._oldest_unsaved = 0
         self._pending: list[_Message] = []
         self._given_up = 0
+        self._lost: Counter[topics.Topic] = Counter()
         if self._simulated:
             subscribe(self, topics.CLOCK, self._on_clock)
         for topic in topics.RECORDED:
-            subscribe(self, topic, self._receiver(topic), LATCHED_SUBSCRIPTION if topic.latched else None, raw=True)
+            profile = copy(LATCHED_SUBSCRIPTION if topic.latched else PROFILES[topic.quality].subscription)
+            profile.depth = DEPTH
+            subscribe(self, topic, self._receiver(topic), profile, raw=True, lost=partial(self._on_lost, topic))
         self._writer = BagWriter(output, limits)
         each_round = self._writer.check_disk if by_log_time else self.save
         self.create_timer(ROUND_S, each_round, clock=NodeClock(clock_type=ClockType.STEADY_TIME))
@@ -144,13 +153,24 @@ class Recorder(SettingsNode):
             found.append(Finding(Severity.WARN, NO_CLOCK))
         if self._given_up:
             found.append(Finding(Severity.WARN, f"{self._given_up} messages given up: they waited for /clock"))
+        if self._lost:
+            names = ", ".join(topic.name for topic in self._lost)
+            found.append(Finding(Severity.WARN, f"messages lost on the way, {self._lost.total()} at least: {names}"))
         numbers = {
             "written": sum(self.counts.values()),
             "bytes": self._writer.size,
             "waiting": len(self._pending),
             "dropped": self._given_up,
+            "lost": self._lost.total(),
         }
         return found, {"file": str(self._writer.file), **{name: str(number) for name, number in numbers.items()}}
+
+    def _on_lost(self, topic: topics.Topic, event: Any) -> None:
+        """Count what a publisher could not keep until the recorder took it (see `DEPTH`); a gap may count as one."""
+        self._lost[topic] = event.total_count
+        self.get_logger().warning(
+            f"{topic.name}: messages lost on the way, {event.total_count} at least; was this stopped?"
+        )
 
     def _receiver(self, topic: topics.Topic) -> Callable[..., None]:
         """Return the callback of a topic; with its second argument rclpy passes the time stamps of DDS."""

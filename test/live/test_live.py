@@ -300,6 +300,37 @@ def test_too_many_connections_are_closed_and_viewers_stay(live: Live, monkeypatc
         assert watcher.until(lambda parts: parts.get("place_m") == 1.0)
 
 
+SHORT_OF_FILES = """
+import os, resource, sys
+from adhesion_node.live.server import Server
+server = Server("127.0.0.1", 0, dict, 0.1)
+most = len(os.listdir("/proc/self/fd")) + 8
+resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
+print(server.url, flush=True)
+sys.stdin.readline()
+server.close()
+"""
+"""A page whose process may open a few files more."""
+
+
+def test_at_the_limit_of_open_files_a_line_is_told_and_the_page_is_served_again_when_there_are_some() -> None:
+    with start(SHORT_OF_FILES, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        url = process.stdout.readline().strip()
+        address = ("127.0.0.1", int(url.rsplit(":", 1)[1].strip("/")))
+        with ExitStack() as stack:
+            for _ in range(40):
+                stack.enter_context(socket.create_connection(address, TIMEOUT_S))
+            waits = stack.enter_context(socket.create_connection(address, TIMEOUT_S))
+            waits.settimeout(2.5)  # the loop tries again every second
+            with suppress(TimeoutError):
+                assert waits.recv(1) == b"", "a silent connection is answered"
+        assert status_of(url) == 200
+        _, err = process.communicate("\n", TIMEOUT_S)
+    assert process.returncode == 0
+    assert err == "no connection is taken: Too many open files; see ulimit -n\n"
+
+
 def test_a_second_viewer_costs_no_second_comparison() -> None:
     looks: list[int] = []
 

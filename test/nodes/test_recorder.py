@@ -9,7 +9,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -18,6 +18,7 @@ import pytest
 from conftest import SpinUntil
 from messages import message_class
 from rclpy.context import Context
+from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -28,14 +29,16 @@ from rosgraph_msgs.msg import Clock
 from adhesion_node.bag import BagReader
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
-from adhesion_node.nodes.ros.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise
+from adhesion_node.nodes.ros.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise, subscribe
 from adhesion_node.wire.topics import (
     BRAKING_CURVE,
     BRAKING_CURVE_NOMINAL,
     CLOCK,
+    DIAGNOSTICS,
     POSITION,
     RECORDED,
     SENSORS,
+    STATE,
     TRUTH,
     TRUTH_MU,
     Topic,
@@ -232,13 +235,14 @@ def talking(context: Context, executor: SingleThreadedExecutor) -> tuple[Publish
 
 
 @contextmanager
-def recording_process(path: Path, *arguments: str) -> Iterator[subprocess.Popen[str]]:
+def recording_process(
+    path: Path, *arguments: str, silent: Sequence[str] = ("-p", "diagnostics_period_s:=3600.0")
+) -> Iterator[subprocess.Popen[str]]:
     """Run the program; it does not outlive a test that fails."""
     private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
     environment = {name: value for name, value in os.environ.items() if name not in private}
     code = "import sys; from adhesion_node.nodes.recorder import main; sys.exit(main())"
-    silent = ("--ros-args", "-p", "diagnostics_period_s:=3600.0")
-    command = [sys.executable, "-c", code, "--output", str(path), *arguments, *silent]
+    command = [sys.executable, "-c", code, "--output", str(path), *arguments, "--ros-args", *silent]
     with subprocess.Popen(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
     ) as process:
@@ -277,3 +281,43 @@ def test_a_signal_ends_the_recording_properly(
     with BagReader(tmp_path / "bag") as reader, Reader(tmp_path / "bag") as other:
         assert reader.complete
         assert other.message_count == reader.counts["/position"] > 0
+
+
+def test_a_recorder_that_was_not_given_the_processor_still_has_what_came_meanwhile(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    recording, ends = start(tmp_path / "bag", context, executor, spin_until, [STATE, POSITION], False)
+    for number in range(1, 801):
+        for topic in (STATE, POSITION):
+            ends[topic].publish(stamped(topic, number * S))
+            assert ends[topic].wait_for_all_acked(Duration(seconds=10))
+    spin_until(executor, lambda: len(recording.counts) == 2 and min(recording.counts.values()) == 800)
+    recording.close()
+
+
+def test_what_a_stopped_recorder_has_lost_is_told(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """Of 5000 messages its publisher keeps the last 100; some more are on their way."""
+    talker, told = Node("talker", context=context), []
+    end = advertise(talker, STATE)
+    subscribe(talker, DIAGNOSTICS, lambda message: told.append(message.status[0]))
+    executor.add_node(talker)
+    with recording_process(tmp_path / "bag", silent=("-p", "diagnostics_period_s:=0.1")) as process:
+        spin_until(executor, lambda: end.get_subscription_count() > 0 and bool(told), 20.0)
+        end.publish(stamped(STATE, S))
+        spin_until(executor, lambda: has_messages(tmp_path / "bag"))
+        process.send_signal(signal.SIGSTOP)
+        for number in range(5000):
+            end.publish(stamped(STATE, (number + 2) * S))
+        process.send_signal(signal.SIGCONT)
+        spin_until(executor, lambda: "lost on the way" in told[-1].message)
+        process.send_signal(signal.SIGINT)
+        spin_until(executor, lambda: process.poll() is not None)
+        _, err = process.communicate()
+    with BagReader(tmp_path / "bag") as reader:
+        kept = reader.counts["/adhesion/state"]
+    lost = next(int(pair.value) for pair in told[-1].values if pair.key == "lost")
+    assert 100 <= kept < 5001
+    assert 1 <= lost <= 5001 - kept
+    assert "adhesion/state: messages lost on the way" in err

@@ -4,10 +4,11 @@
 
 from collections.abc import Callable
 from copy import copy
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.duration import Duration
+from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -80,11 +81,12 @@ def subscribe(
     *,
     raw: bool = False,
     tell: Tell | None = None,
+    lost: Callable[[Any], None] | None = None,
 ) -> Subscription:
     """Subscribe `node` to `topic`, parameters overriding its profile; ValueError when an override is bad.
 
     `profile` takes the place of the one that the table gives the topic. `tell` hears of the events of DDS; without it
-    rclpy logs what does not fit.
+    rclpy logs what does not fit, and `lost` hears of messages that were lost on the way.
     """
     try:
         return node.create_subscription(
@@ -95,7 +97,9 @@ def subscribe(
             copy(profile or PROFILES[topic.quality].subscription),
             qos_overriding_options=OVERRIDES,
             raw=raw,
-            event_callbacks=tell and of_subscription(node.resolve_topic_name(topic.name), tell),
+            event_callbacks=of_subscription(node.resolve_topic_name(topic.name), tell)
+            if tell
+            else SubscriptionEventCallbacks(message_lost=lost),
         )
     except _BAD_OVERRIDE as error:
         raise ValueError(_refusal(node, topic, "subscription")) from error

@@ -27,6 +27,9 @@ ROUNDING_M = 0.01
 FREE_S, FAR_M = 0.3, 1e5
 """So long, s, the target is still far ahead, m: a monitor begins with the emergency brake, and has to let go."""
 
+LEAST_MPS = 0.5
+"""Speed above the one allowed at the target, of the slowest trains."""
+
 Rng = np.random.Generator
 
 WORST = (-1.0, -1.0)
@@ -103,8 +106,9 @@ class Case:
 
     def placed(self, train: Train) -> Case:
         """The case of another train, which needs all the way that it has left at the onset, too."""
-        speed_mps, allowed_mps = np.asarray(train.speed(self.onset_s)), allowed(self.config.target_speed_mps)
-        place_m = float(train.place(self.onset_s) + train.brake.needed(speed_mps, allowed_mps))
+        allowed_mps = allowed(self.config.target_speed_mps)
+        speed_mps = max(train.speed(self.onset_s), allowed_mps + LEAST_MPS)  # of one that slows down by itself
+        place_m = float(train.place(self.onset_s) + train.brake.needed(np.asarray(speed_mps), allowed_mps))
         return replace(self, train=train, targets=(Target(0.0, place_m + FAR_M), Target(FREE_S, place_m)))
 
     def changed(self, from_s: float, by_m: float = 0.0, brake: Brake | None = None, **changes: float) -> Case:
@@ -148,7 +152,7 @@ def draw(rng: Rng) -> Case:
         valid_for_s=rng.uniform(0.5, 3.0),
         max_ahead_s=rng.choice([0.0, 0.1, 0.3]),
     )
-    least = allowed(config.target_speed_mps) + 0.5
+    least = allowed(config.target_speed_mps) + LEAST_MPS
     speed_mps = rng.uniform(max(least, 12.0), 97.0) if often(rng) else rng.uniform(least, least + 12.0)
     standing_mps2, fading_mps = rng.uniform(0.2, 1.6), rng.choice([20.0, 60.0, 1e9, -300.0])
     knee_mps = speed_mps * rng.choice([rng.uniform(0.0, 1.0), rng.uniform(0.94, 1.02)])

@@ -24,7 +24,8 @@ UNITS = (
 """Factors on the columns of a curve: places, speeds, decelerations. Some of them are consistent."""
 
 MISLED_S, MISLED_LEAST_MPS = 4.0, 20.0
-"""Within which a misled monitor must see it, with fresh states of a train that runs at least so fast."""
+"""Within which a misled monitor must see it, with fresh states of a train that runs at least so fast. A curve all in
+feet is consistent: only where the train is so fast it begins elsewhere, however unsure the state is."""
 MISLED_NOISE = Noise(2.0, 0.3, None)
 
 UNSURE = Noise(5.0, 5.0, None)
@@ -97,6 +98,8 @@ def restart(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
 def units(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
     """From a time on, or ever, the curves are in other units."""
     from_s = rng.choice([0.0, rng.uniform(0.0, case.end_s)])
+    if case.train.speed_mps < MISLED_LEAST_MPS:
+        return case, messages
     factors = UNITS[rng.integers(len(UNITS))]
     return case, [
         one._replace(event=in_units(one.event, *factors))
@@ -135,7 +138,7 @@ def all_clocks(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
 
 
 def target(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
-    """A nearer target, a slower one, one that is moved on and back; or one that is not understood, and the same again."""
+    """A nearer target, a slower one, one that is moved on and back; or one that is not understood."""
     from_s, by_m = rng.uniform(FREE_S, case.onset_s + 0.5), 10.0 ** rng.uniform(0.0, 3.0)
     kind = rng.integers(4)
     if kind == 0:
@@ -163,7 +166,7 @@ def settings(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
 
 
 def reboot(rng: Rng, case: Case, messages: list[Message]) -> Faulty:
-    """The monitor is killed and begins anew, with the last curve at once; who listens takes its silence for the brake."""
+    """The monitor is killed and begins anew, with the last curve at once; its silence counts as the emergency brake."""
     del messages
     from_s = rng.uniform(FREE_S, 1.0)
     until_s = from_s + rng.uniform(0.35, 3.0)
