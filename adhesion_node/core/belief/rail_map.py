@@ -15,9 +15,11 @@ from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from ..physics.adhesion import AdhesionLaw
+from ..physics.train import GRAVITY, Array
 from .rail import Rail
 
 DAY_NS = 86_400_000_000_000
@@ -31,8 +33,9 @@ FORGOTTEN = 0.05
 SHOWN = 0.5
 """Where the brake limited, and showed less than this part of what it showed elsewhere, it was only half applied."""
 
-LEAST_M, BRAKES_MPS2 = 200.0, 1.0
-"""The way that is looked ahead: that of this deceleration to a standstill, and at least so long."""
+LEAST_M, BRAKES_MPS2, FAR = 200.0, 1.0, 4.0
+"""The way that tells of the rail: that of this deceleration to a standstill, and at least so long. So many times as far
+it counts whether a stretch was seen."""
 
 MISSED, LEAST_MU, LEAST_STD, BISECTIONS = 0.05, 1e-3, 1e-3, 40
 """What a bound misses; numbers that keep logarithms finite; steps to the bound."""
@@ -101,32 +104,91 @@ class RailMap:
     def informed(self, rail: Rail, way: Way, law: AdhesionLaw, trust: Trust) -> Rail:
         """What is known of a rail, and by the map, at the beginning of a braking.
 
-        `law` is how adhesion falls with speed: a rail seen by a slow train gives less to a fast one.
+        `law` is how adhesion falls with speed: a rail seen by a slow train gives less to a fast one. A stretch that few
+        brakings showed gives no more than without a map, and nowhere on its way may the train be foreseen slower than
+        by what every stretch so far gives.
         """
         reach_m = max(way.speed_mps**2 / (2.0 * BRAKES_MPS2), LEAST_M)
-        ends = sorted((way.position_m, way.position_m + math.copysign(reach_m, way.speed_mps)))
-        known = list(self._known(ends[0], ends[1], way.t_ns, trust.days))
+        known = list(self._known(way, reach_m, trust.days))
         if not known:
             return rail
-        places = {piece.place_m: piece.length_m for piece, _ in known}
-        covered = min(sum(places.values()) / reach_m, 1.0)
-        brakings = covered * sum(piece.seen for piece, _ in known) / len(places)
-        worth = float(np.mean([worth for _, worth in known]))
-        seen = _joined(known, law, way.speed_mps)
-        told = _either(seen, rail, trust.probability * worth * brakings / (brakings + THIN))
-        if brakings >= THIN:
-            return told
-        return Rail(min(told.mu, rail.mu), max(told.std, rail.std), min(told.lower, rail.lower))
+        stretches = _stretches([piece for piece, _ in self._known(way, FAR * reach_m, trust.days)], way, FAR * reach_m)
+        near = np.clip(reach_m - stretches.starts_m, 0.0, stretches.lengths_m)
+        worth, seen = float(np.mean([worth for _, worth in known])), _joined(known, law, way.speed_mps)
+        thin = float(near @ stretches.brakings) < THIN * reach_m
 
-    def _known(self, from_m: float, to_m: float, now_ns: int, days: float) -> Iterator[tuple[Piece, float]]:
-        """The pieces between two places that were seen before now, with what they are worth by their age."""
+        def told(count: int) -> Rail:
+            one = _either(seen, rail, trust.probability * worth * count / (count + THIN))
+            if count >= THIN and not thin:
+                return one
+            return Rail(min(one.mu, rail.mu), max(one.std, rail.std), min(one.lower, rail.lower))
+
+        by_count = {count: told(count) for count in set(stretches.brakings.tolist())}
+        of_way = np.array([by_count[count] for count in stretches.brakings.tolist()])
+        stops, lower = way.speed_mps**2 / (2.0 * GRAVITY), np.minimum(of_way[:, 2], stretches.lowest)
+        mu = _foreseen(stretches.lengths_m, of_way[:, 0], rail.mu, stops)
+        std = float(of_way[near > 0.0, 1].max())
+        return Rail(mu, std, min(_foreseen(stretches.lengths_m, lower, rail.lower, stops), mu))
+
+    def _known(self, way: Way, reach_m: float, days: float) -> Iterator[tuple[Piece, float]]:
+        """The pieces ahead that were seen before now, with what they are worth by their age."""
+        from_m, to_m = _ends(way, reach_m)
         longest = max((piece.length_m for piece in self.pieces), default=0.0)
         for piece in self.pieces[bisect_left(self.pieces, from_m - longest, key=attrgetter("place_m")) :]:
             if piece.place_m >= to_m:
                 return
-            worth = math.exp(-(now_ns - piece.t_ns) / DAY_NS / days) if piece.t_ns <= now_ns else 0.0
+            worth = math.exp(-(way.t_ns - piece.t_ns) / DAY_NS / days) if piece.t_ns <= way.t_ns else 0.0
             if worth >= FORGOTTEN and piece.place_m + piece.length_m > from_m:
                 yield piece, worth
+
+
+class Stretches(NamedTuple):
+    """A way in parts, in its order, on each of which the same pieces tell; arrays of (n,)."""
+
+    starts_m: Array
+    """From the train."""
+    lengths_m: Array
+    brakings: NDArray[np.int64]
+    """How many showed it."""
+    lowest: Array
+    """The least bound where adhesion limited, else infinite."""
+
+
+def _ends(way: Way, reach_m: float) -> tuple[float, float]:
+    """Between which places a way lies, the lower one first."""
+    there = way.position_m + math.copysign(reach_m, way.speed_mps)
+    return min(way.position_m, there), max(way.position_m, there)
+
+
+def _stretches(pieces: Sequence[Piece], way: Way, reach_m: float) -> Stretches:
+    ends = _ends(way, reach_m)
+    lower, upper = (np.array([piece.place_m + part * piece.length_m for piece in pieces]) for part in (0.0, 1.0))
+    edges = np.unique(np.clip(np.concatenate([lower, upper, ends]), *ends))
+    middles = 0.5 * (edges[:-1] + edges[1:])[:: -1 if way.speed_mps < 0.0 else 1]
+    lengths = np.diff(edges)[:: -1 if way.speed_mps < 0.0 else 1]
+    shown = (lower <= middles[:, np.newaxis]) & (middles[:, np.newaxis] < upper)
+    bounds = np.array([piece.lower if piece.limited else np.inf for piece in pieces])
+    lowest = np.where(shown, bounds, np.inf).min(axis=1)
+    return Stretches(np.cumsum(lengths) - lengths, lengths, shown @ np.array([piece.seen for piece in pieces]), lowest)
+
+
+def _foreseen(lengths_m: Array, adhesions: Array, beyond: float, stops: float) -> float:
+    """The one adhesion by which a train is at no place slower than by those of the stretches, and of what comes behind.
+
+    `stops` is the sum of adhesion times way, m, that brings it to a standstill.
+
+    >>> way = np.array([100.0, 100.0, 200.0])
+    >>> [_foreseen(way, np.array(of_it), 0.02, 12.0) for of_it in ([0.06] * 3, [0.06, 0.02, 0.06], [0.02, 0.06, 0.06])]
+    [0.06, 0.04, 0.02]
+    >>> round(_foreseen(way, np.array([0.06] * 3), 0.02, 30.0), 4)
+    0.0429
+    """
+    way, lost = np.cumsum(lengths_m), np.cumsum(lengths_m * adhesions)
+    behind = int(np.searchsorted(lost, stops))  # the stretch on which it stands, or what comes behind all of them
+    last = max(float(adhesions[behind]) if behind < way.size else beyond, LEAST_MU)
+    before = (float(way[behind - 1]), float(lost[behind - 1])) if behind else (0.0, 0.0)
+    means = [*(lost / way)[:behind].tolist(), stops / max(before[0] + (stops - before[1]) / last, LEAST_MU)]
+    return float(np.clip(min(means), min(beyond, adhesions.min()), adhesions[0]))
 
 
 def _joined(known: Sequence[tuple[Piece, float]], law: AdhesionLaw, speed_mps: float) -> Rail:

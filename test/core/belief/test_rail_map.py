@@ -69,10 +69,51 @@ def test_a_map_of_a_small_part_of_the_way_ahead_is_thin() -> None:
     assert NOTHING.lower < told(RailMap(seen(0.10).pieces[10:14])).lower < told(seen(0.10)).lower
 
 
+def without(rail_map: RailMap, from_m: float, to_m: float) -> RailMap:
+    """The map without what it knows between two places."""
+    return RailMap(tuple(piece for piece in rail_map.pieces if not from_m <= piece.place_m < to_m))
+
+
+@pytest.mark.parametrize("length_m", [100.0, 200.0, 400.0])
+@pytest.mark.parametrize("speed", [40.0, -40.0])
+def test_a_gap_just_where_the_train_brakes_makes_it_no_less_careful(length_m: float, speed: float) -> None:
+    """All around it much was seen: of the gap itself nothing is known."""
+    gap = (5000.0, 5000.0 + length_m) if speed > 0 else (5000.0 - length_m, 5000.0)
+    found = told(without(seen(0.10), *gap), HERE._replace(speed_mps=speed))
+    assert found.lower <= NOTHING.lower
+    assert found.mu <= NOTHING.mu
+    thin = [p._replace(seen=2) if gap[0] <= p.place_m < gap[1] else p for p in seen(0.10).pieces]
+    assert told(RailMap(tuple(thin)), HERE._replace(speed_mps=speed)).lower <= NOTHING.lower
+
+
+def test_a_gap_within_the_way_counts_by_its_length() -> None:
+    whole = told(seen(0.10)).lower
+    bounds = [told(without(seen(0.10), 5300.0, 5300.0 + gap_m)).lower for gap_m in (100.0, 200.0, 400.0)]
+    assert NOTHING.lower < bounds[2] < bounds[1] < bounds[0] < whole
+    assert bounds[0] == pytest.approx((300.0 * whole + 100.0 * NOTHING.lower) / 400.0, rel=0.01)
+
+
+@given(known=some.lists(some.sampled_from([0, 1, 2, 3, 5, 50]), min_size=1, max_size=40), at_m=some.floats(0.0, 99.0))
+def test_nowhere_is_a_train_slower_than_by_what_is_known_of_every_piece(known: list[int], at_m: float) -> None:
+    """By v^2: as if each piece gave what its own brakings allow, and one that no train showed what is known without."""
+    at, t_ns = HERE.position_m + at_m, HERE.t_ns - DAY_NS // 24
+    places = [(HERE.position_m + 100.0 * k, count) for k, count in enumerate(known)]
+    rail_map = RailMap(tuple(Piece(place, 100.0, t_ns, n, 0.10, 0.005, 0.09, 40.0) for place, n in places if n))
+    found = told(rail_map, HERE._replace(position_m=at)).lower
+    highest = {n: told(seen(0.10, count=n)).lower if n >= 3 else NOTHING.lower for n in {*known, 50}}
+    lost, reached = 0.0, 0.0
+    for place, count in places:
+        way = 100.0 - (at_m if place == HERE.position_m else 0.0)
+        reached += way
+        lost += way * min(highest[count], highest[50])
+        if 2.0 * 9.81 * lost < HERE.speed_mps**2:
+            assert found * reached <= lost + 1e-6
+
+
 def test_elsewhere_nothing_is_known_and_the_way_is_looked_along() -> None:
     assert told(seen(0.10), HERE._replace(position_m=9000.0)) == NOTHING
     assert told(seen(0.10), HERE._replace(position_m=3500.0, speed_mps=-40.0)) == NOTHING
-    assert told(seen(0.10), HERE._replace(position_m=8500.0, speed_mps=-40.0)).lower > NOTHING.lower
+    assert told(seen(0.10), HERE._replace(position_m=8000.0, speed_mps=-40.0)).lower > NOTHING.lower
     assert told(seen(0.10).turned(), HERE._replace(position_m=-5000.0)) == told(
         seen(0.10), HERE._replace(speed_mps=-40.0)
     )
