@@ -27,6 +27,7 @@ from ..command.options import (
 )
 from ..core.physics.train import KMH
 from ..run.offline import parameters_of
+from ..run.pipeline import off_track
 from ..run.results import rows_to
 from ..wire.settings import Setup, setup_of
 from .curves import Subject
@@ -100,6 +101,8 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         else:
             run, lost = estimate_run(reader, select_from(reader, options.remap), setup, write, targets)
             source = "estimated from the recorded sensors"
+            if (off := off_track(setup.config.track, run.position.values.min(), run.position.values.max())) is not None:
+                print(f"report: {name}: {off}", file=sys.stderr)
         for topic, count in lost.items():
             print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)
         return Subject(name, source, run, setup.config, setup.train)

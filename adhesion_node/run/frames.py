@@ -34,6 +34,20 @@ MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "bra
 
 _AXLE = re.compile(r"wheel_speed_[1-9]\d*")
 
+NO_NUMBERS = (
+    pd.api.types.is_bool_dtype,
+    pd.api.types.is_complex_dtype,
+    pd.api.types.is_datetime64_any_dtype,
+    pd.api.types.is_timedelta64_dtype,
+)
+"""Kinds of columns that pandas takes for numbers, too."""
+
+MAX_SECONDS = 2.0**31
+"""Later than 2038 is no time in seconds; a message has room for no more."""
+
+FAR_S = 10.0
+"""Between two rows of a recorder."""
+
 MOSTLY_USED = 0.9
 """Share of the measurements below which it is worth a warning that so few were used."""
 
@@ -56,6 +70,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if not (isinstance(std_m, int | float) and 0.0 < std_m < math.inf):
         raise ValueError(f"std_m = {std_m!r}: give the positions' standard deviation, above 0 m")
     columns, t_ns = _checked(frame), _nanoseconds(frame["time"])
+    far = _too_far(t_ns)
     pipeline, rows, seen = Pipeline(config, seed), list[Row](), Seen()
     for made in _predictions(pipeline, _samples(t_ns, columns, std_m)):
         e = made.estimate
@@ -65,13 +80,20 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if not rows:
         raise ValueError(
             f"frame: nothing to estimate from in {len(frame)} rows; dropped: {pipeline.dropped or 'nothing'}"
+            + (f"; {far}" if far else "")
         )
     if pipeline.accepted < MOSTLY_USED * pipeline.measurements:
         text = f"{pipeline.accepted} of {pipeline.measurements} positions were used, dropped: {pipeline.dropped}"
         warnings.warn(f"{text}: are units, signs and standard deviations right?", stacklevel=2)
+    elif max(pipeline.dropped.values(), default=0) > (1.0 - MOSTLY_USED) * len(frame):
+        text = f"dropped of {len(frame)} rows: {pipeline.dropped}"
+        warnings.warn(f"{text}: are units, signs and standard deviations right?", stacklevel=2)
     if pipeline.back_m > BACK_M:
         text = "positions fall while the train runs: change their sign, and turn the track"
         warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
+    for odd in (far, pipeline.off_track, seen.too_fast):
+        if odd is not None:
+            warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
     result.insert(0, "time", _like(result["t_ns"].to_numpy(), frame["time"]))
     result.attrs.update(used, why=seen.why_not())
@@ -98,13 +120,31 @@ def _checked(frame: pd.DataFrame) -> dict[str, Array]:
             )
     if "time" not in frame or not {"position", "speed"} & set(frame.columns):
         raise ValueError(f"frame has the columns {list(frame.columns)}: give 'time' and 'position' or 'speed'")
+    for name in frame.columns[frame.columns.duplicated()]:
+        raise ValueError(f"frame column {name!r}: is there twice: drop one")
     columns = {}
     for name in frame.columns.drop("time"):
+        if any(is_kind(frame[name]) for is_kind in NO_NUMBERS):
+            raise ValueError(
+                f"frame column {name!r} is of {frame[name].dtype}: give numbers, NaN where nothing was measured"
+            )
         try:
             columns[str(name)] = pd.to_numeric(frame[name]).to_numpy(np.float64, na_value=math.nan)
         except (ValueError, TypeError) as error:
             raise ValueError(f"frame column {name!r}: {error}: give numbers, NaN where nothing was measured") from error
+    for name in {"variance", "speed_std"} & columns.keys():
+        if (wrong := columns[name] <= 0.0).any():
+            row = int(np.argmax(wrong))
+            raise ValueError(
+                f"frame column {name!r}, row {row}: {columns[name][row]:g}: give it above 0, NaN where it is unknown"
+            )
     return columns
+
+
+def _too_far(t_ns: NDArray[np.int64]) -> str | None:
+    """Say that no recorder has rows so far apart."""
+    step_s = float(np.median(np.diff(t_ns))) * 1e-9 if t_ns.size > 2 else 0.0
+    return f"a row every {step_s:.3g} s: are the times in ms? give seconds" if step_s > FAR_S else None
 
 
 def _nanoseconds(time: "pd.Series[Any]") -> NDArray[np.int64]:
@@ -115,6 +155,11 @@ def _nanoseconds(time: "pd.Series[Any]") -> NDArray[np.int64]:
     elif pd.api.types.is_numeric_dtype(time):
         seconds = time.to_numpy(np.float64, na_value=math.nan)
         missing = ~np.isfinite(seconds)
+        beyond = np.abs(np.where(missing, 0.0, seconds)) > MAX_SECONDS
+        if beyond.any():
+            row = int(np.argmax(beyond))
+            where = f"frame column 'time', row {row}: {seconds[row]:.3g} s"
+            raise ValueError(f"{where}: is it in ms, us or ns? give seconds, or datetimes by pandas.to_datetime")
         stamps = np.rint(np.where(missing, 0.0, seconds) * 1e9).astype(np.int64)
     else:
         raise ValueError(f"frame column 'time' is of {time.dtype}: give seconds, or datetimes by pandas.to_datetime")

@@ -69,7 +69,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
 
 
 def _remarks(pipeline: Pipeline, why: str | None) -> Iterator[str]:
-    """What a person must hear: that nothing is identified, that much was dropped, that the train runs back."""
+    """What a person must hear: that nothing is identified, much was dropped, the train runs back, or elsewhere."""
     for reason, count in pipeline.dropped.items():
         if count > MANY * pipeline.measurements:
             known = [kind[reason].value for kind in (Outcome, Reason) if reason in kind.__members__]
@@ -78,6 +78,8 @@ def _remarks(pipeline: Pipeline, why: str | None) -> Iterator[str]:
         yield f"nothing is identified: {why}"
     elif pipeline.back_m > BACK_M:
         yield BACKWARDS
+    if pipeline.off_track is not None:
+        yield pipeline.off_track
 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -2,12 +2,14 @@
 
 """The way of a sample to an estimate of the adhesion with its braking curves, the same live and offline."""
 
+import math
 import struct
 from functools import partial
 from typing import final
 
 from ..core import Config, Estimate, Outcome, Prediction, State, estimator, predict
 from ..core.physics.braking import BrakingCurve
+from ..core.physics.track import Track
 from ..wire.topics import POSITIONS
 from .engine import EstimatorPipeline, Verbs
 
@@ -18,6 +20,14 @@ BACKWARDS = (
     "positions fall while the train runs: set direction to what the chainage does along the run, up where it rises, "
     "down where it falls; or change their sign"
 )
+
+
+def off_track(track: Track, least_m: float, most_m: float) -> str | None:
+    """Say that no section of the track is where the train ran, as the run counts positions; None where one is."""
+    off_m = track.off(least_m, most_m)
+    where = f"the nearest is {abs(off_m):.0f} m {'ahead of' if off_m > 0.0 else 'behind'} it"
+    remedy = "is the track's chainage, direction or unit another? All that the train ran on counts as level"
+    return f"no section of the track is where the train ran: {where}: {remedy}" if off_m else None
 
 
 @final
@@ -39,6 +49,7 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         """Where it began to run back."""
         self.back_m = 0.0
         """How far it has run back at most, without a break, faster than `BACK_MPS`."""
+        self._ran_m = (math.inf, -math.inf)
 
     def _output(self, estimate: Estimate) -> Prediction:
         self.windows += estimate.window > 0
@@ -56,6 +67,12 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         elif self._back_from_m is None or estimate.position_m > self._back_from_m:
             self._back_from_m = estimate.position_m
         self.back_m = max(self.back_m, self._back_m(estimate))
+        self._ran_m = min(self._ran_m[0], estimate.position_m), max(self._ran_m[1], estimate.position_m)
+
+    @property
+    def off_track(self) -> str | None:
+        """Why the track cannot be that of this run; None where it can."""
+        return None if self.last is None else off_track(self.config.track, *self._ran_m)
 
     def _back_m(self, estimate: Estimate) -> float:
         return 0.0 if self._back_from_m is None else self._back_from_m - estimate.position_m

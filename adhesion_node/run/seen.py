@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Iterator
 
 from ..core import Config, Regime
+from ..core.physics.train import KMH
 from .pipeline import BACKWARDS, Pipeline
 
 BRAKES_MPS2, SPAN_S = 0.3, 3.0
@@ -17,6 +18,9 @@ BRAKED_PA = 20e3
 
 PIPE_PA, RUNS_MPS2, RUNS_MPS = 2.5e5, 0.05, 5.0
 """A train with such a pressure in its cylinders does not run on, slowing down by less than this, at such a speed."""
+
+FASTEST_MPS = 105.0
+"""No train on rails is faster in service: 380 km/h."""
 
 MANY = 0.2
 """A part of all that is more than a fault now and then."""
@@ -90,7 +94,14 @@ class Seen:
     def identified(self) -> bool:
         """Whether the adhesion limited, or may have for more than the first moments of a braking."""
         is_open = self._limited > 0 or self._told > MANY * self._at_brake
-        return is_open and not (self._runs_back or self._runs_on)
+        return is_open and not (self._runs_back or self._runs_on or self._fastest_mps > FASTEST_MPS)
+
+    @property
+    def too_fast(self) -> str | None:
+        """That no train is so fast; None of one that may be."""
+        fast = f"{self._fastest_mps:.0f} m/s, {self._fastest_mps / KMH:.0f} km/h"
+        remedy = "is its speed in km/h, are its positions or times in another unit?"
+        return f"the train runs {fast}: {remedy}" if self._fastest_mps > FASTEST_MPS else None
 
     @property
     def _runs_back(self) -> bool:
@@ -108,9 +119,11 @@ class Seen:
     def _reasons(self) -> Iterator[str]:
         """What may be the reason, the one that explains most first."""
         if not self._estimates:
-            yield "no estimate came of it; see what was dropped, and why"
+            yield "no estimate came of it: was too little recorded? See what was dropped, and why"
         if self._runs_back:
             yield BACKWARDS
+        if self.too_fast is not None:
+            yield self.too_fast
         if self.most_pa is None:
             yield "no brake pressure and no demand came: without them mu cannot be told"
         elif self.most_pa < BRAKED_PA:

@@ -119,6 +119,17 @@ def slipped(**changes: Any) -> pd.DataFrame:
         (measured().iloc[::-1], r"column 'time', row 1: 32\.8 falls: frame.sort_values\('time'\) mends it"),
         (measured().replace({"time": {15.3: np.nan}}), "column 'time', row 3: no time: drop the row"),
         (slipped(position=1e9), "nothing to estimate from in 180 rows; dropped: {'INVALID': 180}"),
+        (slipped(time=1e3 * measured()["time"]), "dropped: nothing; a row every 100 s: are the times in ms\\? give s"),
+        (slipped(position=True), "column 'position' is of bool: give numbers, NaN where nothing was measured"),
+        (slipped(position=1j), "column 'position' is of complex128: give numbers"),
+        (slipped(speed=pd.Timestamp("2024")), "column 'speed' is of datetime64.*: give numbers"),
+        (pd.concat([measured(), measured()[["position"]]], axis=1), "column 'position': is there twice: drop one"),
+        (slipped(speed_std=-0.1), "column 'speed_std', row 0: -0.1: give it above 0, NaN where it is unknown"),
+        (slipped(variance=0.0), "column 'variance', row 0: 0: give it above 0, NaN where it is unknown"),
+        (
+            slipped(time=1.7e18 + measured()["time"] * 1e9),
+            r"column 'time', row 0: 1.7e\+18 s: is it in ms, us or ns\? give seconds, or datetimes",
+        ),
     ],
 )
 def test_a_frame_that_cannot_be_right_is_refused_with_the_remedy(frame: Any, message: str) -> None:
@@ -140,6 +151,7 @@ def test_a_frame_that_cannot_be_right_is_refused_with_the_remedy(frame: Any, mes
             r"track section \('grade', 0, 1, 2\): give a Grade, a Curve or a Tunnel",
         ),
         (lambda: Track((), -200.0), r"track train_length_m = -200\.0: give a length above 0 m"),
+        (lambda: Track(slip(Grade(0.0, 1e6, 10.0))), r"track sections = Grade\(.*\): give a tuple of them"),
         (lambda: Track((Grade(0.0, 1e6, 5e6),)), "rises by 500 %, and trains climb 15 % at most"),
         (lambda: Track((Tunnel(0.0, 1e3), Curve(0.0, 1e3, 2.0, 1.0))), "radius_m of at least 10 m"),
     ],
@@ -159,6 +171,27 @@ def test_drops_that_matter_are_warned_of() -> None:
     frame = slipped(position=measured()["position"].where(measured().index % 2 == 0, 5e7))
     with pytest.warns(UserWarning, match="90 of 180 positions were used, dropped: {'INVALID': 90}: are units"):
         estimate(frame)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"speed": lambda f: 3.6 * 80.0}, r"dropped of 180 rows: {'INVALID': 180}: are units, signs and standard"),
+        (
+            {"position": lambda f: np.nan, "speed": lambda f: 140.0 - f["time"]},
+            "1.* m/s, 4.* km/h: is its speed in km/h",
+        ),
+    ],
+)
+def test_units_that_cannot_be_are_warned_of(changes: dict[str, Any], message: str) -> None:
+    with pytest.warns(UserWarning, match=message):
+        estimate(measured().assign(**changes))
+
+
+def test_a_track_elsewhere_is_warned_of() -> None:
+    elsewhere = Config(track=Track((Grade(1e5, 1.2e5, 10.0),)))
+    with pytest.warns(UserWarning, match="no section of the track is where the train ran: the nearest is 9.* m ahead"):
+        estimate(measured(), elsewhere)
 
 
 def test_every_public_name_is_there_and_documented() -> None:

@@ -71,6 +71,12 @@ def test_however_it_is_written_a_log_is_read_and_how_is_said(
     assert all(option in line for option in ("--encoding", "--delimiter", "--decimal", "--skip-rows", "--time-format"))
 
 
+def test_the_header_is_found_below_a_preamble_of_empty_cells_whatever_its_names(importing: Import) -> None:
+    rows = ride().rename(columns={"time": "Laufzeit", "position": "Weg"})
+    assert importing(text(rows, ";", head="Recorder X;;;;;;\nTrain 4711;;;;;;\n")) == 2
+    assert "it has ['Laufzeit', 'Weg', 'speed', 'brake_pressure']" in importing.errors[0]
+
+
 @pytest.mark.parametrize(
     ("written", "options", "first_ns"),
     [

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from test_import_csv import Import, importing
-from test_import_log import ride, text
+from test_import_log import read_as, ride, text
 
 __all__ = ["importing"]
 
@@ -65,6 +65,24 @@ ODD: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], str, list[str]]] = 
         ["--lat", "position", "--lon", "lon"],
     ),
     (
+        "pipe in bar",
+        lambda r: r.rename(columns={"brake_pressure": "brake_pipe"}).assign(brake_pipe=5.0 - r.brake_pressure / 2e5),
+        "brake_pipe is 5 Pa at most",
+        ["--pressure-unit", "bar"],
+    ),
+    (
+        "an hour in spring",
+        lambda r: r.assign(
+            time=pd.Series(
+                pd.to_datetime("2024-03-31 01:59:30")
+                + pd.to_timedelta(r.time, unit="s")
+                + pd.to_timedelta(3600 * (r.time >= 30.0), unit="s")
+            ).dt.strftime("%Y-%m-%d %H:%M:%S.%f")
+        ),
+        "the clock goes on by 3600 s",
+        ["--time-zone", "Europe/Berlin"],
+    ),
+    (
         "pipe",
         lambda r: r.assign(brake_pressure=5e5 - r.brake_pressure / 2),
         "5.0 bar while the train runs",
@@ -85,6 +103,29 @@ def test_what_is_odd_is_said_with_the_option_that_cures_it(
         assert option in odd
     importing.output = tmp_path / "cured"
     assert importing(log, *cure) == 0, importing.errors
+
+
+def test_a_column_without_any_value_is_said(importing: Import) -> None:
+    assert importing(text(ride().assign(brake_pressure="", position=np.nan))) == 1
+    assert importing.errors == [
+        "import_csv: odd: no row has a position: name another column with --position COL",
+        "import_csv: odd: no row has a brake_pressure: name another column with --pressure COL",
+    ]
+
+
+def test_what_is_not_read_is_said_and_that_a_pressure_is_missing(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert importing(text(ride().rename(columns={"brake_pressure": "BCP"}).assign(note="dry"))) == 0
+    lines = read_as(importing, capsys)
+    assert "not read: BCP, note" in lines
+    assert "no brake pressure: without one mu is not told; --pressure COL, --demand COL or --pipe COL names it" in lines
+
+
+def test_the_step_of_the_rows_is_the_usual_one(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:
+    importing(text(pd.concat([ride(), ride().assign(time=ride().time + 86_400.0, position=ride().position + 5e3)])))
+    (line,) = [line for line in read_as(importing, capsys) if line.startswith("time  ")]
+    assert line.endswith("a row every 0.1 s")
 
 
 def test_the_speed_of_a_step_of_the_clock_is_said(importing: Import) -> None:

@@ -94,6 +94,8 @@ class Track:
     def __post_init__(self) -> None:
         if not (isinstance(self.train_length_m, Real) and 0.0 < self.train_length_m < math.inf):
             raise ValueError(f"track train_length_m = {self.train_length_m!r}: give a length above 0 m")
+        if not isinstance(self.sections, tuple | list):
+            raise ValueError(f"track sections = {self.sections!r}: give a tuple of them, (Grade(0.0, 2000.0, 10.0),)")
         for section in self.sections:
             if not isinstance(section, Section):
                 raise ValueError(f"track section {section!r}: give a Grade, a Curve or a Tunnel")
@@ -134,6 +136,11 @@ class Track:
     def turned(self) -> "Track":
         """The same track run the other way: positions change their sign, climbs fall."""
         return Track(tuple(_turned(section) for section in self.sections), self.train_length_m)
+
+    def off(self, least_m: float, most_m: float) -> float:
+        """How far the nearest section is from a stretch, m, below 0 behind it; 0 where one lies on it, or none is."""
+        gaps = [max(s.start_m - most_m, 0.0) or min(s.end_m - least_m, 0.0) for s in self.sections]
+        return min(gaps, key=abs, default=0.0)
 
     def least_resistance(self, from_m: float) -> float:
         """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""

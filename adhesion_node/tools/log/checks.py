@@ -14,15 +14,13 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import KMH, Array
-from .format import POSITION_UNITS, SPEED_UNITS, TIME_UNITS, Format
+from ...run.seen import FASTEST_MPS
+from .format import OPTIONAL, POSITION_UNITS, PRESSURE_UNITS, SPEED_UNITS, TIME_UNITS, Format, option
 from .rows import Flags
 from .whole import Log, moment
 
 LEAST_S, LEAST_M = 10.0, 100.0
 """Of less time or less way nothing is said."""
-
-FASTEST_MPS = 105.0
-"""No train on rails is faster in service: 380 km/h."""
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
@@ -84,7 +82,7 @@ class Motion(NamedTuple):
 def odd(log: Log) -> list[str]:
     """Say what is odd, with the cure."""
     t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
-    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_pressures(log)]
+    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *_pressures(log)]
     if of_time or t_s[-1] < LEAST_S:
         return of_time + texts
     motion = _motion(log, t_s)
@@ -106,12 +104,25 @@ def _pressures(log: Log) -> Iterator[str]:
             continue
         gauge = log.rows[name] - log.form.ambient_pressure_pa
         least, most = gauge.min(), gauge.max()
-        if 0.1 < most < 3000.0:
-            unit = "bar" if most < 15.0 else "kpa"
-            percent = "" if most != 100.0 else "; per cent of a full brake are not read, give its pressure"
-            yield f"{name} is {most:g} Pa at most: is it in {unit}? --pressure-unit {unit}{percent}"
-        elif 80e3 < least < 108e3:
+        yield from _other_unit(name, most)
+        if 80e3 < least < 108e3:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
+
+    if "brake_pipe" in log.columns.names and log.form.pipe_released is not None:
+        yield from _other_unit("brake_pipe", log.form.pipe_released * PRESSURE_UNITS[log.form.pressure_unit])
+
+
+def _other_unit(name: str, most_pa: float) -> Iterator[str]:
+    if 0.1 < most_pa < 3000.0:
+        unit = "bar" if most_pa < 15.0 else "kpa"
+        percent = "" if most_pa != 100.0 else "; per cent of a full brake are not read, give its pressure"
+        yield f"{name} is {most_pa:g} Pa at most: is it in {unit}? --pressure-unit {unit}{percent}"
+
+
+def _empty(log: Log) -> Iterator[str]:
+    for name in OPTIONAL:
+        if name in log.rows and log.rows[name].isna().all():
+            yield f"no row has a {name}: name another column with {option(name)} COL"
 
 
 def _motion(log: Log, t_s: Array) -> Motion:
@@ -225,8 +236,10 @@ def _clock(log: Log, t_s: Array) -> Iterator[str]:
         )
         slowest = min(before, after)
         if slowest > 5.0 and abs(place[i + 1] - place[i]) < 0.5 * slowest * steps[i]:
+            is_date = log.form.time_format is not None and log.form.time_zone == "UTC"
+            cure = "--time-zone where summer time began, else " if is_date and abs(steps[i] - 3600.0) < LEAST_S else ""
             yield (
                 f"the clock goes on by {steps[i]:.0f} s at {moment(t_ns[i])} and the train does not: "
-                "cut the log there, or correct the times behind"
+                f"{cure}cut the log there, or correct the times behind"
             )
             return

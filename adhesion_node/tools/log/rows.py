@@ -30,10 +30,11 @@ Flags = NDArray[np.bool_]
 
 
 class Columns(NamedTuple):
-    """Names in the header by ours, and those of the axles."""
+    """Names in the header by ours, those of the axles, and those that mean nothing."""
 
     names: dict[str, str]
     axles: tuple[str, ...]
+    unread: tuple[str, ...] = ()
 
 
 class Source(NamedTuple):
@@ -68,7 +69,7 @@ def measured(source: str, log: Source) -> Iterator[tuple[pd.DataFrame, list[Refu
 
 def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
     """What a block has measured: the first reason against a row counts."""
-    form, (names, axles), factors = log.form, log.columns, log.form.factors()
+    form, (names, axles, _), factors = log.form, log.columns, log.form.factors()
     kinds = {name: name for name in names if name != "time"} | dict.fromkeys(axles, "wheel_speed")
     theirs = {name: cells[names.get(name, name)] for name in ("time", *kinds)}
     filled = {name: _filled(column) for name, column in theirs.items()}
@@ -161,7 +162,8 @@ def _columns(header: Sequence[str], source: str, form: Format) -> Columns:
         raise ValueError(f"{source}: columns {_listed(header)}: has neither position, lat and lon, nor speed: {remedy}")
     if {"brake_pipe", "brake_demand"} <= set(used):
         raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")
-    return Columns(used, axles)
+    unread = tuple(name for name in header if name and name not in (*used.values(), *axles))
+    return Columns(used, axles, unread)
 
 
 def _listed(header: Sequence[str]) -> str:

@@ -162,7 +162,8 @@ def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:
 
     delimiter = max(delimiters, key=usual)
     width = usual(delimiter)[1] or 1
-    return delimiter, next((number for number, cells in enumerate(split_up[delimiter]) if len(cells) >= width), 0)
+    named = (number for number, cells in enumerate(split_up[delimiter]) if sum(map(bool, cells)) >= width)
+    return delimiter, next(named, next((i for i, cells in enumerate(split_up[delimiter]) if len(cells) >= width), 0))
 
 
 def _decimal(cells: Iterable[str]) -> str:

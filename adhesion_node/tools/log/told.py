@@ -6,8 +6,10 @@ import sys
 from collections import Counter
 from collections.abc import Iterator
 
+import numpy as np
+
 from ...core.physics.train import KMH
-from .format import LIMITS, PRESSURES, Format
+from .format import LIMITS, PRESSURES, Format, option
 from .text import Refusal
 from .whole import Log, moment
 
@@ -50,10 +52,12 @@ def ranges(log: Log) -> Iterator[str]:
     """Say from where to where the columns go, so that a wrong unit shows."""
     t_ns = log.rows["t_ns"].to_numpy()
     first, length_s = t_ns[0], (t_ns[-1] - t_ns[0]) / 1e9
-    step_s = length_s / max(len(t_ns) - 1, 1)
+    step_s = float(np.median(np.diff(t_ns))) / 1e9 if len(t_ns) > 1 else 0.0
     yield f"{'time':<16} from {moment(first)} for {length_s:.9g} s, a row every {step_s:.3g} s"
     for name in log.rows.columns.drop("t_ns"):
         least, most = log.rows[name].min(), log.rows[name].max()
+        if log.rows[name].isna().all():
+            continue
         if name in PRESSURES:
             least, most = ((value - log.form.ambient_pressure_pa) / 1e5 for value in (least, most))
             yield f"{name:<16} {least:.3g} to {most:.3g} bar above the air"
@@ -61,3 +65,8 @@ def ranges(log: Log) -> Iterator[str]:
             yield f"{name:<16} {least / KMH:.4g} to {most / KMH:.4g} km/h"
         else:
             yield f"{name:<16} {least:.9g} to {most:.9g} {LIMITS.get(name, LIMITS['wheel_speed'])[2].split(':')[0]}"
+    if log.columns.unread:
+        yield f"not read: {', '.join(log.columns.unread)}"
+    if not any(name in log.columns.names for name in PRESSURES):
+        options = [f"{option(name)} COL" for name in PRESSURES]
+        yield f"no brake pressure: without one mu is not told; {', '.join(options[:-1])} or {options[-1]} names it"

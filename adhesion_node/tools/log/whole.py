@@ -3,6 +3,7 @@
 """A log as a whole: its times in order and in their zone, the chainage as the train runs, the demand in the pipe."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,10 +55,11 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         notes.append(
             "direction: positions are minus the chainage, so are those of track; else: replay --set direction=down"
         )
+    form = source.form
     if "brake_pipe" in rows:
-        rows, note = _demanded(rows, source.form)
+        rows, form, note = _demanded(rows, form)
         notes.append(note)
-    return Log(source.form, source.columns, rows, tuple(notes))
+    return Log(form, source.columns, rows, tuple(notes))
 
 
 def _over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
@@ -102,17 +104,18 @@ def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal
     return rows[~late], refused
 
 
-def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, str]:
-    """The rows with the demand that the pressure of the brake pipe is."""
+def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, str]:
+    """The rows with the demand that the pressure of the brake pipe is, and from where on it is released."""
     pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.pressure_unit
     scale = PRESSURE_UNITS[unit]
     released = pipe.quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
     share = ((released - pipe) / FULL_DROP_PA).clip(0.0, 1.0)
     rows = rows.drop(columns="brake_pipe").assign(brake_demand=form.ambient_pressure_pa + share * form.full_pressure_pa)
-    return rows, (
+    note = (
         f"brake pipe: released at {released / scale:g} {unit}, --pipe-released; a full brake {FULL_DROP_PA / scale:g} "
         f"{unit} below; as the demand of {form.full_pressure_pa:g} Pa in the cylinders, --full-pressure"
     )
+    return rows, replace(form, pipe_released=float(released / scale)), note
 
 
 def moment(t_ns: int) -> str:
