@@ -74,7 +74,7 @@ def parts() -> dict[str, str]:
     }
     made = {name: (file, _listed(COLUMNS[name], rows)) for name, (file, rows) in listed.items()}
     for name in ("real", "real_before"):
-        rows = ({"error_least_percent": None, **row} for row in files[name])
+        rows = ({"error_least_percent": None, "excess_least_percent": None, **row} for row in files[name])
         made[name] = name, _listed(COLUMNS["real"], rows, _marked)
     made["real soonest"] = "real", _listed(COLUMNS["real soonest"], _soonest(files["real"]))
     made["real goals"] = "real", table(("figure", "goal", "met", "missed most by"), _reached(files["real"]))

@@ -20,7 +20,7 @@ from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cases import Case, chosen
 from .goals import goals, missed, soonest
-from .least_error import least_error_percent
+from .least import least
 from .score import score
 from .trials import found
 
@@ -103,7 +103,12 @@ def row(case: Case, scored: Mapping[str, Any]) -> dict[str, Any]:
         for goal in goals(case)
     }
     named = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
-    bound = {"found_soonest_s": soonest(case), "error_least_percent": least_error_percent(case)}
+    at_best = least(case)
+    bound = {
+        "found_soonest_s": soonest(case),
+        "error_least_percent": at_best.error_percent,
+        "excess_least_percent": at_best.excess_percent,
+    }
     return {**named, **scored, **bound, "goals": ranges, "missed": missed(case, scored)}
 
 

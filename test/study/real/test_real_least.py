@@ -1,0 +1,95 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The least error of mu and excess of a curve: against a regression with the same unknowns, and where more is known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from adhesion_node.core.physics.train import GRAVITY, Array
+from adhesion_node.study.real.cases import chosen
+from adhesion_node.study.real.least import FACTOR_STD, FAR_M, FAST_MPS, STEP_S, Course, least, on_the_mean, std_of
+from sim_node.real.sensors.fitted import FITTED, Mounted
+from sim_node.real.sensors.position import Gnss
+from sim_node.real.sensors.speed import Speedometer
+from sim_node.real.sensors.timing import Timing
+
+COUNT, START = 150, 50
+TIME_S = (np.arange(COUNT, dtype=np.float64) - START + 0.5) * STEP_S
+COURSE = Course(
+    TIME_S,
+    np.full(COUNT, 30.0),
+    np.where(TIME_S > 0.0, 0.08, 0.0),
+    np.where(TIME_S > 0.0, 0.08, 0.0),
+    (TIME_S > 2.0).astype(np.float64),
+    [],
+    [],
+)
+NO_SWINGS = np.zeros(COUNT)
+
+
+def present(now: int) -> Array:
+    """Weights of the mean over a second about a step."""
+    return np.where(np.abs(np.arange(now + 4) - now) <= 3, 1.0 / 7.0, 0.0)
+
+
+@pytest.mark.parametrize("now", [70, 140])
+@pytest.mark.parametrize("speeds", [False, True])
+def test_without_swings_it_is_a_regression(now: int, speeds: bool) -> None:
+    """The least squares of place, speed and factor, written as such, with what is known beforehand as three rows."""
+    timing = Timing(rate_hz=1.0 / STEP_S)
+    sensor = Speedometer(correlated_std_mps=0.0) if speeds else Gnss(0.0, white_std_m=0.5)
+    slowing = np.where(TIME_S > 0.0, 0.08, 0.0) * GRAVITY * STEP_S
+    lost = np.cumsum(slowing)
+    time_s = TIME_S - TIME_S[0]
+    rows = np.stack(
+        [0 * time_s, 0 * time_s + 1, -lost] if speeds else [0 * time_s + 1, time_s, -STEP_S * np.cumsum(lost)]
+    )
+    rows = rows.T[: now + 1] / (0.05 if speeds else 0.5)
+    information = rows.T @ rows + np.diag([FAR_M**-2, FAST_MPS**-2, FACTOR_STD**-2])
+    expected = 0.08 * float(np.sqrt(np.linalg.inv(information)[2, 2]))
+    assert std_of(COURSE, now, present(now), [Mounted(sensor, timing, "one")], NO_SWINGS) == pytest.approx(
+        expected, rel=1e-6
+    )
+
+
+def test_swings_that_no_sensor_sees_in_time_stay() -> None:
+    """White swings of 10 %: positions of half a metre tell little of the present second."""
+    swings = np.zeros(COUNT)
+    swings[0] = 0.01
+    mounted = tuple(FITTED["white"].sensors.values())
+    alone = 0.08 * 0.1 / np.sqrt(round(1.0 / STEP_S) + 1)
+    assert std_of(COURSE, 140, present(140), mounted, swings) == pytest.approx(alone, rel=0.15)
+
+
+@pytest.mark.parametrize(("more", "fewer"), [("gnss_doppler", "gnss"), ("gnss_imu", "gnss"), ("gnss", "gnss_1hz")])
+def test_who_measures_more_knows_more(more: str, fewer: str) -> None:
+    swings = 0.03**2 * np.exp(-np.arange(COUNT) * STEP_S / 1.5)
+    known = [std_of(COURSE, 120, present(120), tuple(FITTED[name].sensors.values()), swings) for name in (more, fewer)]
+    assert known[0] < known[1]
+
+
+def test_the_mean_over_days_is_what_they_have_in_common() -> None:
+    """Of days that differ by a factor nothing is left to swing; what one has alone is its swing."""
+    speed = np.linspace(40.0, 5.0, COUNT)
+    law = 0.1 * np.exp(-0.02 * speed + 2e-4 * speed**2)
+    days = [COURSE._replace(speed_mps=speed, used=factor * law, swings=np.ones(COUNT)) for factor in (0.8, 1.0, 1.1)]
+    for day, found in zip(days, on_the_mean(days), strict=True):
+        assert found.smooth == pytest.approx(day.used)
+    bump = 1.0 + 0.1 * np.sin(np.arange(COUNT) / 5.0)
+    *_, last = on_the_mean([*days, days[1]._replace(used=law * bump)])
+    assert last.used / last.smooth == pytest.approx(bump, rel=0.02)
+
+
+def test_a_case_has_bounds_where_adhesion_limits_and_sensors_are_honest() -> None:
+    positions, speeds, dry = (
+        least(chosen(name)[0]) for name in ("tram_leaves gnss_wheels", "metro_leaves", "dry gnss")
+    )
+    assert positions.error_percent is not None
+    assert positions.excess_percent is not None
+    assert speeds.error_percent is not None
+    assert speeds.excess_percent is not None
+    assert speeds.error_percent < 0.6 * positions.error_percent
+    assert speeds.excess_percent < 0.2 * positions.excess_percent
+    assert (dry.error_percent, dry.excess_percent) == (None, None)
