@@ -83,7 +83,7 @@ def without_course(patch: pytest.MonkeyPatch) -> None:
 
 
 def without_ways(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr("adhesion_node.wire.curves._check_ways", lambda _: None)
+    patch.setattr("adhesion_node.wire.curves.ROUNDING_M2_PER_S2", np.inf)
 
 
 def without_first_speed(patch: pytest.MonkeyPatch) -> None:
