@@ -40,7 +40,7 @@ _ros_home = pytest.StashKey[str]()
 class SpinUntil(Protocol):
     """Type of the `spin_until` fixture."""
 
-    def __call__(self, executor: Executor, predicate: Callable[[], object], timeout_s: float = 30.0) -> None: ...
+    def __call__(self, executor: Executor, predicate: Callable[[], object], timeout_s: float = 10.0) -> None: ...
 
 
 # The same examples in every run: what passes once, passes always. HYPOTHESIS_PROFILE=search looks for new ones.
@@ -128,14 +128,14 @@ def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
 
 @pytest.fixture
 def spin_until() -> SpinUntil:
-    """Return the function `spin_until(executor, predicate, timeout_s=30.0)`.
+    """Return the function `spin_until(executor, predicate, timeout_s=10.0)`.
 
     It spins until `predicate()` is true and fails the test when that takes longer than `timeout_s` seconds.
     """
     return _spin_until
 
 
-def _spin_until(executor: Executor, predicate: Callable[[], object], timeout_s: float = 30.0) -> None:
+def _spin_until(executor: Executor, predicate: Callable[[], object], timeout_s: float = 10.0) -> None:
     deadline = time.monotonic() + timeout_s
     while not predicate():
         remaining = deadline - time.monotonic()

@@ -183,7 +183,7 @@ class Config:
     )
     pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
     used_ripple: float = _unsure(
-        0.03,
+        0.02,
         "By how much the adhesion used swings about its mean over some seconds, as slide protection works in turns, "
         "relative",
         "",
@@ -194,7 +194,7 @@ class Config:
         0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
     )
     ahead_std: float = _unsure(
-        0.04,
+        0.05,
         "By how much the adhesion, or the brake's force, may differ over the way ahead in the mean, relative",
         "",
         0.0,

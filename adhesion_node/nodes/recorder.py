@@ -27,7 +27,7 @@ from .log_time import SimulatedTime
 from .offers import offered
 from .ros import runtime
 from .ros.diagnostics import Diagnostics, Finding, Told
-from .ros.params import USE_SIM_TIME, SettingsNode, declare, descriptor
+from .ros.params import SettingsNode, declare
 from .ros.qos import PROFILES, subscribe
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
@@ -97,7 +97,6 @@ class Recorder(SettingsNode):
         """
         super().__init__("recorder", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, TELLING, quiet=True)
-        self.set_descriptor(USE_SIM_TIME.name, descriptor(USE_SIM_TIME))  # a recording has one time
         self._simulated = bool(self.get_parameter("use_sim_time").value)
         self._time = SimulatedTime()
         self._last_ns = 0

@@ -69,8 +69,8 @@ class Line:
         self.spin_until(self.executor, output.get_subscription_count)
         return output
 
-    def wait(self, done: Callable[[], object]) -> None:
-        self.spin_until(self.executor, done)
+    def wait(self, done: Callable[[], object], timeout_s: float = 10.0) -> None:
+        self.spin_until(self.executor, done, timeout_s)
 
     def wait_until_said(self, words: str) -> None:
         """Wait for a message with these words that is said from now on."""
@@ -122,7 +122,7 @@ def test_every_node_speaks_without_being_spoken_to(
     own = {"sensor_timeout_s": 3600.0} if "estimator" in entry else {}
     make = beside.get(NODES[entry], NODES[entry])
     line = make_line(make, use_sim_time=use_sim_time, diagnostics_period_s=0.1, namespace="/train1", **own)
-    line.wait(lambda: len(line.told) > 5)
+    line.wait(lambda: len(line.told) > 5, 2.0)
     assert (line.last.name, line.last.hardware_id) == (f"train1/{entry}", "train1")
     assert line.last.message
 

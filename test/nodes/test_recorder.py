@@ -271,7 +271,7 @@ def test_a_signal_ends_the_recording_properly(
 ) -> None:
     _, sent = talking
     with recording_process(tmp_path / "bag") as process:
-        spin_until(executor, lambda: len(sent) >= 50 and has_messages(tmp_path / "bag"))
+        spin_until(executor, lambda: len(sent) >= 50 and has_messages(tmp_path / "bag"), 20.0)
         process.send_signal(number)
         spin_until(executor, lambda: process.poll() is not None)
         out, err = process.communicate()

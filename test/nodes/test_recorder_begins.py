@@ -91,14 +91,3 @@ def test_what_waits_for_a_clock_is_bounded(
     with BagReader(tmp_path / "bag") as reader:
         assert [record.log_ns // S for record in reader.messages()] == [4, 5, 6, 7, 8]
     assert "no /clock: of 5 messages that wait for it the oldest is given up" in capfd.readouterr().err
-
-
-@pytest.mark.parametrize("follows", [False, True])
-def test_a_recording_keeps_the_time_that_it_began_with(tmp_path: Path, context: Context, follows: bool) -> None:
-    """Else its other half would be of another time, or of 1970, where no /clock has been heard."""
-    recording = Recorder(tmp_path / "bag", context=context, parameter_overrides=simulated() if follows else [])
-    assert recording.describe_parameter("use_sim_time").read_only
-    changed = recording.set_parameters_atomically([Parameter("use_sim_time", value=not follows)])
-    assert changed.reason.startswith(f"use_sim_time = {not follows}: fixed at start; restart the node to change it")
-    recording.close()
-    recording.destroy_node()

@@ -236,7 +236,7 @@ def test_at_full_speed_a_slow_subscriber_in_another_process_slows_it_down(
     listener = Listener(context, POSITION, profile=UNLIMITED)
     executor.add_node(listener)
     with replay_process(str(tmp_path / "bag"), "--rate", "0", "--topics", "position", "--json", "-") as process:
-        spin_until(executor, lambda: len(listener.heard) > 10)
+        spin_until(executor, lambda: len(listener.heard) > 10, 20.0)
         time.sleep(0.5)  # not to synchronise: meanwhile the replay publishes several queues full
         spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == steps, 60.0)
         out, err = process.communicate()
@@ -252,7 +252,7 @@ def test_a_best_effort_subscriber_at_full_speed_is_named(
     listener = Listener(context, POSITION)
     executor.add_node(listener)
     with replay_process(str(tmp_path / "bag"), "--rate", "0") as process:
-        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == 5)
+        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == 5, 20.0)
         out, err = process.communicate()
     assert process.returncode == 0
     assert out.split() == ["5", "/brake_pressure", "5", "/position"]

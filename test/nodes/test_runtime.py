@@ -165,7 +165,7 @@ def test_what_is_queued_at_the_signal_is_still_taken(
     words = speaker.create_publisher(Float64, "first_word", 1000)
     program = start(TASK="stumble")
     wait_for(program, "stumbling")
-    spin_until(executor, words.get_subscription_count)
+    spin_until(executor, words.get_subscription_count, timeout_s=30.0)
     for number in range(200):
         words.publish(Float64(data=float(number)))
     assert words.wait_for_all_acked(Duration(seconds=10.0))  # they are in the program's queue
@@ -195,9 +195,9 @@ def test_the_last_messages_arrive(
 
     listener.create_subscription(Float64, "last_word", hear, 100)
     program = start(TASK="call")
-    spin_until(executor, lambda: heard)  # both sides know each other
+    spin_until(executor, lambda: heard, timeout_s=30.0)  # both sides know each other
     program.send_signal(signal.SIGTERM)
-    spin_until(executor, lambda: heard[-50:] == [float(number) for number in range(50)])
+    spin_until(executor, lambda: heard[-50:] == [float(number) for number in range(50)], timeout_s=30.0)
     assert end(program) == (0, [])
 
 

@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
+import math
 from bisect import bisect_left
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..intake.samples import PressureSample
@@ -26,6 +27,10 @@ EMPTY_NS = 3 * S // 2
 
 SLID_NS = 2 * S
 """So long behind a dump axles have slid of late."""
+
+SWING_SHARE = 0.03
+"""Behind a dump the protection is at work as long as the pressure falls and rises, or rises and falls, by so much of
+what is demanded within a second: a driver's hand is steadier."""
 
 RISING_SHARE, RISING_NS = 0.1, S
 """Of the full pressure within this time, is a brake that is being applied harder."""
@@ -63,14 +68,17 @@ class BrakeSeen(NamedTuple):
             applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
             return BrakeSeen(recent, pressure, applied, None, full_ns)
         peak = max(each.pressure_pa for each in recent[bisect_left(recent, (t_ns - DUMP_NS,)) :])
-        dumped_ns = t_ns if peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak) else self.dumped_ns
+        dumps = peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak)
+        if self.dumped_ns is not None:
+            dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
+        dumped_ns = t_ns if dumps else self.dumped_ns
         dumping = dumped_ns is not None and t_ns - dumped_ns < HELD_NS and t_ns - full_ns < EMPTY_NS
         demanded = demand_pa
         if demanded is None:
             demanded = max(self.demanded_pa, peak) if dumping else pressure  # it fell before that was a dump
         applied = pressure
-        if config.pressure_kind == "cylinder" and dumping:
-            applied = demanded  # of the others nothing is known but what is asked of them
+        if dumping:
+            applied = demanded  # the axles that roll are pressed as is asked of them
         elif config.pressure_kind == "mean" and pressure <= recent[0].pressure_pa * (1.0 + RISING_SHARE):
             applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
         return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns)
@@ -87,4 +95,19 @@ class BrakeSeen(NamedTuple):
     @property
     def rising(self) -> bool:
         """Whether the brake is being applied harder."""
-        return len(self.recent) > 1 and self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa
+        if self.dumped_ns is not None or not self.recent:
+            return False  # slide protection makes pressures rise, too
+        return self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa
+
+
+def _swings(recent: Sequence[PressureSample], least_pa: float) -> bool:
+    """Whether pressures have fallen and risen, or risen and fallen, by so much."""
+    for sign in (1.0, -1.0):
+        top, fallen = -math.inf, math.inf  # fallen: the least behind a fall by so much
+        for _, pressure_pa in recent:
+            top = max(top, sign * pressure_pa)
+            if top - sign * pressure_pa >= least_pa:
+                fallen = min(fallen, sign * pressure_pa)
+            if sign * pressure_pa - fallen >= least_pa:
+                return True
+    return False

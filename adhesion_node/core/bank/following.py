@@ -131,6 +131,8 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Off | No
     """Take a position in; the first one places the train, with what there is of slow error in it."""
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
     course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
+    if predicted is not None:
+        course = course.deviating(measurement.t_ns, predicted.stds)
     if memory.is_placed:
         ahead = None if predicted is None else predicted.ahead
         if ahead is not None and ahead.bank is bank:
@@ -165,6 +167,11 @@ class Off(NamedTuple):
     """What was foreseen, ..."""
     ahead: Foreseen | None = None
     """... with the position beside it."""
+
+    @property
+    def stds(self) -> float:
+        """In standard deviations by the hypothesis nearest."""
+        return math.copysign(self.nearest, self.metres)
 
 
 def met(config: Config, measurement: Measurement) -> Memory:

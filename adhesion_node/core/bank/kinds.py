@@ -16,7 +16,7 @@ class Kind(NamedTuple):
     drift: float
     """Of the adhesion at one speed, relative standard deviation over 1 s."""
     roughness: float
-    """Of the rail over `ROUGHNESS_M`, relative standard deviation."""
+    """Of the rail over `ROUGHNESS_M`, relative standard deviation, in the mean over the length of a train."""
     restlessness_mps: float
     """Standard deviation that unknown decelerations give the speed over 1 s."""
     prior: float
@@ -27,9 +27,9 @@ KINDS = (
     Kind("free", False, 0.0, 0.0, 0.02, 1.0),
     Kind("brake", False, 0.0, 0.0, 0.03, 0.55),
     Kind("smooth", True, 0.001, 0.0, 0.018, 0.16),
-    Kind("even", True, 0.003, 0.03, 0.035, 0.16),
-    Kind("rough", True, 0.005, 0.07, 0.05, 0.1),
-    Kind("restless", True, 0.02, 0.15, 0.07, 0.03),
+    Kind("even", True, 0.003, 0.02, 0.035, 0.16),
+    Kind("rough", True, 0.005, 0.05, 0.05, 0.1),
+    Kind("restless", True, 0.02, 0.1, 0.07, 0.03),
     Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
 )
 FREE, HELD, PASSING = 0, 1, 6
@@ -63,8 +63,8 @@ class Noise(NamedTuple):
 
 NOISES = (
     Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
-    Noise(0.05, 0.05, 1.0, 1.0, 30.0, 0.3),
-    Noise(0.05, 0.05, 1.0, 1.0, 200.0, 0.1),
+    Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.3),
+    Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.1),
     Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
 )
 LASTS = np.array([noise.lasts_s for noise in NOISES])

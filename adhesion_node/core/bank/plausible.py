@@ -1,6 +1,6 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
 
-"""A physical check of positions: a deceleration that no brake and rail give is that of a wheel, not of the train."""
+"""Whether positions are the train's: of a wheel that slides they show what no brake gives, or run off in turns."""
 
 from __future__ import annotations
 
@@ -33,6 +33,11 @@ RECEIVER = 1
 BRAKE_ERROR, RESISTANCE_ERROR = 1.15, 1.2
 """Factors on the full brake and the running resistance that are still possible."""
 
+ALIKE_S, FAR, ALIKE, SAMPLES = 1.0, 4.0, 2.5, 4.0
+"""Over such a time the product of deviations that follow each other, in standard deviations by the hypothesis nearest
+and counted as no more than this, is above so much in the mean of so many at least: errors that come by chance, however
+large, do not follow each other so, and those that wander are foreseen."""
+
 GAIN_MPS2, BRAKED_NS = 0.1, 3 * S
 """A train that has been braked so long does not gain speed by more than this, and the grade's part."""
 
@@ -43,16 +48,37 @@ class Course(NamedTuple):
     recent: tuple[tuple[int, float], ...] = ()
     braked_ns: int | None = None
     """Since when the brake is applied."""
+    off_ns: int = 0
+    off: float = 0.0
+    """Stamp and deviation of the newest, in standard deviations, ..."""
+    alike: float = 0.0
+    """... its product with the one before, with those under this brake before it, older ones fading, ..."""
+    samples: float = 0.0
+    """... and how many they are."""
+
+    def deviating(self, t_ns: int, off: float) -> Course:
+        """With the next deviation, in standard deviations by the hypothesis nearest."""
+        off, fading = min(max(off, -FAR), FAR), math.exp(-abs(t_ns - self.off_ns) / (ALIKE_S * S))
+        alike, samples = fading * self.alike + off * self.off, fading * self.samples + 1.0
+        return self._replace(off_ns=t_ns, off=off, alike=alike, samples=samples)
 
     def after(self, t_ns: int, position_m: float, braked: bool) -> Course:
         """With the next position."""
         first, end = bisect_left(self.recent, (t_ns - SPAN_NS,)), bisect_left(self.recent, (t_ns,))
         recent = (*self.recent[first:end], (t_ns, position_m))
-        since = self.braked_ns if braked and self.braked_ns is not None else t_ns
-        return Course(recent, since if braked else None)
+        if not braked:
+            return Course(recent)
+        return self._replace(recent=recent, braked_ns=t_ns if self.braked_ns is None else self.braked_ns)
+
+    @property
+    def runs_off(self) -> bool:
+        """Whether the positions under the brake run off in a way that none of the known errors does."""
+        return self.samples > SAMPLES and self.alike > ALIKE * self.samples
 
     def is_impossible(self, config: Config, bank: Bank, declared_m: float) -> bool:
-        """Whether no train moves so, by a parabola through the positions, in spite of their errors."""
+        """Whether no train moves so: they run off, or a parabola through them says so in spite of their errors."""
+        if self.runs_off:
+            return True
         if self.braked_ns is None or len(self.recent) < LEAST:
             return False
         speed = max(bank.mean_of(SPEED), 0.0)

@@ -25,7 +25,7 @@ CLIPPED = 3.5
 UNSEEN = 1e12
 """Variance of what is not seen."""
 
-STEADY_ERROR, BRAKING_ERROR = 0.002, 0.06
+STEADY_ERROR, BRAKING_ERROR = 0.002, 0.1
 """What an accelerometer feels beside the mean brake: over g, and over the adhesion used, as axles slide in turns."""
 
 

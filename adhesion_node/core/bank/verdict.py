@@ -40,6 +40,10 @@ COUNTED_RISE = 0.5
 TWO_SIDED_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
+KNOWN_SHARE = 0.6
+"""Of the chance that the bound may fail, what is left to all that the hypotheses know of; the rest is for what they do
+not."""
+
 SLOWING = 0.02
 """Net deceleration over g from which a train of whose brake nothing is known brakes."""
 
@@ -103,7 +107,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         return Findings(Regime.COASTING, before, belief, constant(before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     std = np.hypot(used.std(bank), config.used_ripple * used.value)
-    wanted = (0.025, 1.0 - config.confidence, 0.5, 0.975)
+    wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
     rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
     if not memory.braked:

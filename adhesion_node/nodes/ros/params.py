@@ -21,7 +21,7 @@ from adhesion_node.wire.topics import TOPICS
 
 _INT64_MAX = 2**63 - 1
 
-USE_SIM_TIME = Setting("use_sim_time", False, "Follow /clock")
+_USE_SIM_TIME = Setting("use_sim_time", False, "Follow /clock")
 _OF_RCLPY = ("use_sim_time", "start_type_description_service")
 _OF_RCLPY_QOS = "qos_overrides."
 _QOS = re.compile(r"qos_overrides\.(.+)\.(?:publisher|subscription)(?:_\w+)?\.\w+")
@@ -110,8 +110,8 @@ def declare(
     unless `quiet` that all is. Construct the node with `automatically_declare_parameters_from_overrides=True`: then
     parameters that it was given but does not have are logged as well.
     """
-    if node.has_parameter(USE_SIM_TIME.name):
-        USE_SIM_TIME.check(node.get_parameter(USE_SIM_TIME.name).value)
+    if node.has_parameter(_USE_SIM_TIME.name):
+        _USE_SIM_TIME.check(node.get_parameter(_USE_SIM_TIME.name).value)
     defaults = {one.name: one.default for one in settings}
     given = {one.name: node.get_parameter(one.name).value for one in settings if node.has_parameter(one.name)}
     settings = settings if preset is None else preset(settings, given)

@@ -78,6 +78,20 @@ def test_positions_of_a_sliding_wheel_are_caught_until_the_brake_is_released(see
     assert last.position_m == pytest.approx(positions[round((last.t_ns - S) / S / H)], abs=2.0)
 
 
+@pytest.mark.parametrize("slip", [0.04, 0.06])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_wheel_that_slides_a_little_by_turns_is_caught(seed: int, slip: float) -> None:
+    """No deceleration of it is impossible, but no receiver errs so."""
+    _, speeds = truth(0.08)
+    times = np.arange(speeds.size) * H
+    sliding = (times > BRAKE_S + 1.0) & (times < RELEASE_S)
+    rim = speeds * (1.0 - np.where(sliding, slip * (1.0 - np.cos(2.5 * (times - BRAKE_S - 1.0))) / 2.0, 0.0))
+    rim += 0.05 * np.random.default_rng(seed).standard_normal(rim.size)
+    state, estimates = followed(np.concatenate(([0.0], np.cumsum(rim * H)[:-1])), 0.3)
+    assert state.counts[Outcome.SLIDING] > 0
+    assert min((each.t_ns - S) / S for each in estimates if each.withheld) < BRAKE_S + 5.0
+
+
 @pytest.mark.parametrize(("mu", "seeds"), [(0.03, range(3)), (0.2, range(20))])
 def test_a_receiver_whose_error_wanders_is_believed(mu: float, seeds: range) -> None:
     """Errors of 2 m that last 30 s."""
@@ -92,9 +106,12 @@ def test_a_receiver_whose_error_wanders_is_believed(mu: float, seeds: range) -> 
         assert abs(estimates[-1].speed_mps - speeds[-1]) < 5.0 * estimates[-1].speed_std_mps
 
 
-def test_white_errors_are_believed() -> None:
+@pytest.mark.parametrize("tails", [math.inf, 2.0])
+def test_errors_by_chance_are_believed(tails: float) -> None:
+    """White, Gaussian or with the tails of a Student t."""
     places, _ = truth(0.05)
-    for seed in range(2):
+    for seed in range(4):
         rng = np.random.default_rng(seed)
-        state, _ = followed(places + 0.5 * rng.standard_normal(places.size), 0.5)
-        assert state.counts[Outcome.SLIDING] == 0
+        errors = rng.standard_normal(places.size) if math.isinf(tails) else rng.standard_t(tails, places.size)
+        state, _ = followed(places + 0.5 * errors, 0.5)
+        assert state.counts[Outcome.SLIDING] == 0, seed

@@ -53,7 +53,7 @@ def check(bank: Bank, seen: Observation, rows: list[tuple[Array, float, float]])
 
 def test_a_position() -> None:
     declared = 2.0
-    r = [declared**2, 0.1**2, 0.1**2, declared**2]  # 1, 0.05, 0.05, 1 times what is declared
+    r = [declared**2, 0.06**2, 0.06**2, declared**2]  # 1, 0.03, 0.03, 1 times what is declared
     h = np.zeros(SIZE)
     h[POSITION] = h[OFFSET] = 1.0
     rows = [(h, 503.0 - float(h @ x), r[index]) for index, x in enumerate(BANK.mean)]
@@ -86,7 +86,7 @@ def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool) -> Non
         foreseen, used = felt(x, index, resisting)
         step = 1e-6 * np.eye(SIZE)
         h = np.array([(felt(x + d, index, resisting)[0] - felt(x - d, index, resisting)[0]) / 2e-6 for d in step])
-        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 0.06) * used) ** 2
+        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 0.1) * used) ** 2
         rows.append((h, measured / 9.8 - foreseen, r))
     check(BANK, acceleration_seen(CONFIG, BANK, measured, variance, braking), rows)
 

@@ -174,9 +174,9 @@ def test_the_bound_is_the_mixtures_and_below_its_median() -> None:
             + (0.05**2) * bank.covariance[0, ROUGH, ROUGH]
             + 2 * 0.05 * bank.covariance[0, MU, ROUGH]
         ),
-        0.03 * 0.05,
+        CONFIG.used_ripple * 0.05,
     )
-    low, bound, high = norm.ppf([0.025, 0.05, 0.975], 0.05, std)
+    low, bound, high = norm.ppf([0.025, 0.6 * 0.05, 0.975], 0.05, std)
     assert (rail.mu, rail.lower) == pytest.approx((0.05, bound), rel=1e-6)
     assert rail.std == pytest.approx((high - low) / 3.92, rel=1e-6)
     assert low < rail.lower < rail.mu

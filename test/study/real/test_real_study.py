@@ -15,7 +15,7 @@ from adhesion_node.command.running import Running
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.real import point_mass
 from adhesion_node.study.real.cases import CASES, chosen
-from adhesion_node.study.real.trials import found
+from adhesion_node.study.real.trials import arrays, found
 from adhesion_node.study.real.truth import slid
 from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.sensors.fitted import FITTED
@@ -58,6 +58,18 @@ def test_the_point_mass_slides_all_the_way_to_its_standstill() -> None:
     assert np.all(slid(journey)[braked] == 1.0)
     assert journey.used[braked] == pytest.approx(0.07)
     assert [at_s for at_s, _ in drive.messages] == sorted(at_s for at_s, _ in drive.messages)
+
+
+def test_positions_of_an_axle_that_slides_are_left_out_before_they_mislead() -> None:
+    """This one slides so little, and by turns, that no deceleration of it is impossible."""
+    (case,) = chosen("wet tacho")
+    (drive,) = case.drives([5001])
+    parts = arrays(drive, case.config, case.built_after_s)
+    rows, (run,) = parts["rows"], parts["runs"]
+    rows = rows[(rows["t_s"] >= run["built_s"]) & (rows["t_s"] < run["slow_s"])]
+    assert np.mean(rows["withheld"]) > 0.9
+    assert np.all(rows["safe_m"] + 5.0 >= rows["remaining_m"])
+    assert np.all(rows["lower"] <= rows["used"])
 
 
 def test_rows_and_pictures_of_a_case(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -17,14 +17,14 @@ from adhesion_node.study.real import remembered
 def test_rows_with_and_without_the_map(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(remembered, "PAIRS", (("tram_wet", "tram_wet"),))
+    monkeypatch.setattr(remembered, "PAIRS", (("metro_leaves", "metro_leaves"),))
     file = tmp_path / "remembered.json"
     options = ["--runs", "1", "--earlier", "3", "--cache", str(tmp_path / "cache")]
     with computed_here():
         assert main(["remembered", *options, "--json", str(file)]) == 0
     without, with_map = json.loads(file.read_text(encoding="utf-8"))
     assert (without["rail_map"], with_map["rail_map"]) == (False, True)
-    assert (without["before"], without["now"], without["runs"]) == ("tram_wet", "tram_wet", 1)
+    assert (without["before"], without["now"], without["runs"]) == ("metro_leaves", "metro_leaves", 1)
     assert with_map["first_ratio"] != without["first_ratio"]
     assert with_map["least_ratio"] > 0.9
     assert "safe/true, first second" in capsys.readouterr().out
