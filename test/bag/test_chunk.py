@@ -1,0 +1,69 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+
+"""The records of a chunk, and bytes that are not what they seem."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from struct import pack
+from typing import Any
+from zlib import crc32
+
+import pytest
+from mcap.opcode import Opcode
+from mcap.writer import CompressionType, Writer
+
+from adhesion_node.bag.chunk import HEAD, Message, unpack
+
+
+def chunk_of(content: bytes, checksum: int | None = None) -> bytes:
+    """The body of an uncompressed chunk."""
+    wanted = crc32(content) if checksum is None else checksum
+    return pack("<QQQIIQ", 0, 0, len(content), wanted, 0, len(content)) + content
+
+
+def message(data: bytes, log_ns: int = 7) -> bytes:
+    """A message's body on channel 3."""
+    return pack("<HIQQ", 3, 1, log_ns, 0) + data
+
+
+def record(opcode: int, body: bytes, length: int | None = None) -> bytes:
+    """A record that says that it is so long."""
+    return HEAD.pack(opcode, len(body) if length is None else length) + body
+
+
+def test_a_chunk_holds_messages_and_declarations() -> None:
+    """Those that the library writes; records of kinds that come in later versions are passed over."""
+    stream = BytesIO()
+    writer: Any = Writer(stream, compression=CompressionType.NONE)  # mcap annotates its writer only in part
+    writer.start()
+    schema = writer.register_schema("a/msg/A", "ros2msg", b"float64 x")
+    channel = writer.register_channel("x", "cdr", schema)
+    writer.add_message(channel, 5, b"one", 5)
+    writer.add_message(channel, 4, b"", 4)
+    writer.finish()
+    written, at = stream.getvalue(), 8
+    while written[at] != Opcode.CHUNK:
+        at += HEAD.size + HEAD.unpack_from(written, at)[1]
+    length = HEAD.unpack_from(written, at)[1]
+    content = unpack(Opcode.CHUNK, written[at + HEAD.size : at + HEAD.size + length])
+    assert content.messages == [Message(channel, 5, b"one"), Message(channel, 4, b"")]
+    assert [type(each).__name__ for each in content.declared] == ["Schema", "Channel"]
+    known = record(200, b"??") + record(Opcode.MESSAGE, message(b"xy"))
+    assert unpack(Opcode.CHUNK, chunk_of(known)).messages == [Message(3, 7, b"xy")]
+    assert unpack(Opcode.MESSAGE, message(b"xy")).messages == [Message(3, 7, b"xy")], "one outside of any chunk"
+
+
+@pytest.mark.parametrize(
+    ("content", "checksum", "why"),
+    [
+        (record(Opcode.MESSAGE, message(b"xy"), 90), None, "ends behind its chunk"),
+        (record(Opcode.MESSAGE, b"short"), None, "shorter than its head"),
+        (record(Opcode.MESSAGE, message(b"xy", 2**63)), None, "beyond what a recording may hold"),
+        (record(Opcode.MESSAGE, message(b"xy")), 1, "its checksum is another"),
+    ],
+)
+def test_a_chunk_that_is_not_what_it_seems_is_refused(content: bytes, checksum: int | None, why: str) -> None:
+    with pytest.raises(ValueError, match=why):
+        unpack(Opcode.CHUNK, chunk_of(content, checksum))
+    assert unpack(Opcode.CHUNK, chunk_of(record(Opcode.MESSAGE, message(b"xy")), 0)).messages, "0: no checksum"
