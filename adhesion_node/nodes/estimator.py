@@ -29,7 +29,7 @@ PARAMETERS = SETTINGS
 EXAMPLES = (
     "estimator",
     "estimator --ros-args -p train.mass_kg:=450000.0 -p track:='tunnel 3000 9000'",
-    "estimator --ros-args --params-file my_train.yaml -r __ns:=/train1",
+    "estimator --ros-args --params-file my_parameters.yaml -r __ns:=/train1",
 )
 
 UNMEASURED = "no brake pressure: a full brake is assumed"
