@@ -119,7 +119,7 @@ class Seen:
     def _reasons(self) -> Iterator[str]:
         """What may be the reason, the one that explains most first."""
         if not self._estimates:
-            yield "no estimate came of it: was too little recorded? See what was dropped, and why"
+            yield "no estimate came of it; see what was dropped, and why"
         if self._runs_back:
             yield BACKWARDS
         if self.too_fast is not None:

@@ -31,7 +31,7 @@ from ..core.physics.adhesion import DRY
 from ..core.physics.train import KMH
 from ..run import offline
 from ..wire.settings import SETTINGS, given, setup_of
-from ..wire.train_file import TrainFile, read_train
+from ..wire.train_file import KNOWN_TO, TrainFile, read_train
 from . import train_found
 
 EXAMPLES = (
@@ -128,6 +128,9 @@ def likely(file: TrainFile) -> Iterator[Likely]:
     resistance = 1e3 * float(train.specific_resistance(top))
     yield Likely("resistance at top speed", resistance, 0.8, 40.0, "N/kN", "coefficients for km/h, per weight?")
     yield Likely("resistance near standstill", train.resistance_c0, 0.4, 6.0, "N/kN", "per weight, not per mass?")
+    for name, std in KNOWN_TO.items():
+        if std in file.values:
+            yield Likely(f"known_to {name}", file.values[std], 0.001, 1.0, "of it", "per cent? 0.1 is 10 %")
 
 
 def _told(file: TrainFile, rows: Sequence[dict[str, float]]) -> Iterator[str]:

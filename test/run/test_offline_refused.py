@@ -48,6 +48,16 @@ def test_a_falling_chainage_is_run_as_a_rising_one_or_told(tmp_path: Path, bag: 
     assert any("set direction to what the chainage does along the run" in line for line in unannounced.err)
 
 
+def test_a_track_that_lies_elsewhere_is_told(bag: Path, offline: Offline) -> None:
+    told = [
+        offline(bag, "--set", f"track=grade {at}").err for at in ("1000 9000 10", "100000 120000 10", "-900 -800 1")
+    ]
+    off = [[line for line in err if "no section of the track is where the train ran" in line] for err in told]
+    assert off[0] == []
+    assert " m ahead of it" in off[1][0]
+    assert " m behind it" in off[2][0]
+
+
 def test_a_wrong_frame_is_counted_or_accepted_by_name(tmp_path: Path, bag: Path, offline: Offline) -> None:
     write_run(tmp_path / "map", samples(), edit=lambda topic, _, cdr: in_map(topic, cdr))
     code, result, *_ = offline(tmp_path / "map", "--set", "frame=map")

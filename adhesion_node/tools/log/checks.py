@@ -7,7 +7,7 @@ Means over a second are judged, so that neither noise nor the rate of the rows m
 
 import math
 from collections.abc import Iterator
-from itertools import product
+from itertools import chain, product
 from typing import NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ import pandas as pd
 
 from ...core.physics.train import KMH, Array
 from ...run.seen import FASTEST_MPS
-from .format import OPTIONAL, POSITION_UNITS, PRESSURE_UNITS, SPEED_UNITS, TIME_UNITS, Format, option
+from .format import PLACES, POSITION_UNITS, PRESSURE_UNITS, PRESSURES, SPEED_UNITS, TIME_UNITS, Format, option
 from .rows import Flags
 from .whole import Log, moment
 
@@ -120,7 +120,7 @@ def _other_unit(name: str, most_pa: float) -> Iterator[str]:
 
 
 def _empty(log: Log) -> Iterator[str]:
-    for name in OPTIONAL:
+    for name in (*chain.from_iterable(PLACES), *PRESSURES):
         if name in log.rows and log.rows[name].isna().all():
             yield f"no row has a {name}: name another column with {option(name)} COL"
 
