@@ -110,6 +110,13 @@ def test_a_curve_ahead_of_the_clock_is_not_used_once_the_clock_gets_there() -> N
     )
 
 
+@pytest.mark.parametrize("part", [Part.STATE, Part.CURVE])
+def test_a_refused_state_or_curve_takes_the_place_of_the_one_before(part: Part) -> None:
+    _, said = run([*at(0.1, Refused(part, "NaN")), *at(0.5, Tick.ROS)], SUPERVISED)
+    assert {one.level for _, one in said} == {Level.EMERGENCY_BRAKE}
+    assert "refused: NaN" in said[-1][1].message
+
+
 def stepped(known: Known, event: Event, ros_s: float, steady_s: float) -> tuple[Known, Decision | None]:
     now = Now(NOW_NS + round(ros_s * SECOND_NS), round(steady_s * SECOND_NS))
     return step(RULES, known, event, now)
