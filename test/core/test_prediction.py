@@ -123,6 +123,13 @@ def test_an_uncertain_brake_lowers_the_safe_curve_alone() -> None:
     assert sliding.deceleration_mps2 == pytest.approx(0.05 * G)
 
 
+def test_of_a_brake_that_nothing_is_known_of_the_safe_curve_counts_on_nearly_none() -> None:
+    known, unknown = (predict(replace(config(), brake_std=std), estimate(0.2, 0.15)).safe for std in (0.0, 1.0))
+    assert known is not None
+    assert unknown is not None
+    assert 0.0 < unknown.deceleration_mps2[0] < 0.1 * known.deceleration_mps2[0]
+
+
 def test_the_nominal_curve_follows_the_identified_law() -> None:
     """By quadrature of v dv/a on 0.8 times the wet law, the brake's limit included; the safe one stays at its bound."""
     mu = 0.8 * (0.04 + 13.7 / (120.0 + 3.6 * 60.0))
