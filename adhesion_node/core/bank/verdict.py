@@ -41,8 +41,8 @@ TWO_SIDED_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
 KNOWN_SHARE = 0.6
-"""Of the chance that the bound may fail, what is left to all that the hypotheses know of; the rest is for what they do
-not."""
+"""Of the chance that the bound or the safe curve may fail, what is left to all that the hypotheses know of; the rest is
+for what they do not."""
 
 SLOWING = 0.02
 """Net deceleration over g from which a train of whose brake nothing is known brakes."""
@@ -115,7 +115,8 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         if rail.mu > SLOWING:
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
         return Findings(Regime.COASTING, free, belief, constant(before.lower), free)
-    ahead = counted_on(config, _borne_out(memory), 1.0 - config.curve_confidence, memory.braking, memory.known)
+    missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
+    ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, least)
