@@ -1,4 +1,10 @@
 # Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
 
 """The package's papers agree with each other and with the tree: manifest, setup, changelog, README, scripts."""
 
@@ -234,7 +240,16 @@ def test_only_bench_imports_its_peers() -> None:
     assert {path.parent.name for path in importing} == {"bench"}
 
 
-HEAD = "# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0\n"
+HEAD = """\
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+"""
+"""As `ament_copyright` knows it."""
 
 
 def test_every_python_file_states_copyright_and_license() -> None:
