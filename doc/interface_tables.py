@@ -18,8 +18,9 @@ from adhesion_node.core.bank.kinds import KINDS
 from adhesion_node.core.bank.learnt import KIND, QUANTITIES, RADIUS
 from adhesion_node.core.setting import Setting, by_group
 from adhesion_node.tools.defaults import all_settings
-from adhesion_node.wire.codecs import Reason
-from adhesion_node.wire.topics import TOPICS, Quality
+from adhesion_node.wire.messages.refused import Reason
+from adhesion_node.wire.topic import Quality
+from adhesion_node.wire.topics import TOPICS
 from sim_node.faults.plan import FAULTS, NONE
 from sim_node.real.plant.scenarios import KMH, SCENARIOS
 from sim_node.real.plant.way import LEVEL

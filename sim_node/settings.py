@@ -12,8 +12,9 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 from adhesion_node.core.setting import Setting, settings_of
-from adhesion_node.wire.telling import TELLING
-from adhesion_node.wire.topics import POSITION, WHEEL_SPEED, Topic
+from adhesion_node.wire.settings.telling import TELLING
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import POSITION, WHEEL_SPEED
 
 from .faults.plan import Plan
 from .real.plant.scenarios import SCENARIOS as REAL

@@ -45,7 +45,8 @@ from start_stop import start
 from adhesion_node.bag import BagReader
 from adhesion_node.core.atp.supervision import Level
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import stamp_ns
+from adhesion_node.wire.messages.parts import stamp_ns
+from adhesion_node.wire.topic import Topic
 
 TOLD_S, RECOVERED_S, PAUSE_S = 10.0, 120.0, 10.0
 """Longest times. A state is valid for 2 s, /clock may stand for 2 s, and this machine may be busy."""
@@ -172,7 +173,7 @@ class Line:
     def processes(self) -> tuple[Process, ...]:
         return self.simulator, self.estimator, self.monitor, self.recorder
 
-    def _receiver(self, topic: topics.Topic) -> Callable[..., None]:
+    def _receiver(self, topic: Topic) -> Callable[..., None]:
         def receive(message: Any, info: Mapping[str, int]) -> None:
             now_s = time.time()
             if stamp := stamp_ns(message.header):  # those of our own floods have none
@@ -214,7 +215,7 @@ class Line:
         self.epoch_s += by_s
         self.simulator.begin("-p", f"start_time_s:={self.epoch_s}")
 
-    def flood(self, topic: topics.Topic, message: Any, seconds: float, rate_hz: float) -> None:
+    def flood(self, topic: Topic, message: Any, seconds: float, rate_hz: float) -> None:
         """Publish one message again and again, at such a rate at most."""
         output, end_s = self.qos.advertise(self.node, topic), time.monotonic() + seconds
         while time.monotonic() < end_s:
@@ -242,7 +243,7 @@ class Line:
             self.clock.publish(topics.CLOCK.build(new, at_ns))
             self.spin(0.02)
 
-    def message(self, topic: topics.Topic) -> Any:
+    def message(self, topic: Topic) -> Any:
         """One without a number in it."""
         from adhesion_node.nodes.ros.types import message_class
 

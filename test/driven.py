@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from adhesion_node.core.physics.train import Array
-from adhesion_node.wire.codecs import ATMOSPHERE_PA
+from adhesion_node.wire.line import ATMOSPHERE_PA
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 from sim_node.real.drive import START_S, Drive
 from sim_node.real.plant.journey import PERIOD_S, Journey

@@ -26,6 +26,7 @@ from adhesion_node.core.physics.train import Array
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
+from adhesion_node.wire.topic import Topic
 from sim_node.faults.plan import Plan, faulty_run, period_of
 from sim_node.train.plant import Truth
 from sim_node.train.scenario import find
@@ -33,7 +34,7 @@ from sim_node.train.sensors import SensorSettings
 
 S = 10**9
 SETTINGS = SensorSettings()
-READERS: dict[topics.Topic, Callable[[Any], Sample]] = {topic: topic.read for topic in topics.ADHESION_INPUTS}
+READERS: dict[Topic, Callable[[Any], Sample]] = {topic: topic.read for topic in topics.ADHESION_INPUTS}
 
 
 class Outcome(NamedTuple):

@@ -17,8 +17,9 @@ from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.nodes.ros import types
 from adhesion_node.nodes.ros.types import new
-from adhesion_node.wire import codecs, curves, results, topics
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire import topics
+from adhesion_node.wire.messages import curves, parts, results
+from adhesion_node.wire.topic import Topic
 from sim_node.train.sensors import SensorMessage
 
 
@@ -27,7 +28,7 @@ def message_class(topic: Topic) -> type[Any]:
 
 
 def header(t_ns: int) -> Any:
-    return codecs.header(new, t_ns)
+    return parts.header(new, t_ns)
 
 
 def message_of(sent: SensorMessage) -> Any:
@@ -63,8 +64,8 @@ def mu_message(mu: float) -> Any:
 
 
 def deceleration_message(t_ns: int, mu: float, mu_std: float) -> Any:
-    along = new("geometry_msgs/msg/Accel", linear=codecs.vector(new, -mu * GRAVITY))
-    spread = codecs.covariance((mu_std * GRAVITY) ** 2)
+    along = new("geometry_msgs/msg/Accel", linear=parts.vector(new, -mu * GRAVITY))
+    spread = parts.covariance((mu_std * GRAVITY) ** 2)
     accel = new("geometry_msgs/msg/AccelWithCovariance", accel=along, covariance=spread)
     return new(topics.DECELERATION.type, header=header(t_ns), accel=accel)
 

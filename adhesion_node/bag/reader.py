@@ -13,7 +13,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
-from ..wire.codecs import Rejected
+from ..wire.messages.refused import Rejected
 from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
 from .metadata import Metadata, read_metadata

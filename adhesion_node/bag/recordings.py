@@ -15,7 +15,7 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from ..wire.codecs import Reason, Rejected
+from ..wire.messages.refused import Reason, Rejected
 from .mcap_file import McapFile, TopicInfo
 from .types import UnknownTypeError, deserialize
 

@@ -18,7 +18,7 @@ from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_typestore
 from rosbags.typesys.store import Typestore
 
-from ..wire.topics import Topic
+from ..wire.topic import Topic
 
 _UNDECODABLE = (SerdeError, struct.error, ValueError, IndexError, KeyError, OverflowError, MemoryError)
 """What the decoders raise on bytes that are not what they seem."""

@@ -30,8 +30,8 @@ from ..core.config import Config
 from ..run.offline import Recorded, messages, predictions
 from ..run.pipeline import Pipeline
 from ..run.results import row_of
-from ..wire.codecs import ATMOSPHERE_PA, NOMINAL
-from ..wire.results import Status
+from ..wire.line import ATMOSPHERE_PA, NOMINAL
+from ..wire.messages.results import Status
 from ..wire.topics import BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS
 from .scene import journey
 from .step import FILLED_SHARE, resident_mb

@@ -30,7 +30,7 @@ from ..nodes.estimator import Estimator
 from ..nodes.ros import qos
 from ..nodes.ros.types import new
 from ..run.pipeline import Pipeline
-from ..wire.codecs import ATMOSPHERE_PA, FRAME
+from ..wire.line import ATMOSPHERE_PA, FRAME
 from ..wire.topics import BRAKE_PRESSURE, POSITION
 from .scene import CRUISE_S, journey
 from .step import CONFIG

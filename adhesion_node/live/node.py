@@ -23,10 +23,10 @@ from ..nodes.ros import qos
 from ..nodes.ros.diagnostics import Diagnostics, Finding, Told
 from ..nodes.ros.params import SettingsNode, declare
 from ..wire import topics
-from ..wire.codecs import Rejected
-from ..wire.results import Statuses
-from ..wire.telling import TELLING
-from ..wire.topics import Frame
+from ..wire.messages.refused import Rejected
+from ..wire.messages.results import Statuses
+from ..wire.settings.telling import TELLING
+from ..wire.topic import Frame, Topic
 from .view import View
 
 PERIOD_S = 0.1
@@ -74,7 +74,7 @@ class Live(SettingsNode):
         ages = {f"age_s.{name}": f"{now_s - at_s:.1f}" for name, at_s in heard.items()}
         return found, {"viewers": str(self.server.viewers), **ages}
 
-    def _inputs(self) -> dict[topics.Topic, Callable[[Any], None]]:
+    def _inputs(self) -> dict[Topic, Callable[[Any], None]]:
         """How what is read of each topic is taken, in the order in which the estimator publishes."""
         view = self.view
         return {
@@ -91,7 +91,7 @@ class Live(SettingsNode):
             topics.ATP_STATUS: self._on_status,
         }
 
-    def _receiver(self, topic: topics.Topic, take: Callable[[Any], None]) -> Callable[[Any], None]:
+    def _receiver(self, topic: Topic, take: Callable[[Any], None]) -> Callable[[Any], None]:
         # Which frame places are to have is a parameter of the estimator, which says so if it is another.
         read = topic._replace(frame=Frame.ANY).read
 

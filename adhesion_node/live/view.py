@@ -24,7 +24,8 @@ from ..report.ahead import SHOWN, ahead
 from ..report.run import IN_WORDS
 from ..web.creep import creep_part
 from ..web.fit import number, numbers, rounded
-from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
+from ..wire.topic import Topic
+from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE
 
 EXPECTED = {
     POSITION: "position",

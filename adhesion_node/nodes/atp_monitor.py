@@ -33,9 +33,10 @@ from adhesion_node.core.atp.supervision import Decision, Level, Severity
 from adhesion_node.core.physics.train import KMH
 from adhesion_node.core.setting import make
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import Line, Rejected
-from adhesion_node.wire.shared_settings import ATP_SETTINGS, Watchdogs
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.settings.shared import ATP_SETTINGS, Watchdogs
+from adhesion_node.wire.topic import Topic
 
 from .ros import qos, runtime
 from .ros.diagnostics import Diagnostics, Finding, Told

@@ -23,7 +23,8 @@ from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.creep.config import Peak
 from adhesion_node.run.creep_pipeline import CreepPipeline
 from adhesion_node.wire import topics
-from adhesion_node.wire.settings import CREEP_SETTINGS, creep_setup_of
+from adhesion_node.wire.settings.nodes import CREEP_SETTINGS
+from adhesion_node.wire.settings.setup import creep_setup_of
 
 from .ros import runtime
 from .ros.diagnostics import Finding

@@ -24,7 +24,8 @@ from adhesion_node.core.estimator import warm_up
 from adhesion_node.core.physics.train import KMH
 from adhesion_node.run.pipeline import BACKWARDS, Pipeline
 from adhesion_node.wire import topics
-from adhesion_node.wire.settings import SETTINGS, setup_of
+from adhesion_node.wire.settings.nodes import SETTINGS
+from adhesion_node.wire.settings.setup import setup_of
 
 from .ros import runtime
 from .ros.diagnostics import Finding

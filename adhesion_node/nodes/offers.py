@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
 
 from ..bag.qos import FOREVER
-from ..wire.topics import Topic
+from ..wire.topic import Topic
 from .ros.qos import PROFILES
 
 

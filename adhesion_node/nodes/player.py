@@ -24,7 +24,8 @@ from rclpy.qos import ReliabilityPolicy
 from ..bag import BagReader, Record
 from ..core.atp.supervision import Severity
 from ..wire import topics
-from ..wire.telling import TELLING
+from ..wire.settings.telling import TELLING
+from ..wire.topic import Topic
 from .offers import as_recorded, expires
 from .ros.diagnostics import Diagnostics, Finding, Told
 from .ros.discovery import Subscribers
@@ -71,7 +72,7 @@ class Replay(SettingsNode):
         self._clock_out = advertise(self, topics.CLOCK)
         self._outputs = {
             source: advertise(
-                self, topics.Topic(target, reader.topics[source]), as_recorded(reader.infos[source].offered, DEPTH)
+                self, Topic(target, reader.topics[source]), as_recorded(reader.infos[source].offered, DEPTH)
             )
             for source, target in selection.items()
         }

@@ -27,8 +27,9 @@ from ..bag.writer import MB
 from ..command.options import help_texts, run_tool
 from ..core.atp.supervision import Severity
 from ..wire import topics
-from ..wire.codecs import stamp_ns
-from ..wire.telling import TELLING
+from ..wire.messages.parts import stamp_ns
+from ..wire.settings.telling import TELLING
+from ..wire.topic import Topic
 from .log_time import SimulatedTime
 from .offers import offered
 from .ros import runtime
@@ -106,14 +107,14 @@ class Recorder(SettingsNode):
         self._simulated = bool(self.get_parameter("use_sim_time").value)
         self._time = SimulatedTime()
         self._last_ns = 0
-        self.heard: Counter[topics.Topic] = Counter()
+        self.heard: Counter[Topic] = Counter()
         self._arrivals = 0
         self._rounds = deque([0] * ROUNDS, maxlen=ROUNDS)
         """Arrivals at the latest rounds."""
         self._oldest_unsaved = 0
         self._pending: list[_Message] = []
         self._given_up = 0
-        self._lost: Counter[topics.Topic] = Counter()
+        self._lost: Counter[Topic] = Counter()
         if self._simulated:
             subscribe(self, topics.CLOCK, self._on_clock)
         for topic in topics.RECORDED:
@@ -171,14 +172,14 @@ class Recorder(SettingsNode):
         }
         return found, {"file": str(self._writer.file), **{name: str(number) for name, number in numbers.items()}}
 
-    def _on_lost(self, topic: topics.Topic, event: Any) -> None:
+    def _on_lost(self, topic: Topic, event: Any) -> None:
         """Count what a publisher could not keep until the recorder took it (see `DEPTH`); a gap may count as one."""
         self._lost[topic] = event.total_count
         self.get_logger().warning(
             f"{topic.name}: messages lost on the way, {event.total_count} at least; was this stopped?"
         )
 
-    def _receiver(self, topic: topics.Topic) -> Callable[..., None]:
+    def _receiver(self, topic: Topic) -> Callable[..., None]:
         """Return the callback of a topic; with its second argument rclpy passes the time stamps of DDS."""
         name = self.resolve_topic_name(topic.name)
 

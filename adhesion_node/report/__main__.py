@@ -35,7 +35,7 @@ from ..core.physics.train import KMH
 from ..run.offline import parameters_of
 from ..run.pipeline import off_track
 from ..run.results import rows_to
-from ..wire.settings import Setup, setup_of
+from ..wire.settings.setup import Setup, setup_of
 from .curves import Subject
 from .estimated import estimate_run
 from .findings import findings

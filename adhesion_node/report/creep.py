@@ -13,7 +13,7 @@ from operator import itemgetter
 from typing import Any
 
 from ..web.creep import creep_part
-from ..wire.results import Status
+from ..wire.messages.results import Status
 from .series import with_key
 from .thinning import evenly, number
 

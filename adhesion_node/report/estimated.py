@@ -21,9 +21,11 @@ from ..run import offline
 from ..run.offline import Recorded
 from ..run.pipeline import Pipeline
 from ..run.results import Write, row_of
-from ..wire.codecs import Line, Rejected
-from ..wire.settings import Setup
-from ..wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH, Frame
+from ..wire.line import Line
+from ..wire.messages.refused import Rejected
+from ..wire.settings.setup import Setup
+from ..wire.topic import Frame
+from ..wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH
 from .findings import listed
 from .predicted import Curves
 from .run import Inputs, Run

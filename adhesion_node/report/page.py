@@ -14,7 +14,7 @@ from html import escape
 from typing import Any
 
 from ..web import as_json, page
-from ..wire.settings import SETTINGS
+from ..wire.settings.nodes import SETTINGS
 from .creep import creep_in_words
 from .curves import Subject, chart_data
 from .events import events

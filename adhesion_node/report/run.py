@@ -22,9 +22,9 @@ from ..core import Regime
 from ..core.physics import braking
 from ..core.physics.train import GRAVITY, Array, Train
 from ..wire import topics
-from ..wire.codecs import NOMINAL, Line
-from ..wire.results import Status
-from ..wire.topics import Topic
+from ..wire.line import NOMINAL, Line
+from ..wire.messages.results import Status
+from ..wire.topic import Topic
 from .ahead import TOLD
 from .creep import CreepCurves, CreepTaken
 from .predicted import Curves

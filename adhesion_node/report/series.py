@@ -22,9 +22,11 @@ from numpy.typing import NDArray
 from ..bag import BagReader, Record
 from ..bag.together import together
 from ..core.physics.train import Array
-from ..wire.codecs import NOMINAL, Line, Rejected, stamp_ns, stamps_ns
-from ..wire.results import Status
-from ..wire.topics import Frame, Topic
+from ..wire.line import NOMINAL, Line
+from ..wire.messages.parts import stamp_ns, stamps_ns
+from ..wire.messages.refused import Rejected
+from ..wire.messages.results import Status
+from ..wire.topic import Frame, Topic
 
 Times = NDArray[np.int64]
 

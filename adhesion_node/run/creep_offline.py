@@ -15,7 +15,9 @@ from typing import Any
 
 from ..bag import BagReader
 from ..command.options import DONE, FAILED, progress, report
-from ..wire.settings import CREEP_SETTINGS, creep_setup_of, given
+from ..wire.settings.given import given
+from ..wire.settings.nodes import CREEP_SETTINGS
+from ..wire.settings.setup import creep_setup_of
 from ..wire.topics import CREEP_INPUTS, WHEEL_SPEED
 from .creep_pipeline import CreepPipeline
 from .offline import feed, messages

@@ -17,7 +17,7 @@ from typing import Any, Generic, NamedTuple, Protocol, Self, TypeVar
 from ..core import Event, Outcome, Sample
 from ..core.intake.outcome import DROPS
 from ..core.intake.pairing import Gate
-from ..wire.topics import Topic
+from ..wire.topic import Topic
 
 _USED = {outcome.name for outcome in Outcome} - {outcome.name for outcome in DROPS}
 

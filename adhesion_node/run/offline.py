@@ -22,9 +22,13 @@ from ..command.options import DONE, FAILED, progress, report
 from ..core import Outcome
 from ..core.intake.samples import PressureSample, Sample
 from ..core.prediction import Prediction
-from ..wire.codecs import NOMINAL, Line, Reason, Rejected
-from ..wire.settings import SEED, SETTINGS, given, setup_of
-from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE, Topic
+from ..wire.line import NOMINAL, Line
+from ..wire.messages.refused import Reason, Rejected
+from ..wire.settings.given import given
+from ..wire.settings.nodes import SEED, SETTINGS
+from ..wire.settings.setup import setup_of
+from ..wire.topic import Topic
+from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE
 from .engine import EstimatorPipeline
 from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader

@@ -12,9 +12,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from ..core import Sample
-from ..wire.codecs import NS, Line, Reason, Rejected
-from ..wire.sensing import USE
-from ..wire.topics import FIX, POSITIONS, Topic
+from ..wire.line import Line
+from ..wire.messages.parts import NS
+from ..wire.messages.refused import Reason, Rejected
+from ..wire.settings.sensing import USE
+from ..wire.topic import Topic
+from ..wire.topics import FIX, POSITIONS
 
 
 class Reader:

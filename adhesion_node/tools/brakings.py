@@ -29,8 +29,9 @@ from ..run import offline
 from ..run.brakings import BRAKING, CELL, CELL_M, brakings
 from ..run.pipeline import Pipeline
 from ..run.rail_map import map_of
-from ..wire.settings import TRAIN_FILE, setup_of
-from ..wire.train_file import read_train
+from ..wire.files.train import read_train
+from ..wire.settings.nodes import TRAIN_FILE
+from ..wire.settings.setup import setup_of
 
 EXAMPLES = (
     "brakings monday tuesday --output brakings.parquet --map rail.parquet",

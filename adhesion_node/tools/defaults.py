@@ -19,7 +19,7 @@ from pathlib import Path
 from sim_node import settings as simulated
 
 from ..core.setting import Setting, Value, by_group
-from ..wire import settings
+from ..wire.settings.nodes import OF_NODES
 
 FILE = Path(__file__).resolve().parent.parent / "nodes" / "defaults.yaml"
 
@@ -33,7 +33,7 @@ HEAD = """\
 
 def all_settings() -> Mapping[str, Sequence[Setting]]:
     """Return the settings of every node and simulator by the node's name."""
-    return {**settings.OF_NODES, **simulated.OF_NODES}
+    return {**OF_NODES, **simulated.OF_NODES}
 
 
 def text() -> str:

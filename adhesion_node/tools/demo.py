@@ -49,8 +49,8 @@ from ..report.table import table
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.score import Truth
-from ..wire.codecs import NS
-from ..wire.settings import setup_of
+from ..wire.messages.parts import NS
+from ..wire.settings.setup import setup_of
 from ..wire.topics import ATP_STATUS
 from .line import UNASKED, Pace, Task, executor_of_line, parameters, play
 

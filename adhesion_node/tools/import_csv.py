@@ -19,7 +19,7 @@ from typing import Any
 from ..bag import BagWriter, encode
 from ..command.options import DONE, FAILED, help_texts, json_option, progress, report, run_tool
 from ..wire import topics
-from ..wire.topics import Topic
+from ..wire.topic import Topic
 from .log.checks import odd
 from .log.format import Format
 from .log.options import add_options, format_of

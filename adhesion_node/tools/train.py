@@ -36,8 +36,10 @@ from ..core.physics import braking
 from ..core.physics.adhesion import DRY
 from ..core.physics.train import KMH
 from ..run import offline
-from ..wire.settings import SETTINGS, given, setup_of
-from ..wire.train_file import KNOWN_TO, TrainFile, read_train
+from ..wire.files.train import KNOWN_TO, TrainFile, read_train
+from ..wire.settings.given import given
+from ..wire.settings.nodes import SETTINGS
+from ..wire.settings.setup import setup_of
 from . import train_found
 
 EXAMPLES = (

@@ -18,7 +18,8 @@ from ..core import Config, PositionSample, PressureSample, SpeedSample
 from ..core.physics.train import GRAVITY, Array
 from ..run.offline import Recorded
 from ..run.reader import Reader
-from ..wire.codecs import Line, Rejected
+from ..wire.line import Line
+from ..wire.messages.refused import Rejected
 from ..wire.topics import ADHESION_INPUTS
 
 COAST_S, BRAKE_S = 20.0, 6.0

@@ -6,4 +6,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Topics, messages and settings: how the outside speaks to the core, without ROS."""
+"""How the outside speaks to the core, without ROS: the table of topics, the line, and rooms for the rest."""

@@ -15,7 +15,7 @@ it moves, twist and deceleration, is said in its own frame, x forward.
 
 from typing import Any
 
-from .codecs import Line
+from .line import Line
 
 
 def placed(message: Any, line: Line) -> Any:

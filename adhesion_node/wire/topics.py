@@ -11,77 +11,9 @@
 Pure data, no ROS. Names are relative, so that namespaces separate trains.
 """
 
-from enum import Enum
-from typing import Any, NamedTuple
-
-from . import curves, positions, results, sensors
-from .codecs import NOMINAL, Codec, Line, New, Reason, Rejected
-
-
-class Role(Enum):
-    """What a topic is to the package."""
-
-    SENSOR = "measured"
-    TRUTH = "what a simulator knows"
-    ADHESION = "found out by the estimator; its writers take a Prediction"
-    CREEP = "found out by the creep estimator; its writers take a CreepEstimate"
-    STATUS = "how things stand"
-    COMMAND = "what is asked of the package"
-    CLOCK = "time"
-    OTHER = "not ours"
-
-
-class Quality(Enum):
-    """Quality of service in words; nodes/ros/qos.py has the profiles."""
-
-    SENSOR = "reliable; subscribed best effort, so that every publisher matches"
-    RESULT = "reliable"
-    EXPIRING = "reliable, transient local: who comes later gets the last one, unless it is too old"
-
-
-class Frame(Enum):
-    """Which frame_id a reader insists on."""
-
-    ANY = "none: it says how the train moves, or what it feels"
-    LINE = "that of the parameter `frame`: it says where"
-
-
-class Topic(NamedTuple):
-    """A topic: its relative name, its message type in ROS 2 spelling, and how its messages are carried and coded."""
-
-    name: str
-    type: str
-    role: Role = Role.OTHER
-    quality: Quality = Quality.SENSOR
-    frame: Frame = Frame.ANY
-    codec: Codec | None = None
-    meaning: str = ""
-    """For the documentation."""
-
-    @property
-    def latched(self) -> bool:
-        """Whether who subscribes late gets the last message."""
-        return self.quality is Quality.EXPIRING
-
-    def read(self, message: Any, line: Line = NOMINAL) -> Any:
-        """Read and check a message; raises Rejected with reason and remedy."""
-        if self.frame is Frame.LINE and message.header.frame_id != line.frame:
-            raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}, frame = {line.frame!r}")
-        return self._codec.read(message, line)
-
-    def together(self, message: Any, line: Line = NOMINAL) -> Any:
-        """Read one message that stands for many, whatever its frame; raises Rejected where that refuses them all."""
-        return self._codec.together and self._codec.together(message, line)
-
-    def build(self, new: New, *values: Any) -> Any:
-        """Build the message of what the codec's writer takes; None where there is nothing to publish."""
-        fields = self._codec.write(new, *values)
-        return None if fields is None else new(self.type, **fields)
-
-    @property
-    def _codec(self) -> Codec:
-        assert self.codec is not None, f"{self.name}: {self.role.value}"
-        return self.codec
+from .messages import curves, positions, results, sensors
+from .messages.codec import Codec
+from .topic import Frame, Quality, Role, Topic
 
 
 def _sensor(name: str, type_name: str, codec: Codec, meaning: str, frame: Frame = Frame.ANY) -> Topic:

@@ -24,7 +24,7 @@ from scipy.spatial import cKDTree
 
 from ..core.physics.track import Grade
 from ..core.physics.train import Array
-from .codecs import Reason, Rejected
+from .messages.refused import Reason, Rejected
 
 PIECE_M = 100.0
 """Length of the longest piece."""

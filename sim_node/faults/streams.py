@@ -18,7 +18,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED
 
 from ..train.plant import Truth
 from ..train.sensors import ATMOSPHERE_PA, SensorMessage, Tick

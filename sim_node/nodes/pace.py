@@ -28,8 +28,9 @@ from adhesion_node.nodes.ros.discovery import PERIOD_S, Subscribers
 from adhesion_node.nodes.ros.params import SettingsNode, declare
 from adhesion_node.nodes.ros.qos import advertise
 from adhesion_node.nodes.ros.types import new
-from adhesion_node.wire.codecs import NS
-from adhesion_node.wire.topics import CLOCK, Topic
+from adhesion_node.wire.messages.parts import NS
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import CLOCK
 
 MAX_BURST = 10
 """Samples that one timer callback publishes at most, so that the node stays responsive while it catches up."""

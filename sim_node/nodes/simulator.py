@@ -26,7 +26,8 @@ from adhesion_node.core.setting import make
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.nodes.ros.diagnostics import Finding, Told
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import NS
+from adhesion_node.wire.messages.parts import NS
+from adhesion_node.wire.topic import Topic
 
 from ..faults.plan import FAULTS, NONE, Plan, active, faulty_run, period_of, told
 from ..real.drive import drive
@@ -64,7 +65,7 @@ class Simulator(RunNode):
         run, there, period_s = self._real_run() if self._real else self._run_of_paper()
         self.begin(run, (*topics.TRUTH, *there), period_s, paced=paced)
 
-    def _run_of_paper(self) -> tuple[Iterator[Tick], tuple[topics.Topic, ...], float]:
+    def _run_of_paper(self) -> tuple[Iterator[Tick], tuple[Topic, ...], float]:
         """The run, its topics and its period."""
         settings, plan = make(SensorSettings, self.values), make(Plan, self.values)
         self._fault = told(plan)
@@ -75,7 +76,7 @@ class Simulator(RunNode):
         there = (topics.BRAKE_PRESSURE, *(topic for topic, std in optional if std > 0), topics.POSITION)
         return run, there, period_s
 
-    def _real_run(self) -> tuple[Iterator[Tick], tuple[topics.Topic, ...], float]:
+    def _real_run(self) -> tuple[Iterator[Tick], tuple[Topic, ...], float]:
         """The same of a real train; the period is that of truth and messages together."""
         if self.values["fault"] != NONE:
             raise ValueError(f"fault = {self.values['fault']!r}: a real train has its faults by `sensors`: give none")

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adhesion_node.wire.codecs import NS
+from adhesion_node.wire.messages.parts import NS
 
 from ..train.sensors import SensorMessage
 from .plant.journey import Journey

@@ -16,7 +16,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from adhesion_node.core.physics.train import Array
-from adhesion_node.wire.codecs import NS
+from adhesion_node.wire.messages.parts import NS
 
 from ..train.plant import ADHESION_LIMITED, BRAKE_LIMITED, COASTING, Truth
 from ..train.sensors import SensorMessage, Tick

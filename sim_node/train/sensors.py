@@ -19,8 +19,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from adhesion_node.core.setting import check_settings, setting
-from adhesion_node.wire.codecs import FRAME, New
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, WHEEL_SPEED, Topic
+from adhesion_node.wire.line import FRAME
+from adhesion_node.wire.messages.codec import New
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, WHEEL_SPEED
 
 from .plant import ADHESION_LIMITED, Truth
 

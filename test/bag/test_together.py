@@ -26,10 +26,11 @@ from adhesion_node.bag.types import deserialize, encode, new, serialize, typesto
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import Line, Rejected
-from adhesion_node.wire.curves import write_curve
-from adhesion_node.wire.results import Status
-from adhesion_node.wire.topics import Frame, Topic
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.curves import write_curve
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.messages.results import Status
+from adhesion_node.wire.topic import Frame, Topic
 
 STAMP_NS = 1_700_000_000_123_456_789
 CURVE = braking.curve(CRH3, 80.0, 0.07)

@@ -26,7 +26,7 @@ from adhesion_node.core import Config
 from adhesion_node.core.intake import stream
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, Sample, SpeedSample, WheelSample
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire.codecs import Rejected
+from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9

@@ -21,6 +21,7 @@ from test_faults_estimator import MakeLine, assert_published_is_sound, is_stale,
 
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
+from adhesion_node.wire.topic import Topic
 
 __all__ = ["make_line"]
 
@@ -127,7 +128,7 @@ def test_who_comes_late_gets_no_old_curve(make_line: MakeLine) -> None:
     line.hear_all()
     expired = time.monotonic() + 0.2
     line.spin_until(line.executor, lambda: time.monotonic() > expired)
-    late: dict[topics.Topic, list[Any]] = {topics.BRAKING_CURVE: [], topics.BRAKING_CURVE_NOMINAL: []}
+    late: dict[Topic, list[Any]] = {topics.BRAKING_CURVE: [], topics.BRAKING_CURVE_NOMINAL: []}
     for topic, heard in late.items():
         line.driver.create_subscription(messages.message_class(topic), topic.name, heard.append, qos.LATCHED)
     line.spin_until(line.executor, lambda: late[topics.BRAKING_CURVE_NOMINAL])

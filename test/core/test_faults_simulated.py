@@ -23,8 +23,9 @@ from rclpy.parameter import Parameter
 from rclpy.publisher import Publisher
 
 from adhesion_node.core.physics.train import GRAVITY
-from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.topic import Topic
 from sim_node.faults.plan import FAULTS, Plan, faulty_run, period_of
 from sim_node.faults.streams import RATES_HZ
 from sim_node.nodes.simulator import Simulator
@@ -44,7 +45,7 @@ def ticks(fault: str, seed: int = 1, start_s: float = 30.0, **dose: float) -> li
     return list(faulty_run(plan, find("tunnel_entry"), period_of(plan, 0.1), seed, SETTINGS))
 
 
-def sent(run: Sequence[Tick], topic: topics.Topic = topics.POSITION) -> list[SensorMessage]:
+def sent(run: Sequence[Tick], topic: Topic = topics.POSITION) -> list[SensorMessage]:
     return [message for _, messages in run for message in messages if message.topic == topic]
 
 
@@ -57,7 +58,7 @@ def usable(messages: Sequence[SensorMessage]) -> list[SensorMessage]:
     for message in messages:
         try:
             topics.POSITION.read(message_of(message))
-        except reading.Rejected:
+        except Rejected:
             continue
         kept.append(message)
     return kept

@@ -38,6 +38,7 @@ from adhesion_node.live.node import Live
 from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
+from adhesion_node.wire.topic import Topic
 
 aiohttp = pytest.importorskip("aiohttp", reason="the extra `live` is not installed")
 viewer, guard, server = (
@@ -113,7 +114,7 @@ def test_a_message_that_cannot_be_shown_is_said_and_shown_nowhere(
 
 @pytest.mark.parametrize("topic", [topics.FIX, topics.ODOMETRY], ids=lambda topic: topic.name)
 def test_every_source_of_the_position_is_heard(
-    live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil, topic: topics.Topic
+    live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil, topic: Topic
 ) -> None:
     node = Node("receiver", context=context)
     executor.add_node(node)

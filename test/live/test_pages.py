@@ -23,7 +23,8 @@ from adhesion_node.core.atp.supervision import read
 from adhesion_node.core.physics.braking import curve
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.live.view import View
-from adhesion_node.wire.topics import ATP_STATUS, BRAKING_CURVE, MU, POSITION, SPEED, STATE, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import ATP_STATUS, BRAKING_CURVE, MU, POSITION, SPEED, STATE
 
 browser = pytest.importorskip("browser", reason="playwright, of the extra `test`, is not installed")
 server = pytest.importorskip("adhesion_node.live.server", reason="the extra `live` is not installed")

@@ -32,7 +32,7 @@ from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import stamp_ns
+from adhesion_node.wire.messages.parts import stamp_ns
 
 NAMESPACE = "/atp_test"
 REFUSED = "/atp_test_refused"

@@ -31,6 +31,7 @@ from adhesion_node.nodes.creep_estimator import PARAMETERS, CreepEstimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.run.creep_pipeline import CreepPipeline
 from adhesion_node.wire import topics
+from adhesion_node.wire.topic import Topic
 from sim_node.slip import plant as slip
 from sim_node.slip.scenario import DRY, WET, SlipScenario, find
 
@@ -49,7 +50,7 @@ class Line:
     spin_until: SpinUntil
     estimator: CreepEstimator
     driver: Node
-    heard: dict[topics.Topic, list[Any]] = field(default_factory=lambda: {topic: [] for topic in OUTPUTS})
+    heard: dict[Topic, list[Any]] = field(default_factory=lambda: {topic: [] for topic in OUTPUTS})
 
     def __post_init__(self) -> None:
         self.outputs = {topic: qos.advertise(self.driver, topic, qos.SENSOR_PUBLISHER) for topic in INPUTS}
@@ -63,7 +64,7 @@ class Line:
         listening = all(output.get_subscription_count() for output in self.outputs.values())
         return listening and all(self.estimator.count_subscribers(topic.name) for topic in OUTPUTS)
 
-    def send(self, topic: topics.Topic, message: Any) -> None:
+    def send(self, topic: Topic, message: Any) -> None:
         before = self.estimator.heard[topic]
         self.outputs[topic].publish(message)
         self.spin_until(self.executor, lambda: self.estimator.heard[topic] > before)
@@ -163,7 +164,7 @@ def test_bad_messages_are_counted_said_and_change_nothing(line: Line, readings: 
     assert any("message refused: traction force x = 1e+08: force.x is in N, within +-1e+07" in text for text in said)
 
 
-def bad_messages(t_ns: int) -> Iterator[tuple[topics.Topic, Any]]:
+def bad_messages(t_ns: int) -> Iterator[tuple[Topic, Any]]:
     yield topics.TRACTION_FORCE, traction_force(t_ns, float("nan"))
     yield topics.TRACTION_FORCE, traction_force(t_ns, 1e8)
     yield topics.WHEEL_SPEED, wheel_speed(t_ns, ())

@@ -34,8 +34,8 @@ from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import stamp_ns
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.messages.parts import stamp_ns
+from adhesion_node.wire.topic import Topic
 from sim_node.nodes.simulator import Simulator
 from sim_node.nodes.slip_simulator import SlipSimulator
 

@@ -29,9 +29,10 @@ from adhesion_node.core.atp.supervision import Level
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.estimator import Estimator
-from adhesion_node.wire import codecs, topics
-from adhesion_node.wire.codecs import DOWN
+from adhesion_node.wire import topics
 from adhesion_node.wire.frames import placed
+from adhesion_node.wire.line import DOWN
+from adhesion_node.wire.line import Line as OfTrack
 
 MakeLine = Callable[..., Line]
 TRACK = "grade 1000 5000 -20; tunnel 2000 3000"
@@ -91,7 +92,7 @@ def test_a_falling_chainage_gives_the_same_numbers_and_goes_out_as_it_came(make_
 def test_results_are_read_along_the_run_or_as_chainage(make_line: MakeLine) -> None:
     line = make_line(direction=DOWN)
     play(line, -1)
-    estimate, falling = line.estimator.latest, codecs.Line(direction=DOWN)
+    estimate, falling = line.estimator.latest, OfTrack(direction=DOWN)
     state, curve = line.heard[topics.STATE][-1], line.heard[topics.BRAKING_CURVE][-1]
     assert topics.STATE.read(state, falling).position_m == estimate.position_m
     assert topics.STATE.read(state).position_m == -estimate.position_m
@@ -104,7 +105,7 @@ def test_results_are_read_along_the_run_or_as_chainage(make_line: MakeLine) -> N
 def test_the_curve_of_a_train_that_stands_is_read_in_either_direction() -> None:
     standing = BrakingCurve(np.zeros(9), np.zeros(9), np.full(9, 0.5), np.zeros(9))
     for direction in ("up", DOWN):
-        line = codecs.Line(direction=direction)
+        line = OfTrack(direction=direction)
         read = topics.BRAKING_CURVE.read(placed(messages.curve_message(5, standing, 700.0), line), line)
         assert (read.position_m, read.sign) == (700.0, 1)
         assert topics.BRAKING_CURVE.read(placed(messages.curve_message(5, standing, 700.0), line)).sign == line.sign

@@ -35,8 +35,9 @@ from adhesion_node.nodes.estimator import PARAMETERS, Estimator
 from adhesion_node.nodes.ros import qos, types
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import ATMOSPHERE_PA
-from adhesion_node.wire.settings import setup_of
+from adhesion_node.wire.line import ATMOSPHERE_PA
+from adhesion_node.wire.settings.setup import setup_of
+from adhesion_node.wire.topic import Topic
 from sim_node.train import scenario
 from sim_node.train.plant import Truth
 from sim_node.train.run import run
@@ -59,7 +60,7 @@ class Line:
     spin_until: SpinUntil
     estimator: Estimator
     driver: Node
-    heard: dict[topics.Topic, list[Any]] = field(default_factory=dict)
+    heard: dict[Topic, list[Any]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.outputs = {topic: qos.advertise(self.driver, topic) for topic in self.estimator.inputs}
@@ -74,7 +75,7 @@ class Line:
         listening = all(output.get_subscription_count() for output in self.outputs.values())
         return listening and all(self.estimator.count_subscribers(topic.name) for topic in self.heard)
 
-    def send(self, topic: topics.Topic, message: Any) -> None:
+    def send(self, topic: Topic, message: Any) -> None:
         before = self.estimator.heard[topic]
         self.outputs[topic].publish(message)
         self.spin_until(self.executor, lambda: self.estimator.heard[topic] > before)

@@ -28,7 +28,7 @@ from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import NOMINAL
+from adhesion_node.wire.line import NOMINAL
 from sim_node.train.sensors import Tick
 
 

@@ -30,7 +30,7 @@ from adhesion_node.nodes.creep_estimator import CreepEstimator
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.topic import Topic
 
 S = 10**9
 QUICK = {"diagnostics_period_s": 0.1}

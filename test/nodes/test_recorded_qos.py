@@ -32,7 +32,8 @@ from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.nodes.ros.qos import EXPIRING, LATCHED, SENSOR_SUBSCRIPTION, subscribe
 from adhesion_node.tools.recover import recover
-from adhesion_node.wire.topics import BRAKING_CURVE, POSITION, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKING_CURVE, POSITION
 
 S = 10**9
 

@@ -36,6 +36,7 @@ from adhesion_node.bag import BagReader
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.nodes.ros.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise, subscribe
+from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import (
     BRAKING_CURVE,
     BRAKING_CURVE_NOMINAL,
@@ -47,7 +48,6 @@ from adhesion_node.wire.topics import (
     STATE,
     TRUTH,
     TRUTH_MU,
-    Topic,
 )
 
 S = 10**9

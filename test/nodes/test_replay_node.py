@@ -37,7 +37,8 @@ from adhesion_node.nodes import player, replay
 from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.ros import discovery
 from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, subscribe
-from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU
 
 S = 10**9
 UNLIMITED = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)

@@ -33,7 +33,7 @@ from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
-from adhesion_node.wire.curves import Target
+from adhesion_node.wire.messages.curves import Target
 
 
 def given(**values: Any) -> list[Parameter]:

@@ -30,7 +30,7 @@ from std_msgs.msg import Float64
 from adhesion_node.command.options import BAD_INPUT, DONE, FAILED
 from adhesion_node.command.signals import stop_on_signals
 from adhesion_node.nodes.ros import runtime
-from adhesion_node.wire.parameter_file import sections, unheeded
+from adhesion_node.wire.files.parameters import sections, unheeded
 
 PROGRAM = """
 import gc, os, sys

@@ -39,8 +39,10 @@ from adhesion_node.tools.log.checks import odd
 from adhesion_node.tools.log.format import OPTIONAL, Format
 from adhesion_node.tools.log.text import Refusal
 from adhesion_node.tools.log.whole import read_log
-from adhesion_node.wire import parameter_file
-from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
+from adhesion_node.wire.files import parameters
+from adhesion_node.wire.settings.given import parse_setting
+from adhesion_node.wire.settings.nodes import SETTINGS
+from adhesion_node.wire.settings.setup import Setup, setup_of
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
@@ -290,7 +292,7 @@ def parameters_in(content: bytes) -> dict[str, Any] | None:
         path = Path(folder, "params.yaml")
         path.write_bytes(content)
         with refusals_say_why():
-            values = parameter_file.read(str(path), "estimator")
+            values = parameters.read(str(path), "estimator")
             setup_of(values)
             return values
     return None

@@ -36,7 +36,8 @@ from adhesion_node.core.methods.protocol import MethodWindow
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire.codecs import FRAME, MAX_ABSOLUTE_PA, Line, Reason, Rejected
+from adhesion_node.wire.line import FRAME, MAX_ABSOLUTE_PA, Line
+from adhesion_node.wire.messages.refused import Reason, Rejected
 from adhesion_node.wire.topics import POSITIONS, SENSORS
 from adhesion_node.wire.track_line import line_of
 

@@ -23,7 +23,7 @@ from test_diagnostics import NODES
 from test_docs import documented, section
 from test_package import console_scripts, setup_arguments
 
-from adhesion_node.wire.telling import Telling
+from adhesion_node.wire.settings.telling import Telling
 
 LINE, ESTIMATOR = ROOT / "launch" / "line.launch.py", ROOT / "launch" / "estimator.launch.xml"
 

@@ -33,6 +33,7 @@ from adhesion_node.report.findings import distances, true_way
 from adhesion_node.report.run import Band, Run, distance_to_target, read_run
 from adhesion_node.report.series import NONE
 from adhesion_node.report.table import NO_ROWS, ROWS, table
+from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,
     BRAKING_CURVE,
@@ -44,7 +45,6 @@ from adhesion_node.wire.topics import (
     STATE,
     TRUTH_MU,
     TRUTH_STATE,
-    Topic,
 )
 
 S = 10**9

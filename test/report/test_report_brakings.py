@@ -37,7 +37,7 @@ from adhesion_node.run import offline
 from adhesion_node.run.brakings import brakings as of_predictions
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.run.score import Truth
-from adhesion_node.wire.settings import setup_of
+from adhesion_node.wire.settings.setup import setup_of
 from adhesion_node.wire.topics import (
     ATP_STATUS,
     BRAKE_PRESSURE,

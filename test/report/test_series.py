@@ -24,7 +24,8 @@ from std_msgs.msg import Float64
 from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core.atp.received import TrainState
 from adhesion_node.report.series import Series, read_series, read_status
-from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE
 
 S = 10**9
 

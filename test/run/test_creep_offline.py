@@ -32,6 +32,7 @@ from adhesion_node.nodes import replay
 from adhesion_node.nodes.creep_estimator import CreepEstimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
+from adhesion_node.wire.topic import Topic
 from sim_node.slip import plant as slip
 from sim_node.slip.scenario import find
 
@@ -39,9 +40,9 @@ SAMPLES = 380
 """At 20 Hz: up to the peak of the dry rail."""
 
 
-def recorded(count: int = SAMPLES) -> list[tuple[topics.Topic, int, Any]]:
+def recorded(count: int = SAMPLES) -> list[tuple[Topic, int, Any]]:
     """The sensor messages of a pull, with two that must not be used."""
-    stream: list[tuple[topics.Topic, int, Any]] = []
+    stream: list[tuple[Topic, int, Any]] = []
     for _, measured in islice(slip.run(find("creep_dry"), 0.05, 1), count):
         stream += [
             (topics.SPEED, measured.t_ns, messages.speed(measured.t_ns, measured.speed_mps, 0.003)),
@@ -52,7 +53,7 @@ def recorded(count: int = SAMPLES) -> list[tuple[topics.Topic, int, Any]]:
     return [*stream, (topics.TRACTION_FORCE, late, traction_force(late, 1e9)), (*stream[-1][:1], late, stream[-1][2])]
 
 
-def write(folder: Path, stream: list[tuple[topics.Topic, int, Any]], *, position: bool = False) -> Path:
+def write(folder: Path, stream: list[tuple[Topic, int, Any]], *, position: bool = False) -> Path:
     with BagWriter(folder) as writer:
         for topic, t_ns, message in stream:
             writer.write(f"/{topic.name}", topic.type, bytes(serialize_message(message)), t_ns)
@@ -99,7 +100,7 @@ def test_live_and_offline_give_one_digest(
         executor.add_node(each)
     spin_until(executor, lambda: all(output.get_subscription_count() for output in outputs.values()))
 
-    def send(topic: topics.Topic, message: Any) -> None:
+    def send(topic: Topic, message: Any) -> None:
         before = node.heard.total()
         outputs[topic].publish(message)
         spin_until(executor, lambda: node.heard.total() > before)

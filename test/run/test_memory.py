@@ -19,7 +19,8 @@ import numpy as np
 from adhesion_node.core import Config
 from adhesion_node.run.offline import Recorded, predictions
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.wire.codecs import ATMOSPHERE_PA, NOMINAL, plain
+from adhesion_node.wire.line import ATMOSPHERE_PA, NOMINAL
+from adhesion_node.wire.messages.codec import plain
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9

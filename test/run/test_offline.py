@@ -29,8 +29,9 @@ from adhesion_node.bag.writer import file_name
 from adhesion_node.command import options as cli
 from adhesion_node.core import Config, Estimate, Measurement, finish, init, step
 from adhesion_node.nodes import replay
-from adhesion_node.wire.settings import setup_of
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, TRUTH_MU, TRUTH_STATE, Topic
+from adhesion_node.wire.settings.setup import setup_of
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, TRUTH_MU, TRUTH_STATE
 from sim_node.train.plant import Truth
 from sim_node.train.run import run
 from sim_node.train.scenario import find

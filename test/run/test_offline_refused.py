@@ -30,7 +30,8 @@ from test_offline import (
 
 from adhesion_node.bag import deserialize, serialize
 from adhesion_node.nodes import replay
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 __all__ = ["bag", "offline"]
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 from test_offline import FAST, FAST_CONFIG, FAST_SETTINGS, Offline, bag, offline, samples, straight
 
-from adhesion_node.wire.settings import setup_of
+from adhesion_node.wire.settings.setup import setup_of
 
 __all__ = ["bag", "offline"]
 

@@ -28,18 +28,12 @@ from adhesion_node.run.offline import replay as replayed
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.run.reader import Reader
 from adhesion_node.run.score import Truth
-from adhesion_node.wire.codecs import Line, Rejected, plain
-from adhesion_node.wire.settings import setup_of
-from adhesion_node.wire.topics import (
-    ADHESION_INPUTS,
-    BRAKE_PRESSURE,
-    CREEP_INPUTS,
-    FIX,
-    ODOMETRY,
-    POSITION,
-    SPEED,
-    Topic,
-)
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.codec import plain
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.settings.setup import setup_of
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import ADHESION_INPUTS, BRAKE_PRESSURE, CREEP_INPUTS, FIX, ODOMETRY, POSITION, SPEED
 
 GEOD = Geod(ellps="WGS84")
 STEP_M = 50.0

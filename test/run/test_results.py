@@ -28,7 +28,7 @@ from adhesion_node.run import offline
 from adhesion_node.run.offline import Recorded
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.run.results import COLUMNS, LEARNT
-from adhesion_node.wire.codecs import NOMINAL
+from adhesion_node.wire.line import NOMINAL
 
 
 @pytest.fixture(scope="module")

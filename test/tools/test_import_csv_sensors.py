@@ -23,8 +23,9 @@ from test_import_csv import Import, importing
 from adhesion_node.bag import BagReader
 from adhesion_node.core.intake.samples import DemandSample, ImuSample, SpeedSample, WheelSample
 from adhesion_node.nodes import replay
-from adhesion_node.wire.codecs import Line
-from adhesion_node.wire.topics import BRAKE_DEMAND, FIX, IMU, POSITION, SPEED, WHEEL_SPEED, Topic
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_DEMAND, FIX, IMU, POSITION, SPEED, WHEEL_SPEED
 from adhesion_node.wire.track_line import line_of
 
 __all__ = ["importing"]

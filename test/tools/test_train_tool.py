@@ -21,8 +21,8 @@ from oracles import G
 
 from adhesion_node.bag import BagWriter
 from adhesion_node.tools import train
+from adhesion_node.wire.files.train import SHIPPED, read_train
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
-from adhesion_node.wire.train_file import SHIPPED, read_train
 
 Told = tuple[int, str, str]
 

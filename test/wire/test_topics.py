@@ -26,9 +26,12 @@ from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.nodes.ros import types
-from adhesion_node.wire.codecs import ATMOSPHERE_PA, Line, Rejected, plain
-from adhesion_node.wire.curves import Target
-from adhesion_node.wire.results import Status
+from adhesion_node.wire.line import ATMOSPHERE_PA, Line
+from adhesion_node.wire.messages.codec import plain
+from adhesion_node.wire.messages.curves import Target
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.messages.results import Status
+from adhesion_node.wire.topic import Role, Topic
 from adhesion_node.wire.topics import (
     ATP_TARGET,
     BRAKE_DEMAND,
@@ -44,8 +47,6 @@ from adhesion_node.wire.topics import (
     TRUTH_MU,
     TRUTH_STATE,
     WHEEL_SPEED,
-    Role,
-    Topic,
 )
 from adhesion_node.wire.track_line import line_of
 

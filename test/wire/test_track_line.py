@@ -19,7 +19,7 @@ import pytest
 from pyproj import Geod
 
 from adhesion_node.core.physics.train import Array
-from adhesion_node.wire.codecs import Rejected
+from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.track_line import TrackLine, line_of
 
 GEOD = Geod(ellps="WGS84")

@@ -18,10 +18,11 @@ from rclpy.node import Node
 
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.setting import make
-from adhesion_node.wire.codecs import TRAIN
-from adhesion_node.wire.results import Status
-from adhesion_node.wire.telling import Telling
-from adhesion_node.wire.topics import DIAGNOSTICS, Topic
+from adhesion_node.wire.line import TRAIN
+from adhesion_node.wire.messages.results import Status
+from adhesion_node.wire.settings.telling import Telling
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import DIAGNOSTICS
 
 from . import qos
 from .types import new

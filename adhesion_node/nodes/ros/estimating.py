@@ -24,10 +24,12 @@ from adhesion_node.core.setting import Setting
 from adhesion_node.run.engine import EstimatorPipeline
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import NS, Line, Rejected
 from adhesion_node.wire.frames import placed
-from adhesion_node.wire.settings import preset
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.parts import NS
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.settings.setup import preset
+from adhesion_node.wire.topic import Topic
 
 from . import qos
 from .diagnostics import Diagnostics, Finding, Told

@@ -19,8 +19,9 @@ from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import Line, Reason, Rejected
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.refused import Reason, Rejected
+from adhesion_node.wire.topic import Topic
 
 from . import qos
 from .diagnostics import Finding

@@ -19,7 +19,7 @@ from rclpy.lifecycle import LifecycleState, TransitionCallbackReturn
 from rclpy.lifecycle.node import LifecycleNodeMixin
 
 from adhesion_node.core.atp.supervision import Severity
-from adhesion_node.wire.shared_settings import AUTOSTART
+from adhesion_node.wire.settings.shared import AUTOSTART
 
 from .diagnostics import Finding, Told
 from .params import SettingsNode

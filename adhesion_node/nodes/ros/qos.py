@@ -22,7 +22,7 @@ from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPo
 from rclpy.qos_overriding_options import InvalidQosOverridesError, QoSOverridingOptions
 from rclpy.subscription import Subscription
 
-from adhesion_node.wire.topics import Quality, Topic
+from adhesion_node.wire.topic import Quality, Topic
 
 from .qos_events import Tell, of_publisher, of_subscription
 from .types import message_class

@@ -32,7 +32,7 @@ from adhesion_node.command.signals import StopRequest, stop_on_signals
 
 from ...command.options import BAD_INPUT, DONE, FAILED, complete, help_texts, version_option
 from ...core.setting import Setting, by_group
-from ...wire.parameter_file import unheeded
+from ...wire.files.parameters import unheeded
 
 POLL_S = 0.1
 """Longest time until a signal is seen: no signal interrupts rclpy's wait."""

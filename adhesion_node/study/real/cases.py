@@ -26,7 +26,7 @@ from sim_node.real.sensors.fitted import FITTED
 from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
-from ...wire.codecs import NOMINAL, Line
+from ...wire.line import NOMINAL, Line
 from ...wire.track_line import TrackLine, line_of
 from . import point_mass
 from .truth import USED_S

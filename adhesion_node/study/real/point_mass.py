@@ -20,7 +20,7 @@ from sim_node.train.run import run
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings, messages_of
 
-from ...wire.codecs import NS
+from ...wire.messages.parts import NS
 
 SCENARIO = replace(find("constant_adhesion"), end_speed_mps=0.0, end_s=400.0)
 """Adhesion of 0.07 from 300 km/h to the standstill."""

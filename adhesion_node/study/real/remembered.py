@@ -30,7 +30,7 @@ from ...core.physics.train import Array
 from ...run.brakings import CELL_M, brakings
 from ...run.pipeline import Pipeline
 from ...run.rail_map import map_of
-from ...wire.rail_map_file import map_of_rows
+from ...wire.files.rail_map import map_of_rows
 from ..trial.estimators import through
 from ..trial.text import Column, lines
 from ..trial.trials import length_m

@@ -23,7 +23,7 @@ from ...command.running import Arrays, Running, run_all
 from ...core import Config
 from ...core.physics.train import GRAVITY, Array
 from ...run.pipeline import Pipeline
-from ...wire.codecs import NOMINAL, Line
+from ...wire.line import NOMINAL, Line
 from ...wire.topics import POSITION
 from ..trial.estimators import LaneResult, through
 from ..trial.trials import DROP, Rows, length_m

@@ -20,8 +20,10 @@ from ...core.atp.config import SupervisionConfig
 from ...core.atp.monitor import TICKS, Event, Part, Refused
 from ...core.atp.received import NS_PER_S, StampedCurve, TrainState
 from ...core.physics.braking import BrakingCurve
-from ...wire.codecs import NOMINAL, Rejected, plain
-from ...wire.curves import read_curve, write_curve
+from ...wire.line import NOMINAL
+from ...wire.messages.codec import plain
+from ...wire.messages.curves import read_curve, write_curve
+from ...wire.messages.refused import Rejected
 from .truth import Brake, Train, allowed
 
 EPOCH_NS = 10**12

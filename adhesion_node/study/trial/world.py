@@ -23,7 +23,9 @@ from sim_node.train.sensors import SensorMessage, SensorSettings, Tick
 from ...core import Config, Measurement, Sample
 from ...core.estimator import paired
 from ...core.physics.train import Array
-from ...wire.codecs import NOMINAL, Line, Rejected, plain
+from ...wire.line import NOMINAL, Line
+from ...wire.messages.codec import plain
+from ...wire.messages.refused import Rejected
 
 PERIOD_S = 0.1
 """Of every published figure."""

@@ -23,7 +23,8 @@ from ...core.intake.samples import (
     MIN_VARIANCE_M2,
 )
 from ...core.physics.train import CRH3, KMH
-from ...wire.codecs import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MAX_WHEEL_RADPS, MIN_ABSOLUTE_PA, Line
+from ...wire.line import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA, Line
+from ...wire.messages.refused import MAX_WHEEL_RADPS
 
 TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "excel": 86_400 * 10**9}
 """In ns; besides there is `iso`, a date. `excel`: days, those of 1970 from 25569 on."""

@@ -14,8 +14,8 @@ from dataclasses import fields
 from typing import Any
 
 from ...core.physics.train import CRH3
-from ...wire.shared_settings import AMBIENT
-from ...wire.train_file import read_train
+from ...wire.files.train import read_train
+from ...wire.settings.shared import AMBIENT
 from .format import (
     ACCELERATION_UNITS,
     OPTIONAL,

@@ -21,7 +21,8 @@ from typing import ClassVar
 import numpy as np
 
 from adhesion_node.core.setting import check_settings, setting
-from adhesion_node.wire.topics import IMU, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import IMU
 
 from ..plant.journey import GRAVITY, Array
 from .sensor import Measured, Ride, one

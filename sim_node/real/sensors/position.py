@@ -21,7 +21,8 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid
 
 from adhesion_node.core.setting import check_settings, setting
-from adhesion_node.wire.topics import FIX, POSITION, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import FIX, POSITION
 
 from ..plant.journey import Array
 from .centre_line import places

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesion_node.core.setting import check_settings, setting
-from adhesion_node.wire.codecs import ATMOSPHERE_PA
-from adhesion_node.wire.topics import BRAKE_PRESSURE, Topic
+from adhesion_node.wire.line import ATMOSPHERE_PA
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE
 
 from ..plant.journey import Array
 from .sensor import Measured, Ride, one

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from scipy.signal import lfilter
 
-from adhesion_node.wire.topics import Topic
+from adhesion_node.wire.topic import Topic
 
 from ..plant.journey import Array, Journey
 from ..plant.train import Nominal

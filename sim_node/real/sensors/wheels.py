@@ -14,7 +14,8 @@ from typing import ClassVar
 import numpy as np
 
 from adhesion_node.core.setting import check_settings, setting
-from adhesion_node.wire.topics import WHEEL_SPEED, Topic
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import WHEEL_SPEED
 
 from ..plant.journey import Array
 from .sensor import Measured, Ride

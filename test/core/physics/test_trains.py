@@ -31,7 +31,7 @@ from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
-from adhesion_node.wire.settings import setup_of
+from adhesion_node.wire.settings.setup import setup_of
 from sim_node.faults.plan import Plan, faulty_run
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorMessage, SensorSettings

@@ -14,7 +14,7 @@ from rides import ride
 
 from adhesion_node.core import Config
 from adhesion_node.core.setting import make
-from adhesion_node.wire.codecs import plain
+from adhesion_node.wire.messages.codec import plain
 from adhesion_node.wire.topics import POSITION, SPEED, WHEEL_SPEED
 from sim_node.real.drive import START_S, sense
 from sim_node.real.sensors.fitted import FITTED

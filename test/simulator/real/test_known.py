@@ -11,7 +11,7 @@
 import numpy as np
 import pytest
 
-from adhesion_node.wire.settings import setup_of
+from adhesion_node.wire.settings.setup import setup_of
 from sim_node.real import known
 from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.sensors.fitted import FITTED

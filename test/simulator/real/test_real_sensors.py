@@ -15,7 +15,7 @@ import pytest
 from rides import BRAKING_MPS2, CRUISE_S, GRADE, GROUPS, NOMINAL, PITCH_RAD, RADIUS_M, SLID, SPEED_MPS, ride
 
 from adhesion_node.core.physics.train import Array
-from adhesion_node.wire.track_file import read_track_line
+from adhesion_node.wire.files.track import read_track_line
 from sim_node.real.plant.journey import GRAVITY
 from sim_node.real.sensors.centre_line import BEGINS_M, geojson
 from sim_node.real.sensors.imu import Imu, specific_force

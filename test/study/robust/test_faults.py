@@ -26,7 +26,8 @@ from adhesion_node.study.robust.cases import Case
 from adhesion_node.study.robust.faults import row
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results
 from adhesion_node.study.trial.world import World, ticks
-from adhesion_node.wire.codecs import Rejected, plain
+from adhesion_node.wire.messages.codec import plain
+from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import FAULTS, Plan
 from sim_node.train.sensors import SensorMessage, SensorSettings

@@ -89,7 +89,7 @@ def without_course(patch: pytest.MonkeyPatch) -> None:
 
 
 def without_ways(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr("adhesion_node.wire.curves.ROUNDING_M2_PER_S2", np.inf)
+    patch.setattr("adhesion_node.wire.messages.curves.ROUNDING_M2_PER_S2", np.inf)
 
 
 def without_first_speed(patch: pytest.MonkeyPatch) -> None:

@@ -6,116 +6,31 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The nodes' settings by name: what ROS parameters, parameter files, command lines and pages have in common."""
+"""What estimators are set up with, made from values by the names of settings and from the files that they name."""
 
-import argparse
 from collections.abc import Mapping, Sequence
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..core import Config
-from ..core.belief.rail_map import RailMap
-from ..core.creep.config import CreepConfig
-from ..core.creep.vehicle import Vehicle
-from ..core.intake.samples import MAX_POSITION_M
-from ..core.physics.track import Grade, Track, parse_track
-from ..core.physics.train import CRH3, Train
-from ..core.setting import Setting, make, settings_of
-from . import parameter_file, sensing
-from .codecs import Line
-from .rail_map_file import read_rail_map
-from .shared_settings import ATP_SETTINGS, OF_LINE, OF_NODES_ALONE
-from .telling import TELLING
-from .topics import ADHESION_INPUTS, CREEP_INPUTS
-from .train_file import read_train
+from ...core import Config
+from ...core.belief.rail_map import RailMap
+from ...core.creep.config import CreepConfig
+from ...core.creep.vehicle import Vehicle
+from ...core.physics.track import Grade, Track, parse_track
+from ...core.physics.train import CRH3, Train
+from ...core.setting import Setting, make
+from ..files.rail_map import read_rail_map
+from ..files.train import read_train
+from ..line import Line
+from ..topics import ADHESION_INPUTS, CREEP_INPUTS
+from . import sensing
+from .nodes import CREEP_SETTINGS, RAIL_MAP, SEED, SENSOR_TIMEOUT, SETTINGS, TRACK, TRACK_LINE, TRACK_START, TRAIN_FILE
+from .shared import OF_NODES_ALONE
 
 if TYPE_CHECKING:
-    from .track_line import TrackLine
-
-TRACK = Setting(
-    "track",
-    "",
-    "Track profile: 'grade START END RISE', 'curve START END RADIUS ANGLE', 'tunnel START END', separated by ';'",
-    "m, degrees",
-    group="track",
-)
-
-TRACK_LINE = Setting(
-    "track_line",
-    "",
-    "File with the track's centre line, GeoJSON or CSV: a fix is projected on it; its heights are the track's grades",
-    group="track",
-)
-TRACK_START = Setting(
-    "track_start_m",
-    0.0,
-    "Position of the first point of track_line",
-    "m",
-    -MAX_POSITION_M,
-    MAX_POSITION_M,
-    group="track",
-)
+    from ..track_line import TrackLine
 
 DEFAULT_TRAIN, OWN_TRAIN = "CRH3 of Xie et al. 2019, as no train is given", "by its parameters"
 """Of a train that has no file."""
-
-TRAIN_FILE = Setting(
-    "train_file",
-    "",
-    "File that describes the train, or high_speed, metro, freight; a parameter given beside it counts first",
-    group="train's file",
-)
-
-RAIL_MAP = Setting(
-    "rail_map",
-    "",
-    "File of the rail by place and date, of `brakings --map`: what earlier trains saw where a braking begins",
-    group="track",
-)
-
-SEED = Setting("seed", 1, "Seed of the particle filter", "", 0, 2**31 - 1, group="method")
-
-_SILENCE = "Silence of the sensor after which /diagnostics says STALE"
-SENSOR_TIMEOUT = Setting("sensor_timeout_s", 0.5, _SILENCE, "s", 0.05, 3600.0, group="intake")
-
-CHANGING = frozenset(
-    {
-        *("confidence", "curve_confidence", "sensor_timeout_s"),
-        *("ambient_pressure_pa", "position_std_m", "max_cross_track_m"),
-    }
-)
-"""What may change while an estimator runs: what is read and what is said of what is known, never what was learnt."""
-
-
-def _marked(*settings: Setting) -> tuple[Setting, ...]:
-    return tuple(one._replace(changes=one.changes or one.name in CHANGING) for one in settings)
-
-
-_OF_TRAIN = settings_of(Train, "train.", "train")
-SETTINGS = _marked(
-    *(SEED, *OF_LINE, SENSOR_TIMEOUT, *sensing.settings(ADHESION_INPUTS), *OF_NODES_ALONE),
-    *(*settings_of(Config), TRAIN_FILE, *_OF_TRAIN, TRACK, TRACK_LINE, TRACK_START, RAIL_MAP),
-)
-"""All settings of the estimator."""
-
-CREEP_SETTINGS = _marked(
-    SENSOR_TIMEOUT,
-    *sensing.settings(CREEP_INPUTS),
-    *OF_NODES_ALONE,
-    *settings_of(Vehicle, group="vehicle"),
-    *settings_of(CreepConfig, group="identification"),
-)
-"""All settings of the creep estimator."""
-
-OF_NODES: Mapping[str, tuple[Setting, ...]] = MappingProxyType(
-    {
-        "estimator": SETTINGS,
-        "creep_estimator": CREEP_SETTINGS,
-        "atp_monitor": ATP_SETTINGS,
-        **dict.fromkeys(("recorder", "replay", "live"), TELLING),
-    }
-)
-"""The settings of every node by its name; those of the simulators are in sim_node/settings.py."""
 
 
 class Setup(NamedTuple):
@@ -189,7 +104,7 @@ def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":
     path, start_m = (one.check(values.get(one.name, one.default)) for one in (TRACK_LINE, TRACK_START))
     if not path:
         return None
-    from .track_file import read_track_line  # only here: without a line no geodesy is loaded
+    from ..files.track import read_track_line  # only here: without a line no geodesy is loaded
 
     return read_track_line(str(path), float(start_m))
 
@@ -216,31 +131,3 @@ def creep_setup_of(values: Mapping[str, Any]) -> CreepSetup:
     timeout_s = SENSOR_TIMEOUT.check(values.get(SENSOR_TIMEOUT.name, SENSOR_TIMEOUT.default))
     config = make(CreepConfig, values, vehicle=make(Vehicle, values))
     return CreepSetup(config, make(Line, values, **sensing.of_line(CREEP_INPUTS, values)), float(timeout_s))
-
-
-def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:
-    """Values of `--params` and, before them, of `--set`, by name; ValueError when one cannot be read.
-
-    `--node` names the node whose parameters are meant where a file has them for several.
-    """
-    values = parameter_file.read(options.params, getattr(options, "node", None) or node) if options.params else {}
-    if getattr(options, "train", None):
-        values |= {TRAIN_FILE.name: options.train}
-    return values | dict(parse_setting(text, settings) for text in options.set)
-
-
-def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:
-    """Split "NAME=VALUE" and read the value as the type of its setting. Raises ValueError naming the setting.
-
-    >>> parse_setting("start_mu=0.12")
-    ('start_mu', 0.12)
-    """
-    name, separator, value = text.partition("=")
-    setting = next((setting for setting in settings if setting.name == name), None)
-    if setting is None or not separator:
-        raise ValueError(f"setting {text!r}: write NAME=VALUE with one of {', '.join(s.name for s in settings)}")
-    kind = type(setting.default)
-    try:
-        return name, {"true": True, "false": False}[value.lower()] if kind is bool else kind(value)
-    except (ValueError, KeyError):
-        raise ValueError(f"setting {name} = {value!r}: give a value of type {kind.__name__}") from None

@@ -30,7 +30,7 @@ from adhesion_node.core import Config
 from adhesion_node.core.setting import Setting, Value
 from adhesion_node.nodes import atp_monitor, creep_estimator, estimator, replay
 from adhesion_node.tools import defaults
-from adhesion_node.wire.telling import TELLING
+from adhesion_node.wire.settings.telling import TELLING
 from sim_node.nodes import simulator
 from sim_node.nodes import slip_simulator as slip_node
 

@@ -27,8 +27,10 @@ from trajectory_msgs.msg import JointTrajectory
 
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
-from adhesion_node.wire import codecs as reading
 from adhesion_node.wire import topics
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.refused import Rejected
+from adhesion_node.wire.topic import Topic
 
 T_NS = 12_000_000_034
 ROS = get_typestore(Stores.ROS2_JAZZY)
@@ -75,7 +77,7 @@ def test_sensor_messages_are_read(view: Callable[[Any, str], Any]) -> None:
 
 def test_a_variance_of_0_is_an_unknown_one() -> None:
     assert topics.POSITION.read(make_position(variance=0.0)).variance_m2 == 9.0
-    assert topics.POSITION.read(make_position(variance=0.0), reading.Line(position_std_m=0.5)).variance_m2 == 0.25
+    assert topics.POSITION.read(make_position(variance=0.0), Line(position_std_m=0.5)).variance_m2 == 0.25
 
 
 def test_what_is_no_place_may_have_any_frame() -> None:
@@ -117,10 +119,8 @@ def test_a_released_brake_never_pulls() -> None:
         (topics.SPEED, make_speed(math.inf), "NOT_FINITE", r"speed x = inf"),
     ],
 )
-def test_bad_messages_are_refused_with_value_and_remedy(
-    topic: topics.Topic, message: Any, reason: str, text: str
-) -> None:
-    with pytest.raises(reading.Rejected, match=text) as refusal:
+def test_bad_messages_are_refused_with_value_and_remedy(topic: Topic, message: Any, reason: str, text: str) -> None:
+    with pytest.raises(Rejected, match=text) as refusal:
         topic.read(message)
     assert refusal.value.reason == reason
 
@@ -149,7 +149,7 @@ def test_the_state_goes_round() -> None:
 def test_an_estimated_state_tells_how_sure_it_is(part: str, variance: float, reason: str) -> None:
     message = messages.state_message(T_NS, 1500.0, 0.04, 70.0, 0.01)
     getattr(message, part).covariance[0] = variance
-    with pytest.raises(reading.Rejected, match=r"(position|speed) covariance\[0\] = ") as refusal:
+    with pytest.raises(Rejected, match=r"(position|speed) covariance\[0\] = ") as refusal:
         topics.STATE.read(message)
     assert refusal.value.reason == reason
     if variance == 0.0:  # what a simulator knows is exact
@@ -248,7 +248,7 @@ def _set(name: str, index: int, value: float) -> Callable[[Any], None]:
 def test_a_curve_that_cannot_be_braked_along_is_refused(spoil: Callable[[Any], None], reason: str, text: str) -> None:
     message = deepcopy(MESSAGE)
     spoil(message)
-    with pytest.raises(reading.Rejected, match=text) as refusal:
+    with pytest.raises(Rejected, match=text) as refusal:
         topics.BRAKING_CURVE.read(message)
     assert refusal.value.reason == reason
 

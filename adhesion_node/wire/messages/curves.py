@@ -18,29 +18,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core.atp.received import StampedCurve
-from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
-from ..core.physics.braking import BrakingCurve
-from ..core.physics.train import Array
-from .codecs import (
-    FRAME,
-    MOST_POINTS,
-    NS,
-    TRAIN,
-    Codec,
-    Fields,
-    Line,
-    New,
-    Reason,
-    Rejected,
-    header,
-    plausible,
-    stamp_ns,
-    stamps_ns,
-)
+from ...core.atp.received import StampedCurve
+from ...core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS
+from ...core.physics.braking import BrakingCurve
+from ...core.physics.train import Array
+from ..line import FRAME, TRAIN, Line
+from .codec import Codec, Fields, New
+from .parts import NS, header, stamp_ns, stamps_ns
+from .refused import MOST_POINTS, Reason, Rejected, plausible
 
 if TYPE_CHECKING:  # see results.py
-    from ..core.estimate import Estimate
+    from ...core.estimate import Estimate
 
 
 STEP_TOLERANCE, ROUNDING_M2_PER_S2 = 0.05, 1e-6

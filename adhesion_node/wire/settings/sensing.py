@@ -11,8 +11,8 @@
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from ..core.setting import Setting
-from .topics import Topic
+from ...core.setting import Setting
+from ..topic import Topic
 
 USE, LATENCY = "use_", "latency_s."
 

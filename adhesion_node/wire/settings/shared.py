@@ -10,9 +10,9 @@
 
 from dataclasses import dataclass
 
-from ..core.atp.config import SupervisionConfig
-from ..core.setting import Setting, check_settings, setting, settings_of
-from .codecs import Line
+from ...core.atp.config import SupervisionConfig
+from ...core.setting import Setting, check_settings, setting, settings_of
+from ..line import Line
 from .telling import TELLING
 
 OF_LINE = settings_of(Line)

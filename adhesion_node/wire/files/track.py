@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .track_line import TrackLine, line_of
+from ..track_line import TrackLine, line_of
 
 GEOJSON = (".geojson", ".json")
 

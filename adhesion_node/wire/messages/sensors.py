@@ -12,14 +12,17 @@ The writers are alike: stamp, the sensor's numbers in the unit of the message, t
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ..core.intake import samples
-from . import codecs
-from .codecs import FRAME, Codec, Fields, Line, New, Reason, Rejected, header, plausible, stamp_ns, stamps_ns
+from ...core.intake import samples
+from ..line import MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA, Line
+from . import parts
+from .codec import Codec, Fields, New
+from .parts import stamp_ns, stamps_ns, writer
+from .refused import MAX_FORCE_N, MAX_WHEEL_RADPS, MOST_AXLES, Reason, Rejected, plausible, within
 
 
 def read_brake_pressure(message: Any, line: Line) -> samples.PressureSample:
@@ -34,21 +37,21 @@ def read_brake_demand(message: Any, line: Line) -> samples.DemandSample:
 
 def _gauge_pa(message: Any, line: Line) -> float:
     """A released brake whose noise falls below the air's pressure reads 0: a cylinder only pushes."""
-    limits = codecs.MAX_ABSOLUTE_PA, codecs.MIN_ABSOLUTE_PA
+    limits = MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA
     absolute = plausible("fluid_pressure", message.fluid_pressure, Reason.IMPLAUSIBLE_PRESSURE, *limits)
     return max(absolute - line.ambient_pressure_pa, 0.0)
 
 
 def _gauge_together(message: Any, line: Line) -> samples.PressureSample:
     """Read many of either at once."""
-    absolute = codecs.within(message.fluid_pressure, codecs.MAX_ABSOLUTE_PA, codecs.MIN_ABSOLUTE_PA)
+    absolute = within(message.fluid_pressure, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA)
     return samples.PressureSample(stamps_ns(message.header), np.maximum(absolute - line.ambient_pressure_pa, 0.0))
 
 
 def read_speed(message: Any, _line: Line) -> samples.SpeedSample:
     """Read a speed, m/s, and its variance from a TwistWithCovarianceStamped; raises Rejected."""
-    variance = codecs.variance_of(message.twist.covariance)
-    return samples.SpeedSample(stamp_ns(message.header), codecs.speed_of(message), variance)
+    variance = parts.variance_of(message.twist.covariance)
+    return samples.SpeedSample(stamp_ns(message.header), parts.speed_of(message), variance)
 
 
 def read_imu(message: Any, _line: Line) -> samples.ImuSample:
@@ -57,12 +60,12 @@ def read_imu(message: Any, _line: Line) -> samples.ImuSample:
     if spread[0] == -1.0:  # the message's own convention
         raise Rejected(Reason.NO_ACCELERATION, f"imu linear_acceleration_covariance[0] = {spread[0]:g}")
     along = plausible("imu linear_acceleration x", message.linear_acceleration.x, Reason.IMPLAUSIBLE_ACCELERATION, most)
-    return samples.ImuSample(stamp_ns(message.header), along, codecs.variance_of(spread))
+    return samples.ImuSample(stamp_ns(message.header), along, parts.variance_of(spread))
 
 
 def read_wheel_speed(message: Any, _line: Line) -> samples.WheelSample:
     """Read the speeds of the axles, rad/s, NaN where one has none, from a JointState; raises Rejected."""
-    if len(message.name) > codecs.MOST_AXLES:
+    if len(message.name) > MOST_AXLES:
         raise Rejected(Reason.MANY_AXLES, f"wheel speed names = {len(message.name)}")
     names, velocities = list(message.name), list(message.velocity)
     if not names or len(names) != len(velocities):
@@ -71,7 +74,7 @@ def read_wheel_speed(message: Any, _line: Line) -> samples.WheelSample:
     speeds = (
         math.nan
         if known and math.isnan(velocity)
-        else plausible(f"wheel speed of {name}", velocity, Reason.IMPLAUSIBLE_WHEEL_SPEED, codecs.MAX_WHEEL_RADPS)
+        else plausible(f"wheel speed of {name}", velocity, Reason.IMPLAUSIBLE_WHEEL_SPEED, MAX_WHEEL_RADPS)
         for name, velocity in zip(names, velocities, strict=True)
     )
     return samples.WheelSample(stamp_ns(message.header), tuple(speeds))
@@ -79,17 +82,8 @@ def read_wheel_speed(message: Any, _line: Line) -> samples.WheelSample:
 
 def read_traction_force(message: Any, _line: Line) -> samples.ForceSample:
     """Read the traction force of all driven axles, N at the rim, from a WrenchStamped; raises Rejected."""
-    force = plausible("traction force x", message.wrench.force.x, Reason.IMPLAUSIBLE_FORCE, codecs.MAX_FORCE_N)
+    force = plausible("traction force x", message.wrench.force.x, Reason.IMPLAUSIBLE_FORCE, MAX_FORCE_N)
     return samples.ForceSample(stamp_ns(message.header), force)
-
-
-def writer(written: Callable[[New, Sequence[float], float], Fields]) -> Callable[..., Fields]:
-    """Put the header before what is `written` of the sensor's numbers and their variance."""
-
-    def write(new: New, t_ns: int, numbers: Sequence[float], variance: float = 0.0, frame: str = FRAME) -> Fields:
-        return {"header": header(new, t_ns, frame), **written(new, numbers, variance)}
-
-    return write
 
 
 def _wheels(_new: New, speeds_radps: Sequence[float], _variance: float) -> Fields:
@@ -103,11 +97,11 @@ def _imu(new: New, along_mps2: Sequence[float], variance: float) -> Fields:
     spread, none = np.zeros(9), np.zeros(9)
     spread[0], none[0] = variance, -1.0
     return {
-        "orientation": codecs.upright(new),
+        "orientation": parts.upright(new),
         "orientation_covariance": none,
-        "angular_velocity": codecs.vector(new, 0.0),
+        "angular_velocity": parts.vector(new, 0.0),
         "angular_velocity_covariance": none,
-        "linear_acceleration": codecs.vector(new, along_mps2[0]),
+        "linear_acceleration": parts.vector(new, along_mps2[0]),
         "linear_acceleration_covariance": spread,
     }
 
@@ -117,13 +111,13 @@ def _pressure(_new: New, absolute_pa: Sequence[float], variance: float) -> Field
 
 
 def _force(new: New, force_n: Sequence[float], _variance: float) -> Fields:
-    wrench = {"force": codecs.vector(new, force_n[0]), "torque": codecs.vector(new, 0.0)}
+    wrench = {"force": parts.vector(new, force_n[0]), "torque": parts.vector(new, 0.0)}
     return {"wrench": new("geometry_msgs/msg/Wrench", **wrench)}
 
 
 BRAKE_PRESSURE = Codec(read_brake_pressure, writer(_pressure), _gauge_together)
 BRAKE_DEMAND = Codec(read_brake_demand, writer(_pressure), _gauge_together)
-SPEED = Codec(read_speed, writer(lambda new, speed, variance: {"twist": codecs.twist(new, speed[0], variance)}))
+SPEED = Codec(read_speed, writer(lambda new, speed, variance: {"twist": parts.twist(new, speed[0], variance)}))
 IMU = Codec(read_imu, writer(_imu))
 WHEEL_SPEED = Codec(read_wheel_speed, writer(_wheels))
 TRACTION_FORCE = Codec(read_traction_force, writer(_force))

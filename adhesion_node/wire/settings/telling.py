@@ -10,7 +10,7 @@
 
 from dataclasses import dataclass
 
-from ..core.setting import check_settings, setting, settings_of
+from ...core.setting import check_settings, setting, settings_of
 
 _TOLD = "diagnostics"
 

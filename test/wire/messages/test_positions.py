@@ -18,7 +18,9 @@ import numpy as np
 import pytest
 from pyproj import Geod
 
-from adhesion_node.wire.codecs import Line, Rejected, plain
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.messages.codec import plain
+from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.topics import FIX, ODOMETRY
 from adhesion_node.wire.track_line import line_of
 

@@ -14,7 +14,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from ..core.belief.rail_map import Piece, RailMap
+from ...core.belief.rail_map import Piece, RailMap
 
 COLUMNS = ("place_m", "length_m", "t_ns", "seen", "mu", "mu_std", "used", "mu_lower", "speed_mps")
 

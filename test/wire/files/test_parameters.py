@@ -18,7 +18,7 @@ import pytest
 from rclpy.context import Context
 from rclpy.node import Node
 
-from adhesion_node.wire.parameter_file import read, unheeded
+from adhesion_node.wire.files.parameters import read, unheeded
 
 
 def section(name: str, **values: float) -> str:

@@ -26,8 +26,10 @@ from adhesion_node.core.physics.train import CRH3
 from adhesion_node.nodes import replay
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.tools.log.options import add_options, format_of
-from adhesion_node.wire.settings import SETTINGS, given, setup_of
-from adhesion_node.wire.train_file import SHIPPED, read_train
+from adhesion_node.wire.files.train import SHIPPED, read_train
+from adhesion_node.wire.settings.given import given
+from adhesion_node.wire.settings.nodes import SETTINGS
+from adhesion_node.wire.settings.setup import setup_of
 
 UNIT: dict[str, Any] = {
     "name": "regional unit",

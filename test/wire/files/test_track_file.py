@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 from adhesion_node.core.physics.track import Grade
-from adhesion_node.wire.settings import setup_of
-from adhesion_node.wire.track_file import read_track_line
+from adhesion_node.wire.files.track import read_track_line
+from adhesion_node.wire.settings.setup import setup_of
 
 COORDINATES = [[8.0, 47.0], [8.01, 47.0], [8.02, 47.005]]
 HIGH = [[*position, 400.0 + number] for number, position in enumerate(COORDINATES)]

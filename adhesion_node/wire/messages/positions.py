@@ -11,10 +11,12 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ..core.intake.samples import MAX_VARIANCE_M2, MIN_VARIANCE_M2, PositionSample
-from . import codecs
-from .codecs import TRAIN, Codec, Fields, Line, New, Reason, Rejected, plausible, stamp_ns
-from .sensors import writer
+from ...core.intake.samples import MAX_VARIANCE_M2, MIN_VARIANCE_M2, PositionSample
+from ..line import TRAIN, Line
+from . import parts
+from .codec import Codec, Fields, New
+from .parts import stamp_ns, writer
+from .refused import Reason, Rejected, plausible
 
 NO_FIX = -1
 """NavSatStatus: no position. -2, a status never set, is taken for one."""
@@ -25,7 +27,7 @@ UNKNOWN, DIAGONAL_KNOWN = 0, 2
 
 def read_position(message: Any, line: Line) -> PositionSample:
     """Read a position along the run, m and m^2, from a message with a `pose`; raises Rejected."""
-    place = codecs.place_of(message, line)
+    place = parts.place_of(message, line)
     return PositionSample(stamp_ns(message.header), place, _variance(message.pose.covariance[0], line))
 
 
@@ -70,10 +72,10 @@ def _fix(new: New, place: Sequence[float], variance: float) -> Fields:
 
 
 def _odometry(new: New, x: Sequence[float], variance: float) -> Fields:
-    still = codecs.twist(new, 0.0, 0.0)
-    return {"child_frame_id": TRAIN, "pose": codecs.pose(new, x[0], variance), "twist": still}
+    still = parts.twist(new, 0.0, 0.0)
+    return {"child_frame_id": TRAIN, "pose": parts.pose(new, x[0], variance), "twist": still}
 
 
-POSITION = Codec(read_position, writer(lambda new, x, variance: {"pose": codecs.pose(new, x[0], variance)}))
+POSITION = Codec(read_position, writer(lambda new, x, variance: {"pose": parts.pose(new, x[0], variance)}))
 FIX = Codec(read_fix, writer(_fix))
 ODOMETRY = Codec(read_position, writer(_odometry))

@@ -20,10 +20,12 @@ from adhesion_node.core import Config
 from adhesion_node.core.physics.track import Curve, Grade, Tunnel
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.core.setting import Setting
-from adhesion_node.wire import sensing
-from adhesion_node.wire.codecs import Line
-from adhesion_node.wire.settings import SETTINGS, Setup, parse_setting, setup_of
-from adhesion_node.wire.shared_settings import OF_LINE, OF_NODES_ALONE
+from adhesion_node.wire.line import Line
+from adhesion_node.wire.settings import sensing
+from adhesion_node.wire.settings.given import parse_setting
+from adhesion_node.wire.settings.nodes import SETTINGS
+from adhesion_node.wire.settings.setup import Setup, setup_of
+from adhesion_node.wire.settings.shared import OF_LINE, OF_NODES_ALONE
 
 OF_FILES = {"track", "track_line", "track_start_m", "train_file", "rail_map"}
 """Settings that are no number or word of the configuration."""

@@ -22,14 +22,15 @@ from adhesion_node.core.intake.samples import WheelSample
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.wire import topics
-from adhesion_node.wire.codecs import MOST_AXLES, MOST_POINTS, Reason, Rejected
+from adhesion_node.wire.messages.refused import MOST_AXLES, MOST_POINTS, Reason, Rejected
+from adhesion_node.wire.topic import Topic
 
 T_NS = 10**9
 STEERS = "\x1b[2J\x9b31m\u202e\n" + "x" * 1_000_000
 """It clears the screen, colours it, turns the text round, and is a megabyte long."""
 
 
-def refused(topic: topics.Topic, message: object) -> Rejected:
+def refused(topic: Topic, message: object) -> Rejected:
     with pytest.raises(Rejected) as refusal:
         topic.read(message)
     text = str(refusal.value)

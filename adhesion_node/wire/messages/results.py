@@ -20,14 +20,17 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core.atp.received import TrainState
-from ..core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MIN_VARIANCE_M2
-from ..core.physics.train import GRAVITY, Array
-from . import codecs
-from .codecs import TRAIN, Codec, Fields, Line, New, Reason, Rejected, finite, header, stamp_ns, stamps_ns, within
+from ...core.atp.received import TrainState
+from ...core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MIN_VARIANCE_M2
+from ...core.physics.train import GRAVITY, Array
+from ..line import TRAIN, Line
+from . import parts
+from .codec import Codec, Fields, New
+from .parts import header, stamp_ns, stamps_ns
+from .refused import Reason, Rejected, finite, within
 
 if TYPE_CHECKING:  # the simulator uses these codecs, too, and must not know the estimators
-    from ..core.prediction import Prediction
+    from ...core.prediction import Prediction
 
 MOST = float(np.finfo(np.float64).max)
 """Every number that is one."""
@@ -89,8 +92,8 @@ def write_deceleration(new: New, prediction: Prediction, *, lower: bool = False)
         return None
     estimate = prediction.estimate
     mu = estimate.mu_lower if lower else estimate.mu
-    along = new("geometry_msgs/msg/Accel", linear=codecs.vector(new, -mu * GRAVITY), angular=codecs.vector(new, 0.0))
-    spread = codecs.covariance((GRAVITY * estimate.mu_std) ** 2)
+    along = new("geometry_msgs/msg/Accel", linear=parts.vector(new, -mu * GRAVITY), angular=parts.vector(new, 0.0))
+    spread = parts.covariance((GRAVITY * estimate.mu_std) ** 2)
     accel = new("geometry_msgs/msg/AccelWithCovariance", accel=along, covariance=spread)
     return {"header": header(new, estimate.t_ns), "accel": accel}
 
@@ -100,7 +103,7 @@ def read_state(message: Any, line: Line, least: float = 0.0) -> TrainState:
 
     No variance may be below `least`.
     """
-    place, speed = codecs.place_of(message, line), codecs.speed_of(message)
+    place, speed = parts.place_of(message, line), parts.speed_of(message)
     deviations = []
     for what, part in (("position", message.pose), ("speed", message.twist)):
         variance = finite(f"{what} covariance[0]", part.covariance[0])
@@ -135,8 +138,8 @@ def write_state(
     return {
         "header": header(new, t_ns),
         "child_frame_id": TRAIN,
-        "pose": codecs.pose(new, position_m, position_var),
-        "twist": codecs.twist(new, speed_mps, speed_var),
+        "pose": parts.pose(new, position_m, position_var),
+        "twist": parts.twist(new, speed_mps, speed_var),
     }
 
 
@@ -178,6 +181,4 @@ DECELERATION_LOWER = DECELERATION._replace(write=partial(write_deceleration, low
 STATE = Codec(read_state, write_state, _states)
 ESTIMATED_STATE = Codec(read_estimated_state, write_estimated_state, partial(_states, least=MIN_VARIANCE_M2))
 STATUS = Codec(read_statuses, write_status)
-CLOCK = Codec(
-    lambda message, _: codecs.nanoseconds(message.clock), lambda new, t_ns: {"clock": codecs.moment(new, t_ns)}
-)
+CLOCK = Codec(lambda message, _: parts.nanoseconds(message.clock), lambda new, t_ns: {"clock": parts.moment(new, t_ns)})

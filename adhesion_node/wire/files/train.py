@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from ..core.physics.train import CRH3, Train
-from ..core.setting import make
-from .parameter_file import load
+from ...core.physics.train import CRH3, Train
+from ...core.setting import make
+from .parameters import load
 
-SHIPPED = Path(__file__).parent.parent / "trains"
+SHIPPED = Path(__file__).parents[2] / "trains"
 """Examples to copy; their names do for a path."""
 
 GEOMETRY = ("cylinder_diameter_m", "rigging_efficiency", "rigging_ratio", "pad_friction", "disc_radius_m", "pads")
