@@ -28,7 +28,7 @@ from browser import open_page
 
 from adhesion_node.bag import BagReader
 from adhesion_node.report.__main__ import main as report
-from adhesion_node.report.run import read_run
+from adhesion_node.report.read.recorded import read_run
 from adhesion_node.study.__main__ import main as study
 from adhesion_node.study.intervention.figure import draw_changing
 from adhesion_node.study.trial.figures import Place

@@ -21,7 +21,7 @@ from ..core.intake.outcome import text_of
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
-from ..report.run import IN_WORDS
+from ..report.found.regimes import IN_WORDS
 from ..web.creep import creep_part
 from ..web.fit import number, numbers, rounded
 from ..wire.topic import Topic

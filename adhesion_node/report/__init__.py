@@ -6,4 +6,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""What a recording shows: its series, and the page, the pictures and the table of them."""
+"""What a recording shows: read, found, drawn."""

@@ -36,15 +36,16 @@ from ..run.offline import parameters_of
 from ..run.pipeline import off_track
 from ..run.results import rows_to
 from ..wire.settings.setup import Setup, setup_of
-from .curves import Subject
-from .estimated import estimate_run
-from .findings import findings
+from .drawn.page import report_page
+from .drawn.page_data import Subject
+from .drawn.picture import draw
+from .drawn.table import table
 from .fleet import is_table
-from .page import report_page
-from .picture import draw
-from .rows import KEYS, rows_of
-from .run import FIXED_MU, RESULTS, read_run
-from .table import table
+from .found.distances import FIXED_MU
+from .found.findings import findings
+from .found.rows import KEYS, rows_of
+from .read.estimated import estimate_run
+from .read.recorded import RESULTS, read_run
 
 PICTURES = (".png", ".pdf")
 

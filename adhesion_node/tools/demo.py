@@ -42,10 +42,12 @@ from ..core import Estimate, Regime
 from ..core.physics.train import KMH
 from ..live.__main__ import address_options
 from ..live.node import Live
-from ..report.picture import draw
-from ..report.run import Band, Run, read_run
-from ..report.series import read_status
-from ..report.table import table
+from ..report.drawn.picture import draw
+from ..report.drawn.table import table
+from ..report.found.regimes import Band
+from ..report.read.gathered import read_status
+from ..report.read.recorded import read_run
+from ..report.read.run import Run
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.score import Truth

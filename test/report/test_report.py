@@ -27,9 +27,11 @@ from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core import Config
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
-from adhesion_node.report.findings import distances, findings, first_identified, text_changes
-from adhesion_node.report.run import Band, bands
-from adhesion_node.report.series import Series
+from adhesion_node.report.found.distances import distances
+from adhesion_node.report.found.events import text_changes
+from adhesion_node.report.found.findings import findings, first_identified
+from adhesion_node.report.found.regimes import Band, bands
+from adhesion_node.report.read.series import Series
 from adhesion_node.wire.topics import DIAGNOSTICS, TRUTH_MU
 
 QUICK = ("--set", "iterations=3")

@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 
 from ...web import as_json, page
-from ..parts import table_html, value_or, versions
-from ..run import FIXED_MU
-from ..thinning import rounded
+from ..drawn.parts import table_html, value_or, versions
+from ..drawn.thinning import rounded
+from ..found.distances import FIXED_MU
 from .rail import Fleet, Spot, low_spots, over_dates
 
 EDGES = (0.05, FIXED_MU, 0.1, 0.15)

@@ -21,7 +21,7 @@ from scipy.optimize import curve_fit
 
 from ...core.creep.curve import adhesion
 from ...core.physics.train import Array
-from ...report.picture import BLACK, BLUE, GREY, ORANGE
+from ...report.drawn.picture import BLACK, BLUE, GREY, ORANGE
 from ..trial.drawing import draw_lines, picture
 from ..trial.figures import Figures
 from . import runs as he

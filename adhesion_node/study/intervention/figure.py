@@ -17,8 +17,9 @@ from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
 from ...core.physics.braking import BrakingCurve
 from ...core.physics.train import GRAVITY, KMH, Array
-from ...report.picture import BLACK, BLUE, GREY, ORANGE, SHADES
-from ...report.run import FIXED_MU, Run
+from ...report.drawn.picture import BLACK, BLUE, GREY, ORANGE, SHADES
+from ...report.found.distances import FIXED_MU
+from ...report.read.run import Run
 from ..trial.drawing import panels, picture
 from ..trial.figures import Place
 

@@ -15,7 +15,7 @@ import numpy as np
 from matplotlib.patches import Patch
 
 from ...core.physics.train import KMH
-from ...report.picture import BLACK, BLUE, GREY, ORANGE, SHADES
+from ...report.drawn.picture import BLACK, BLUE, GREY, ORANGE, SHADES
 from ..trial.drawing import draw_cases, panels
 from ..trial.figures import Figures
 from ..trial.score import TWO_SIDED_95

@@ -18,7 +18,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from ...core.physics.train import Array
-from ...report.picture import BLACK, BLUE, GREY, ORANGE
+from ...report.drawn.picture import BLACK, BLUE, GREY, ORANGE
 from .figures import Place
 
 STYLES = ((BLACK, "-"), (BLUE, "--"), (ORANGE, "-."), (GREY, ":"), ("#5b8c2a", (0, (5, 1, 1, 1, 1, 1))))

@@ -23,9 +23,9 @@ from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, KMH
 from adhesion_node.core.prediction import Prediction
-from adhesion_node.report.predicted import Curves
-from adhesion_node.report.run import Run
-from adhesion_node.report.series import Series
+from adhesion_node.report.read.predicted import Curves
+from adhesion_node.report.read.run import Run
+from adhesion_node.report.read.series import Series
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.intervention import study as intervention
 from adhesion_node.study.intervention.figure import draw_changing

@@ -23,7 +23,8 @@ from std_msgs.msg import Float64
 
 from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core.atp.received import TrainState
-from adhesion_node.report.series import Series, read_series, read_status
+from adhesion_node.report.read.gathered import read_series, read_status
+from adhesion_node.report.read.series import Series
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE
 

@@ -13,10 +13,11 @@ from typing import TypeVar
 
 import numpy as np
 
-from ..core.physics.train import CRH3, KMH, Train
-from ..run.seen import is_known
-from .findings import distances, why_not
-from .run import FIXED_MU, Run
+from ...core.physics.train import CRH3, KMH, Train
+from ...run.seen import is_known
+from ..found.distances import FIXED_MU, distances
+from ..found.findings import why_not
+from ..read.run import Run
 
 Column = TypeVar("Column")
 

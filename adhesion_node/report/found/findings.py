@@ -9,57 +9,24 @@
 """What a run shows, in numbers: how the adhesion was identified and what braking distance that saves."""
 
 import math
-from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
-from ..core import Config, Regime
-from ..core.atp.supervision import Level
-from ..core.physics.train import KMH, Train
-from ..run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
-from ..run.seen import Seen
-from .brakings import RELEASED_NS, bound_kept, brakings, rises, row_of
-from .run import FIXED_MU, Distances, Run, distance_to_target
-from .series import NONE, Series
-
-BRAKES = (Level.SERVICE_BRAKE.name, Level.EMERGENCY_BRAKE.name)
-"""Levels at which the ATP monitor brakes."""
+from ...core import Config, Regime
+from ...core.physics.train import KMH
+from ...run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
+from ...run.seen import Seen
+from ..read.dropped import dropped
+from ..read.run import Run
+from .braking_row import bound_kept, row_of
+from .brakings import brakings, rises
+from .distances import distances, true_way
+from .events import BRAKES, text_changes
 
 AT_FIRST = ("identified_at_kmh", "mu", "mu_lower", "fixed_m", "saved_m", "saved_at_least_m")
 """Findings at the first estimate that counts as identified: speed, adhesion, braking distances."""
-
-
-@lru_cache
-def distances(run: Run, target_mps: float, train: Train) -> Distances:
-    """Braking distances from the speed at each estimate to the target speed."""
-    times = run.speed.t_ns
-    return Distances(
-        fixed=distance_to_target(run, FIXED_MU, target_mps, train),
-        identified=distance_to_target(run, run.mu.at(times), target_mps, train, run.nominal),
-        longest=distance_to_target(run, run.mu_lower.at(times), target_mps, train, run.safe),
-    )
-
-
-@lru_cache
-def true_way(run: Run, target_mps: float) -> Series:
-    """Way, m, that the train truly went from each moment of a braking until it had the target speed.
-
-    Empty where the recording holds no truth or brake pressure, or the train never got there.
-    """
-    t_ns, place = run.true_position
-    slow = run.true_speed.values <= target_mps
-    if not (slow.any() and run.pressure.t_ns.size):
-        return NONE
-    parts = []
-    for braking in brakings(run):
-        begun = np.flatnonzero(t_ns >= braking.start_ns)
-        reached = begun[slow[begun]]
-        if reached.size and t_ns[reached[0]] <= braking.end_ns + RELEASED_NS:
-            during = begun[begun <= reached[0]]
-            parts.append((t_ns[during], np.abs(place[reached[0]] - place[during])))
-    return Series(*(np.concatenate(column) for column in zip(*parts, strict=True))) if parts else NONE
 
 
 def first_identified(run: Run) -> int | None:
@@ -118,30 +85,6 @@ def why_not(run: Run) -> str | None:
     for t_ns, regime, mu, bound, speed, pressure_pa in zip(*(column.tolist() for column in columns), strict=True):
         seen.note(t_ns, regime, mu, bound, speed, None if math.isnan(pressure_pa) else pressure_pa)
     return seen.why_not()
-
-
-def text_changes(series: Series) -> list[tuple[int, str]]:
-    """Times and texts at which a series of texts changes, the first included; "" is left out."""
-    rows = zip(series.t_ns.tolist(), map(str, series.values), ["", *map(str, series.values)], strict=False)
-    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]
-
-
-def dropped(counts: Mapping[str, str]) -> dict[str, int]:
-    """Messages that were not used, by reason.
-
-    >>> dropped({"windows": "65", "dropped.LATE": "2"})
-    {'LATE': 2}
-    """
-    return {key.removeprefix("dropped."): int(value) for key, value in counts.items() if key.startswith("dropped.")}
-
-
-def listed(counts: Mapping[str, int]) -> str:
-    """Counts by reason in words.
-
-    >>> listed({"LATE": 2, "OLD": 1})
-    '2 LATE, 1 OLD'
-    """
-    return ", ".join(f"{count} {reason}" for reason, count in counts.items())
 
 
 def _error(run: Run, config: Config) -> float | None:

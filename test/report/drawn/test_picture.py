@@ -28,11 +28,13 @@ from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.bag.types import serialize
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.physics.train import Train
-from adhesion_node.report import picture
-from adhesion_node.report.findings import distances, true_way
-from adhesion_node.report.run import Band, Run, distance_to_target, read_run
-from adhesion_node.report.series import NONE
-from adhesion_node.report.table import NO_ROWS, ROWS, table
+from adhesion_node.report.drawn import picture
+from adhesion_node.report.drawn.table import NO_ROWS, ROWS, table
+from adhesion_node.report.found.distances import distance_to_target, distances, true_way
+from adhesion_node.report.found.regimes import Band
+from adhesion_node.report.read.recorded import read_run
+from adhesion_node.report.read.run import Run
+from adhesion_node.report.read.series import NONE
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,

@@ -13,23 +13,25 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ..bag import BagReader
-from ..command.options import progress
-from ..core import Prediction
-from ..core.intake.samples import DemandSample, PressureSample
-from ..run import offline
-from ..run.offline import Recorded
-from ..run.pipeline import Pipeline
-from ..run.results import Write, row_of
-from ..wire.line import Line
-from ..wire.messages.refused import Rejected
-from ..wire.settings.setup import Setup
-from ..wire.topic import Frame
-from ..wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH
-from .findings import listed
+from ...bag import BagReader
+from ...command.options import progress
+from ...core import Prediction
+from ...core.intake.samples import DemandSample, PressureSample
+from ...run import offline
+from ...run.offline import Recorded
+from ...run.pipeline import Pipeline
+from ...run.results import Write, row_of
+from ...wire.line import Line
+from ...wire.messages.refused import Rejected
+from ...wire.settings.setup import Setup
+from ...wire.topic import Frame
+from ...wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH
+from .dropped import listed
+from .gathered import Numbers, Texts
+from .inputs import Inputs
+from .messages import read_topics, sample_of
 from .predicted import Curves
-from .run import Inputs, Run
-from .series import Numbers, Texts, read_topics, sample_of
+from .run import Run
 
 
 def estimate_run(

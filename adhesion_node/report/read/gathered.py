@@ -6,134 +6,24 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Series over time out of a recording, whose messages are decoded once: what pictures and tables are made from."""
+"""Series gathered while the messages of a recording are read: of numbers, of texts, of what diagnostics tell by key."""
 
 from __future__ import annotations
 
 import math
 import sys
 from array import array
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..bag import BagReader, Record
-from ..bag.together import together
-from ..core.physics.train import Array
-from ..wire.line import NOMINAL, Line
-from ..wire.messages.parts import stamp_ns, stamps_ns
-from ..wire.messages.refused import Rejected
-from ..wire.messages.results import Status
-from ..wire.topic import Frame, Topic
-
-Times = NDArray[np.int64]
-
-MOST_TOGETHER = 256
-"""Messages that are read together: what is theirs stays in the processor's cache."""
-
-
-class Series(NamedTuple):
-    """Values at increasing times; both of shape (n,)."""
-
-    t_ns: Times
-    values: NDArray[Any]
-
-    def at(self, t_ns: Times) -> Array:
-        """Values interpolated at other times; held constant before the first and after the last."""
-        return np.asarray(np.interp(t_ns, self.t_ns, self.values), dtype=np.float64)
-
-    def exactly(self, t_ns: Times, absent: Any = np.nan) -> NDArray[Any]:
-        """Values at those very times, the last of several; `absent` where there is none."""
-        if not self.t_ns.size:
-            return np.full(t_ns.shape, absent)
-        found = np.searchsorted(self.t_ns, t_ns, side="right") - 1
-        return np.where((found >= 0) & (self.t_ns[found] == t_ns), self.values[found], absent)
-
-    def map(self, change: Callable[[Array], Any]) -> Series:
-        """What `change` makes of the values, at the same times."""
-        return self._replace(values=np.asarray(change(self.values)))
-
-    def by_time(self) -> dict[int, Any]:
-        """Values by time."""
-        return dict(zip(self.t_ns.tolist(), self.values.tolist(), strict=True))
-
-
-NONE = Series(np.array([], dtype=np.int64), np.array([]))
-"""Of what was not recorded."""
-
-
-class Sample(NamedTuple):
-    """What was read of one message; None where it was refused. `t_ns` is its stamp, or the log time without one.
-
-    Of a topic whose messages are read together, it is of many: the numbers are arrays, NaN where one was refused.
-    """
-
-    log_ns: Any
-    t_ns: Any
-    read: Any
-
-
-Take = Callable[[Sample], None]
-"""Takes what is read of a topic's messages, one after the other."""
-
-
-def read_topics(reader: BagReader, takes: Iterable[tuple[Topic, Take]], line: Line = NOMINAL) -> None:
-    """Hand over what is read of every message, whatever its frame, in one pass; one that does not decode is left out.
-
-    A topic may be taken several times; one that the recording lacks is not. Messages that are read together come in
-    their order where they are of one length.
-    """
-    taken: dict[str, tuple[Topic, list[Take]]] = {}
-    for topic, take in takes:
-        if (name := reader.resolve(topic.name)) is not None:
-            taken.setdefault(name, (topic._replace(frame=Frame.ANY), []))[1].append(take)
-    waiting: dict[tuple[str, int], list[Record]] = {}
-    for record in reader.messages(taken):
-        topic, each = taken[record.topic]
-        if topic.codec is None or topic.codec.together is None:
-            _hand_over(reader, topic, [record], line, each)
-            continue
-        alike = waiting.setdefault((record.topic, len(record.cdr)), [])
-        alike.append(record)
-        if len(alike) == MOST_TOGETHER:
-            _hand_over(reader, topic, alike, line, each)
-            alike.clear()
-    for (name, _), alike in waiting.items():
-        _hand_over(reader, taken[name][0], alike, line, taken[name][1])
-
-
-def _hand_over(reader: BagReader, topic: Topic, records: Sequence[Record], line: Line, takes: Iterable[Take]) -> None:
-    message = together([record.cdr for record in records], topic.type) if len(records) > 1 else None
-    if message is None:
-        samples = [sample_of(topic, one, record.log_ns, line) for record, one in reader.decoded(records)]
-    else:
-        log_ns = np.array([record.log_ns for record in records], dtype=np.int64)
-        samples = [_samples_of(topic, message, log_ns, line)]
-    for sample in samples:
-        for take in takes:
-            take(sample)
-
-
-def sample_of(topic: Topic, message: Any, log_ns: int, line: Line) -> Sample:
-    """Read a message."""
-    header = getattr(message, "header", None)
-    t_ns = log_ns if header is None else stamp_ns(header)
-    try:
-        return Sample(log_ns, t_ns, topic.read(message, line))
-    except Rejected:
-        return Sample(log_ns, t_ns, None)
-
-
-def _samples_of(topic: Topic, message: Any, log_ns: Times, line: Line) -> Sample:
-    """Read many messages that stand as one."""
-    header = getattr(message, "header", None)
-    t_ns = log_ns if header is None else stamps_ns(header)
-    try:
-        return Sample(log_ns, t_ns, topic.together(message, line))
-    except Rejected:
-        return Sample(log_ns, t_ns, None)
+from ...bag import BagReader
+from ...wire.line import NOMINAL, Line
+from ...wire.messages.results import Status
+from ...wire.topic import Topic
+from .messages import Sample, read_topics, with_key
+from .series import NONE, Series
 
 
 def _itself(read: Any) -> Any:
@@ -241,18 +131,6 @@ class Texts:
         t_ns, texts = np.array(self._t_ns, dtype=np.int64), np.array(self._texts, dtype=object)
         order = np.argsort(t_ns, kind="stable")
         return Series(t_ns[order], texts[order])
-
-
-def with_key(key: str, take: Callable[[int, Status], None]) -> Take:
-    """Hand over the statuses that have `key`, at the stamp of the estimate of which they tell, else at their own."""
-
-    def taken(sample: Sample) -> None:
-        for status in sample.read.entries:
-            stamp = status.values.get("stamp_ns", sample.t_ns)
-            if key in status.values and stamp != "none":  # of no estimate
-                take(int(stamp), status)
-
-    return taken
 
 
 def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any] = _itself, line: Line = NOMINAL) -> Series:

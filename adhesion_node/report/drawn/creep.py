@@ -6,40 +6,16 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The creep curve as the diagnostics of a recorded creep estimator told it, its peak and why that was withheld."""
+"""The creep curve on a page: its curves as the slider moves, its peak in words, and why that was withheld."""
 
 from collections.abc import Sequence
-from operator import itemgetter
 from typing import Any
 
-from ..web.creep import creep_part
-from ..wire.messages.results import Status
-from .series import with_key
+from ..read.creep import CreepCurves
 from .thinning import evenly, number
 
 MOST_CURVES = 200
 """Curves of a run at most, evenly spread over its time."""
-
-CreepCurves = tuple[tuple[int, dict[str, Any]], ...]
-"""Curves as the pages draw them, at their times, ns."""
-
-
-class CreepTaken:
-    """The curves while the diagnostics are read; none where no creep estimator was recorded."""
-
-    def __init__(self) -> None:
-        self._told: list[tuple[int, dict[str, Any]]] = []
-        self.take = with_key("lambda_m", self._note)
-
-    def _note(self, t_ns: int, status: Status) -> None:
-        part = creep_part(status.values, status.message)
-        if part is not None:
-            self._told.append((t_ns, part))
-
-    @property
-    def curves(self) -> CreepCurves:
-        """All of them by their times."""
-        return tuple(sorted(self._told, key=itemgetter(0)))
 
 
 def creep_data(curves: CreepCurves, origin_ns: int) -> list[dict[str, Any]]:

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..core.physics.train import Array
-from .series import Series, Times
+from ...core.physics.train import Array
+from ..read.series import Series, Times
 
 GAP_STEPS, GAP_NS = 5.0, 3e9
 """Values further apart than so many usual steps, and than so long, have a gap between them."""

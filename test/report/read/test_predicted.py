@@ -13,8 +13,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesion_node.report import predicted
-from adhesion_node.report.predicted import Curves, distances_to
+from adhesion_node.report.read import predicted
+from adhesion_node.report.read.predicted import Curves, distances_to
 
 SPEEDS = np.array([40.0, 30.0, 20.0, 0.0])
 

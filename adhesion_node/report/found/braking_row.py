@@ -6,58 +6,20 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A run split into its brakings, and what each of them shows: one row for each, as a report lists them."""
+"""What one braking of a run shows: its row, as a report lists it."""
 
-from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import Regime
-from ..core.physics.train import KMH
-from ..run.brakings import split
-from ..run.score import CONVERGED_AFTER_MPS
-from ..run.seen import BRAKED_PA
-from .run import Distances, Run
-from .series import Series
-
-RELEASED_NS = 3_000_000_000
-"""The brake is released once it has not worked for so long, longer than a dump lasts."""
-
-SLOWS_NS, SLOWS_MPS = 3_000_000_000, 0.6
-"""Without a recorded pressure a train brakes that has lost so much speed in so long: no resistance does that."""
-
-
-class Braking(NamedTuple):
-    """A braking from when to when, and which estimates are of it: indices from `first` to `last`."""
-
-    start_ns: int
-    end_ns: int
-    first: int
-    last: int
-
-
-@lru_cache
-def brakings(run: Run) -> list[Braking]:
-    """Return the brakings in their order."""
-    under_brake = _under_brake(run).tolist()
-    told = list(zip(run.speed.t_ns.tolist(), run.speed.values.tolist(), strict=True))
-    parts = split(range(len(told)), under_brake.__getitem__, told.__getitem__)
-    return [Braking(told[part[0]][0], told[part[-1]][0], part[0], part[-1]) for part in parts]
-
-
-def _under_brake(run: Run) -> NDArray[np.bool_]:
-    """Whether the brake works at the estimates, a dump by the slide protection included; shape (n,)."""
-    times = run.speed.t_ns
-    if not run.pressure.t_ns.size:
-        speed = run.speed.map(np.abs)
-        return np.asarray(speed.at(times - SLOWS_NS) - speed.values > SLOWS_MPS)
-    braked_ns = run.pressure.t_ns[run.pressure.values >= BRAKED_PA]
-    never = np.iinfo(np.int64).max // 4
-    around = np.concatenate([[-never], braked_ns, [never]])
-    after = np.searchsorted(around, times)
-    return np.asarray((around[after] == times) | (around[after] - around[after - 1] <= RELEASED_NS))
+from ...core import Regime
+from ...core.physics.train import KMH
+from ...run.score import CONVERGED_AFTER_MPS
+from ..read.run import Run
+from ..read.series import Series
+from .brakings import Braking, rises
+from .distances import Distances
 
 
 def bound_kept(run: Run, first: int, last: int) -> NDArray[np.bool_]:
@@ -68,14 +30,6 @@ def bound_kept(run: Run, first: int, last: int) -> NDArray[np.bool_]:
     lower, true = run.mu_lower.exactly(times), run.true_mu.at(times)
     known = np.isfinite(lower) & np.isfinite(true)
     return np.asarray(lower[known] <= true[known] + 1e-9)
-
-
-def rises(series: Series, start_ns: int, end_ns: int) -> list[int]:
-    """Times within which a counter has risen."""
-    first, end = np.searchsorted(series.t_ns, [start_ns, end_ns + 1])
-    part = slice(max(first - 1, 0), end)
-    counts = np.array([int(value) if value.isdigit() else 0 for value in series.values[part].tolist()])
-    return [int(t) for t in series.t_ns[part][1:][np.diff(counts) > 0]]
 
 
 def row_of(run: Run, braking: Braking, planned: Distances, true_m: Series, target_mps: float) -> dict[str, Any]:

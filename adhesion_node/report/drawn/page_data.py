@@ -6,24 +6,26 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A run as plain numbers for the charts of a page: series over time and the braking curves of every moment."""
+"""A run as plain numbers for the script of a page: series over time and the braking curves of every moment."""
 
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import Config
-from ..core.physics import braking
-from ..core.physics.train import KMH
-from .ahead import SHOWN, ahead
-from .brakings import Braking, brakings
+from ...core import Config
+from ...core.physics import braking
+from ...core.physics.train import KMH
+from ..ahead import SHOWN, ahead
+from ..found.brakings import Braking, brakings
+from ..found.distances import FIXED_MU, Distances, distances
+from ..found.events import events
+from ..found.findings import first_identified
+from ..found.regimes import IN_WORDS, bands
+from ..read.predicted import Curve
+from ..read.run import Run
+from ..read.series import Times
 from .charts import Chart, charts
 from .creep import creep_data
-from .events import events
-from .findings import distances, first_identified
-from .predicted import Curve
-from .run import FIXED_MU, IN_WORDS, Distances, Run, bands
-from .series import Times
 from .thinning import evenly, number, peaks, rounded, with_gaps
 
 MOST_POINTS, MOST_MOMENTS, CURVE_POINTS = 6000, 800, 32

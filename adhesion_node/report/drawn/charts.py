@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core import Regime
-from ..core.physics.train import KMH, Train
-from .findings import distances, true_way
-from .run import FIXED_MU, Run
-from .series import NONE, Series
+from ...core import Regime
+from ...core.physics.train import KMH, Train
+from ..found.distances import FIXED_MU, distances, true_way
+from ..read.run import Run
+from ..read.series import NONE, Series
 
 
 class Line(NamedTuple):

@@ -17,8 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..core.physics.braking import BrakingCurve
-from ..core.physics.train import Array
+from ...core.physics.braking import BrakingCurve
+from ...core.physics.train import Array
 from .series import Series, Times
 
 MOST_CURVES = 8192

@@ -11,8 +11,8 @@
 import math
 from collections.abc import Iterator
 
-from ..run.results import COLUMNS, LEARNT, Row
-from .run import Run
+from ...run.results import COLUMNS, LEARNT, Row
+from ..read.run import Run
 
 KEYS = ("mu_std", "window", *LEARNT)
 """What the diagnostics are asked for; they tell five digits."""

@@ -25,14 +25,14 @@ from test_picture import FREE, START_NS, S, read
 
 from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.core import Config
-from adhesion_node.report.brakings import brakings
-from adhesion_node.report.curves import MOST_MOMENTS, Subject, chart_data
-from adhesion_node.report.estimated import estimate_run
-from adhesion_node.report.events import events
-from adhesion_node.report.findings import findings
-from adhesion_node.report.run import Run
-from adhesion_node.report.series import NONE, Series
-from adhesion_node.report.thinning import peaks, with_gaps
+from adhesion_node.report.drawn.page_data import MOST_MOMENTS, Subject, chart_data
+from adhesion_node.report.drawn.thinning import peaks, with_gaps
+from adhesion_node.report.found.brakings import brakings
+from adhesion_node.report.found.events import events
+from adhesion_node.report.found.findings import findings
+from adhesion_node.report.read.estimated import estimate_run
+from adhesion_node.report.read.run import Run
+from adhesion_node.report.read.series import NONE, Series
 from adhesion_node.run import offline
 from adhesion_node.run.brakings import brakings as of_predictions
 from adhesion_node.run.pipeline import Pipeline

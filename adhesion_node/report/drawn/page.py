@@ -13,14 +13,16 @@ from datetime import UTC, datetime
 from html import escape
 from typing import Any
 
-from ..web import as_json, page
-from ..wire.settings.nodes import SETTINGS
+from ...web import as_json, page
+from ...wire.settings.nodes import SETTINGS
+from ..found.distances import FIXED_MU
+from ..found.events import events
+from ..found.findings import findings
+from ..read.dropped import listed
+from ..read.run import Run
 from .creep import creep_in_words
-from .curves import Subject, chart_data
-from .events import events
-from .findings import findings, listed
+from .page_data import Subject, chart_data
 from .parts import table_html, value_or, versions
-from .run import FIXED_MU, Run
 from .table import NO_ROWS, rows, shown
 
 LITTLE = "it limited for less than 30 km/h, or a weaker brake would look the same"

@@ -20,7 +20,7 @@ from test_picture import START_NS, S, read, record, rows
 
 from adhesion_node.bag import BagWriter
 from adhesion_node.report.__main__ import main
-from adhesion_node.report.creep import MOST_CURVES, creep_data, creep_in_words
+from adhesion_node.report.drawn.creep import MOST_CURVES, creep_data, creep_in_words
 from adhesion_node.wire.topics import DIAGNOSTICS
 
 KNOWN = {"p1": "80", "p2": "100", "mu_max": "0.2", "lambda_m": "0.1", "mu_max_lower": "0.18", "mu_max_upper": "0.22"}

@@ -17,9 +17,10 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
-from ..core.physics.train import CRH3, KMH, Train
+from ...core.physics.train import CRH3, KMH, Train
+from ..found.regimes import Band, bands
+from ..read.run import Run
 from .charts import charts
-from .run import Band, Run, bands
 from .thinning import evenly, peaks, with_gaps
 
 SHADES = {"COASTING": "0.85", "BRAKE_LIMITED": "#d3e5f7", "ADHESION_LIMITED": "#fff1dc"}

@@ -8,9 +8,14 @@
 
 """What happened in a run, in its order: regimes, changes of the rail, levels of the ATP monitor, what was not well."""
 
+from ...core.atp.supervision import Level
+from ..read.run import Run
+from ..read.series import Series
 from .brakings import rises
-from .findings import BRAKES, text_changes
-from .run import IN_WORDS, Run
+from .regimes import IN_WORDS
+
+BRAKES = (Level.SERVICE_BRAKE.name, Level.EMERGENCY_BRAKE.name)
+"""Levels at which the ATP monitor brakes."""
 
 Event = tuple[int, str, str]
 """Time, ns; kind, as the live page has them; what is said."""
@@ -27,3 +32,9 @@ def events(run: Run) -> list[Event]:
     ]
     found += [(t_ns, "fault", said) for t_ns, said in text_changes(run.remarks)]
     return sorted(event for event in found if event[0] >= start_ns)
+
+
+def text_changes(series: Series) -> list[tuple[int, str]]:
+    """Times and texts at which a series of texts changes, the first included; "" is left out."""
+    rows = zip(series.t_ns.tolist(), map(str, series.values), ["", *map(str, series.values)], strict=False)
+    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]

@@ -1,0 +1,98 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""A run as series over time: what its pictures, tables and pages are made from."""
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...core import Regime
+from ...core.physics.train import Array
+from .creep import CreepCurves
+from .predicted import Curves
+from .series import NONE, Series, Times
+
+
+class Run(NamedTuple):
+    """The series of a recording; empty where it holds none."""
+
+    true_mu: Series = NONE
+    true_position: Series = NONE
+    true_speed: Series = NONE
+    pressure: Series = NONE
+    """Gauge, Pa."""
+    mu: Series = NONE
+    mu_lower: Series = NONE
+    position: Series = NONE
+    speed: Series = NONE
+    regime: Series = NONE
+    safe: Curves = Curves()
+    """On mu_lower, a weaker brake and the least resistance of the track; at most one for each estimate."""
+    nominal: Curves = Curves()
+    """On mu and the identified law over speed."""
+    remarks: Series = NONE
+    """What the estimator said while all was not well."""
+    levels: Series = NONE
+    """Of the ATP monitor."""
+    changes: Series = NONE
+    """Changes of the rail found so far, counted."""
+    said: Mapping[str, Series] = MappingProxyType({})
+    """Numbers of the ATP monitor by key, NaN where it does not tell one; all at the same times."""
+    creep: CreepCurves = ()
+    """Of the creep estimator."""
+    counts: Mapping[str, str] = MappingProxyType({})
+    """Last diagnostics by key."""
+    told: Mapping[str, Series] = MappingProxyType({})
+    """Further numbers of the estimates, where they were asked for."""
+
+    @property
+    def confidence(self) -> float | None:
+        """Of the lower bound; None where the recording does not tell."""
+        return float(self.counts["confidence"]) if "confidence" in self.counts else None
+
+    @property
+    def learnt(self) -> NDArray[np.bool_]:
+        """At which estimates the train braked and its adhesion could be seen, or that it is enough; shape (n,)."""
+        return np.asarray(self.regimes_at(self.speed.t_ns) != Regime.COASTING.name)
+
+    def regimes_at(self, t_ns: Times) -> NDArray[np.str_]:
+        """Regimes of the estimates of those times by name; "" where none is recorded."""
+        return self.regime.exactly(t_ns, "").astype(np.str_)
+
+    def __eq__(self, other: object) -> bool:
+        """A run is itself alone, so that what follows from it can be kept."""
+        return self is other
+
+    def __hash__(self) -> int:
+        """By identity, as well."""
+        return id(self)
+
+    @property
+    def origin_ns(self) -> int:
+        """When the run starts."""
+        return int(min(series.t_ns[0] for series in (self.speed, self.true_speed) if series.t_ns.size))
+
+    @property
+    def way(self) -> tuple[Series, Series]:
+        """Place and speed of the train: the true ones where they are known."""
+        known = self.true_position.t_ns.size > 0
+        return (self.true_position, self.true_speed) if known else (self.position, self.speed)
+
+    @property
+    def sign(self) -> int:
+        """-1 where the chainage falls along the run."""
+        place = self.way[0].values
+        return -1 if place[-1] < place[0] else 1
+
+    def seconds(self, t_ns: Times) -> Array:
+        """Times as seconds from the start of the run."""
+        return np.asarray((t_ns - self.origin_ns) * 1e-9, dtype=np.float64)
