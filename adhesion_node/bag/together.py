@@ -11,7 +11,9 @@
 Where the numbers stand follows from the type and from the texts before them, so equal texts make equal places.
 """
 
-from collections.abc import Callable, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import islice, repeat
 from struct import error, unpack_from
 from types import SimpleNamespace
 from typing import Any
@@ -19,7 +21,14 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
+from ..wire.line import Line
+from ..wire.messages.refused import Rejected
+from ..wire.topic import Topic
+from .recordings import Record
 from .types import deserialize, typestore
+
+MOST_TOGETHER = 256
+"""Messages that are read together: what is theirs stays in the processor's cache."""
 
 _HEAD_BYTES = 4
 """Before the body, from which CDR counts its alignment."""
@@ -56,6 +65,36 @@ def together(cdrs: Sequence[bytes], type_name: str) -> Any | None:
         return layout.trajectory() if type_name == TRAJECTORY else layout.message(type_name)
     except (error, ValueError):
         return None
+
+
+def read_together(
+    records: Iterable[Record], topics: Mapping[str, Topic], line: Line
+) -> Iterator[tuple[Record, Any | None]]:
+    """Yield the records, each with what its topic reads of it.
+
+    None where it is of none of the `topics`, by recorded name, or has to be read by itself, if only to be refused.
+    """
+    every = iter(records)
+    while some := list(islice(every, MOST_TOGETHER)):
+        alike = defaultdict[tuple[str, int], list[bytes]](list)
+        for record in some:
+            alike[record.topic, len(record.cdr)].append(record.cdr)
+        read = {each: iter(_read(topics.get(each[0]), cdrs, line)) for each, cdrs in alike.items()}
+        for record in some:
+            yield record, next(read[record.topic, len(record.cdr)])
+
+
+def _read(topic: Topic | None, cdrs: Sequence[bytes], line: Line) -> Iterable[Any | None]:
+    """Read messages of one length."""
+    message = together(cdrs, topic.type) if topic and topic.codec and topic.codec.together else None
+    try:
+        columns = message and topic and topic.together(message, line)
+    except Rejected:
+        columns = None
+    if columns is None:
+        return repeat(None)
+    known, rows = ~np.isnan(columns[-1]), zip(*(column.tolist() for column in columns), strict=True)
+    return (type(columns)(*row) if each else None for each, row in zip(known.tolist(), rows, strict=True))
 
 
 class _Layout:

@@ -46,12 +46,12 @@ def replay(hours: float, rate_hz: float, seed: int) -> dict[str, Any]:
         with BagReader(bag) as reader:
             selection = {name: name for name in reader.topics}
             started = time.process_time()
-            for _ in messages(reader, selection):
+            for _ in messages(reader, selection, NOMINAL):
                 pass
             reading_s = time.process_time() - started
             pipeline, filled = Pipeline(Config(), seed), list[float]()
             wall, started = time.perf_counter(), time.process_time()
-            recorded = _watched(messages(reader, selection), 2 * total, filled)
+            recorded = _watched(messages(reader, selection, NOMINAL), 2 * total, filled)
             for _ in predictions(pipeline, None, recorded, NOMINAL, array("d")):
                 pass
             took_s, wall_s = time.process_time() - started, time.perf_counter() - wall

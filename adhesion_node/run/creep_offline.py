@@ -37,7 +37,8 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         raise ValueError(f"bag = {reader.path}: holds no {WHEEL_SPEED.name}, without which there is no creep")
     setup = creep_setup_of(given(options, NODE, CREEP_SETTINGS))
     pipeline = CreepPipeline(setup.config)
-    for _ in feed(pipeline, progress(messages(reader, selection), "messages"), CREEP_INPUTS, setup.line):
+    recorded = progress(messages(reader, selection, setup.line), "messages")
+    for _ in feed(pipeline, recorded, CREEP_INPUTS, setup.line):
         pass
     pipeline.finish()
     result = summary(pipeline)

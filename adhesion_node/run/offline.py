@@ -17,7 +17,8 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..bag import BagReader
+from ..bag import BagReader, Record
+from ..bag.together import read_together
 from ..command.options import DONE, FAILED, progress, report
 from ..core import Outcome
 from ..core.intake.samples import PressureSample, Sample
@@ -28,7 +29,7 @@ from ..wire.settings.given import given
 from ..wire.settings.nodes import SEED, SETTINGS
 from ..wire.settings.setup import setup_of
 from ..wire.topic import Topic
-from ..wire.topics import ADHESION_INPUTS, FIX, SPEED, TRUTH_MU, TRUTH_STATE
+from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_MU, TRUTH_STATE
 from .engine import EstimatorPipeline
 from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
@@ -37,7 +38,7 @@ from .score import Identified, Point, Truth, mean_relative_error_percent
 from .seen import MANY, Seen, pressure_of
 
 Recorded = tuple[str, Any, int]
-"""Our name of a message's topic, the message or why it is refused, its log time in ns."""
+"""Our name of a message's topic; the message, what was read of it, or why it is refused; its log time in ns."""
 
 Output = TypeVar("Output")
 
@@ -53,7 +54,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         )
     pipeline, window_ms = Pipeline(setup.config, setup.seed), array("d")
     truth = Truth() if TRUTH_MU.name in selection.values() else None
-    recorded = progress(messages(reader, selection), "messages")
+    recorded = progress(messages(reader, selection, setup.line), "messages")
     compared: list[Point] = []
     seen = Seen()
     with rows_to(options.out) as write:
@@ -189,11 +190,18 @@ def summary(
     return result
 
 
-def messages(reader: BagReader, selection: Mapping[str, str]) -> Iterator[Recorded]:
-    """Yield the recorded messages of `selection` under our names; one that does not decode as refused."""
-    for record in reader.messages(selection):
-        try:
-            message = record.message
-        except Rejected as refusal:
-            message = refusal
-        yield selection[record.topic], message, record.log_ns
+def messages(reader: BagReader, selection: Mapping[str, str], line: Line) -> Iterator[Recorded]:
+    """Yield the recorded messages of `selection` under our names; one that does not decode as refused.
+
+    Of a sensor's messages that can be read together it is their samples.
+    """
+    sensors = {theirs: topic for theirs, ours in selection.items() for topic in SENSORS if topic.name == ours}
+    for record, sample in read_together(reader.messages(selection), sensors, line):
+        yield selection[record.topic], _message(record) if sample is None else sample, record.log_ns
+
+
+def _message(record: Record) -> Any:
+    try:
+        return record.message
+    except Rejected as refusal:
+        return refusal

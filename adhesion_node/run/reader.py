@@ -37,7 +37,10 @@ class Reader:
         """The anchor that counts; None before one was heard."""
 
     def read(self, topic: Topic, message: Any) -> Sample:
-        """Read a message of one of the inputs, at the time of what it measured; raises Rejected."""
+        """Read a message of one of the inputs, at the time of what it measured; raises Rejected.
+
+        What is a sample already only takes its turn.
+        """
         if topic.name in self.line.unused:
             self.source = None if self.source is topic else self.source
             raise Rejected(Reason.SWITCHED_OFF, f"{USE}{topic.name} = false")
@@ -45,13 +48,12 @@ class Reader:
         return sample._replace(t_ns=sample.t_ns - round(late_s * NS)) if late_s else sample
 
     def _read(self, topic: Topic, message: Any) -> Sample:
-        if topic not in self.anchors:
-            sample: Sample = topic.read(message, self.line)
-            return sample
-        if self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
+        is_anchor = topic in self.anchors
+        if is_anchor and self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
             raise Rejected(Reason.OTHER_SOURCE, f"{topic.name} beside {self.source.name}")
-        sample = topic.read(message, self.line)
-        self.source = topic
+        sample: Sample = message if isinstance(message, Sample) else topic.read(message, self.line)
+        if is_anchor:
+            self.source = topic
         return sample
 
 

@@ -76,7 +76,7 @@ class Recording(NamedTuple):
     def _replay(self) -> tuple[NDArray[np.void], NDArray[np.void]]:
         setup = setup_of(dict(self.settings))
         with BagReader(Path(self.path)) as reader:
-            recorded = offline.messages(reader, select_from(reader, self.remaps))
+            recorded = offline.messages(reader, select_from(reader, self.remaps), setup.line)
             pipeline = Pipeline(setup.config, setup.seed)
             made = offline.predictions(pipeline, None, recorded, setup.line, array("d"))
             found = list(brakings(made, self.cell_m, setup.line.sign))

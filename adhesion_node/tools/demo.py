@@ -255,7 +255,7 @@ def _evaluate(reader: BagReader, task: Task) -> dict[str, Any]:
     selection = select(reader.topics)
     setup, truth = setup_of(task.estimator), Truth()
     pipeline = Pipeline(setup.config, task.seed)
-    replayed = offline.replay(pipeline, truth, offline.messages(reader, selection), setup.line)
+    replayed = offline.replay(pipeline, truth, offline.messages(reader, selection, setup.line), setup.line)
     levels = read_status(reader, ATP_STATUS, "level").values.tolist()
     changes = [level for previous, level in pairwise(["", *levels]) if level != previous]
     estimates = [made.estimate for made in replayed.predictions]

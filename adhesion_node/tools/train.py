@@ -161,7 +161,8 @@ def _estimate(options: argparse.Namespace) -> int:
     with BagReader(options.estimate) as reader:
         for loss in reader.damage:
             print(f"train: {loss}", file=sys.stderr)
-        recorded = progress(offline.messages(reader, select_from(reader, options.remap)), "messages")
+        selection = select_from(reader, options.remap)
+        recorded = progress(offline.messages(reader, selection, setup.line), "messages")
         found = train_found.find(setup.config, train_found.read(recorded, setup.line))
     text = [f"believed: {setup.train}", *found.told()]
     if options.output and found.says_anything:

@@ -63,13 +63,17 @@ class Topic(NamedTuple):
 
     def read(self, message: Any, line: Line = NOMINAL) -> Any:
         """Read and check a message; raises Rejected with reason and remedy."""
-        if self.frame is Frame.LINE and message.header.frame_id != line.frame:
-            raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}, frame = {line.frame!r}")
+        self._check_frame(message, line)
         return self._codec.read(message, line)
 
     def together(self, message: Any, line: Line = NOMINAL) -> Any:
-        """Read one message that stands for many, whatever its frame; raises Rejected where that refuses them all."""
+        """Read one message that stands for many; raises Rejected where that refuses them all."""
+        self._check_frame(message, line)
         return self._codec.together and self._codec.together(message, line)
+
+    def _check_frame(self, message: Any, line: Line) -> None:
+        if self.frame is Frame.LINE and message.header.frame_id != line.frame:
+            raise Rejected(Reason.WRONG_FRAME, f"header.frame_id = {message.header.frame_id!r}, frame = {line.frame!r}")
 
     def build(self, new: New, *values: Any) -> Any:
         """Build the message of what the codec's writer takes; None where there is nothing to publish."""

@@ -19,14 +19,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as some
 
+from adhesion_node.bag import Record
 from adhesion_node.bag.statuses import TYPE as DIAGNOSTICS
 from adhesion_node.bag.statuses import statuses
-from adhesion_node.bag.together import TRAJECTORY, together
+from adhesion_node.bag.together import MOST_TOGETHER, TRAJECTORY, read_together, together
 from adhesion_node.bag.types import deserialize, encode, new, serialize, typestore
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.wire import topics
-from adhesion_node.wire.line import Line
+from adhesion_node.wire.line import NOMINAL, Line
 from adhesion_node.wire.messages.curves import write_curve
 from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.messages.results import Status
@@ -97,7 +98,9 @@ def one_by_one(topic: Topic, messages: list[Any]) -> list[Any]:
 
 @given(some.lists(some.tuples(ANY, ANY, ANY, ANY), min_size=2, max_size=6))
 @example([(0.0, 0.0, 0.0, 0.0), (math.nan, 1.0, 1.0, 1.0), (1.0, 200.0, 1e-12, 1.0), (3e9, 1.0, 1.0, 1.0)])
-@pytest.mark.parametrize("topic", [topics.STATE, topics.TRUTH_STATE, topics.DECELERATION, topics.BRAKE_PRESSURE])
+@pytest.mark.parametrize(
+    "topic", [topics.STATE, topics.TRUTH_STATE, topics.DECELERATION, topics.BRAKE_PRESSURE, topics.ODOMETRY]
+)
 def test_many_messages_are_read_as_each_is(topic: Topic, rows: list[tuple[float, float, float, float]]) -> None:
     blank = _filled(topic.type, np.random.default_rng(1), "track")
     messages = [_with(blank, topic, row) for row in rows]
@@ -122,6 +125,29 @@ def _with(blank: Any, topic: Topic, row: tuple[float, float, float, float]) -> A
 
 def _linear(blank: Any) -> Any:
     return blank.twist.twist.linear
+
+
+def test_records_come_in_their_order_with_what_can_be_read_together() -> None:
+    def position(k: int, frame: str = "track", place_m: float = 1.0) -> Record:
+        cdr = encode(topics.POSITION, k, (place_m,), 0.25 if k % 3 else 0.0, frame)
+        return Record("/train1/position", topics.POSITION.type, cdr, k)
+
+    def pressure(k: int, absolute_pa: float = 2e5) -> Record:
+        return Record("brake", topics.BRAKE_PRESSURE.type, encode(topics.BRAKE_PRESSURE, k, (absolute_pa,)), k)
+
+    taken = {"/train1/position": topics.POSITION, "brake": topics.BRAKE_PRESSURE, "speed": topics.SPEED}
+    records = [make(k) for k in range(3 * MOST_TOGETHER // 2) for make in (position, pressure)]
+    records[10] = Record("speed", topics.SPEED.type, encode(topics.SPEED, 5, (30.0,)), 5)
+    records[20:23] = position(10, "map"), pressure(10, 2.0), position(11, place_m=math.nan)
+    records[-1] = records[-1]._replace(cdr=records[-1].cdr[:-3])
+    read = list(read_together(records, taken, NOMINAL))
+    assert [record for record, _ in read] == records
+    by_itself = [index for index, (_, sample) in enumerate(read) if sample is None]
+    assert by_itself == [10, 20, 21, 22, len(records) - 1], "of no codec for many, elsewhere, refused, refused, cut"
+    for record, sample in read:
+        assert sample is None or sample == taken[record.topic].read(record.message)
+    strange = [position(k, "trick") for k in range(3)]
+    assert [sample for _, sample in read_together(strange, taken, NOMINAL)] == [None] * 3
 
 
 @given(some.lists(some.floats(), min_size=2, max_size=6))

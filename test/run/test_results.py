@@ -48,7 +48,7 @@ def rows_of(bag: Path, out: Path, *options: str) -> list[dict[str, str]]:
 def test_every_estimate_is_a_row_of_numbers_as_they_were_published(bag: Path, tmp_path: Path) -> None:
     rows = rows_of(bag, tmp_path / "results.csv")
     with BagReader(bag) as reader:
-        recorded = offline.messages(reader, select_from(reader, []))
+        recorded = offline.messages(reader, select_from(reader, []), NOMINAL)
         pipeline = Pipeline(Config(), 1)
         made = list(offline.predictions(pipeline, None, recorded, NOMINAL, array("d")))
     assert list(rows[0]) == list(COLUMNS)
@@ -93,7 +93,7 @@ def test_estimates_come_while_the_recording_is_read(bag: Path) -> None:
             yield message
 
     with BagReader(bag) as reader:
-        stream = counted(offline.messages(reader, select_from(reader, [])))
+        stream = counted(offline.messages(reader, select_from(reader, []), NOMINAL))
         made = offline.predictions(Pipeline(Config(), 1), None, stream, NOMINAL, array("d"))
         next(made)
         early = read

@@ -46,7 +46,7 @@ def estimate_run(
     pipeline, inputs, lost = Pipeline(setup.config, setup.seed), Inputs(), Counter[str]()
     mu, mu_lower, position, speed = (Numbers() for _ in range(4))
     regime, changes, safe, nominal = Texts(), Texts(), Curves(targets), Curves(targets)
-    recorded = progress(offline.messages(reader, selection), "messages")
+    recorded = progress(offline.messages(reader, selection, setup.line), "messages")
     for made in _predictions(pipeline, inputs, _noting(inputs, lost, recorded, setup.line), setup.line):
         write(row_of(pipeline, made, setup.line.sign))
         e = made.estimate

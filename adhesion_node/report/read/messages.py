@@ -14,16 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...bag import BagReader, Record
-from ...bag.together import together
+from ...bag.together import MOST_TOGETHER, together
 from ...wire.line import NOMINAL, Line
 from ...wire.messages.parts import stamp_ns, stamps_ns
 from ...wire.messages.refused import Rejected
 from ...wire.messages.results import Status
 from ...wire.topic import Frame, Topic
 from .series import Times
-
-MOST_TOGETHER = 256
-"""Messages that are read together: what is theirs stays in the processor's cache."""
 
 
 class Sample(NamedTuple):

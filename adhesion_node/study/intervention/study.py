@@ -33,6 +33,7 @@ from ...core.prediction import Prediction
 from ...run import offline
 from ...run.pipeline import Pipeline
 from ...run.score import Truth
+from ...wire.line import NOMINAL
 from ..trial.estimators import EXACT
 from ..trial.figures import Place, add_figure_options, figures_of
 from ..xie.distances import BRAKINGS
@@ -90,7 +91,7 @@ def _draw(said: list[Prediction], place: Place) -> None:
 def predictions(bag: Path, seed: int) -> list[Prediction]:
     """What the estimator says in an offline replay of a recording. Raises ValueError when it cannot be read."""
     with BagReader(bag) as reader:
-        messages = offline.messages(reader, select(reader.topics))
+        messages = offline.messages(reader, select(reader.topics), NOMINAL)
         return offline.replay(Pipeline(EXACT, seed), Truth(), progress(messages, "messages")).predictions
 
 

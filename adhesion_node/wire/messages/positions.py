@@ -11,12 +11,14 @@
 from collections.abc import Sequence
 from typing import Any
 
-from ...core.intake.samples import MAX_VARIANCE_M2, MIN_VARIANCE_M2, PositionSample
+import numpy as np
+
+from ...core.intake.samples import MAX_POSITION_M, MAX_VARIANCE_M2, MIN_VARIANCE_M2, PositionSample
 from ..line import TRAIN, Line
 from . import parts
 from .codec import Codec, Fields, New
-from .parts import stamp_ns, writer
-from .refused import Reason, Rejected, plausible
+from .parts import stamp_ns, stamps_ns, writer
+from .refused import Reason, Rejected, plausible, whole, within
 
 NO_FIX = -1
 """NavSatStatus: no position. -2, a status never set, is taken for one."""
@@ -29,6 +31,14 @@ def read_position(message: Any, line: Line) -> PositionSample:
     """Read a position along the run, m and m^2, from a message with a `pose`; raises Rejected."""
     place = parts.place_of(message, line)
     return PositionSample(stamp_ns(message.header), place, _variance(message.pose.covariance[0], line))
+
+
+def _positions_together(message: Any, line: Line) -> PositionSample:
+    """Read many of them at once."""
+    place = line.sign * within(message.pose.pose.position.x, MAX_POSITION_M)
+    given = message.pose.covariance[0]
+    variance = np.where(given == 0.0, line.position_std_m**2, within(given, MAX_VARIANCE_M2, MIN_VARIANCE_M2))
+    return PositionSample(stamps_ns(message.header), *whole(place, variance))
 
 
 def read_fix(message: Any, line: Line) -> PositionSample:
@@ -76,6 +86,10 @@ def _odometry(new: New, x: Sequence[float], variance: float) -> Fields:
     return {"child_frame_id": TRAIN, "pose": parts.pose(new, x[0], variance), "twist": still}
 
 
-POSITION = Codec(read_position, writer(lambda new, x, variance: {"pose": parts.pose(new, x[0], variance)}))
+POSITION = Codec(
+    read_position,
+    writer(lambda new, x, variance: {"pose": parts.pose(new, x[0], variance)}),
+    _positions_together,
+)
 FIX = Codec(read_fix, writer(_fix))
-ODOMETRY = Codec(read_position, writer(_odometry))
+ODOMETRY = Codec(read_position, writer(_odometry), _positions_together)

@@ -110,3 +110,9 @@ def plausible(what: str, value: Any, reason: Reason, most: float, least: float |
 def within(values: Array, most: float, least: float | None = None) -> Any:
     """Return those numbers that `plausible` returns, NaN in the place of others."""
     return np.where((values >= (-most if least is None else least)) & (values <= most), values, np.nan)
+
+
+def whole(*columns: Array) -> list[Any]:
+    """Return the numbers of many messages, all of a message NaN where one of them is."""
+    known = np.isfinite(columns).all(axis=0)
+    return [np.where(known, column, np.nan) for column in columns]

@@ -22,12 +22,12 @@ import numpy as np
 
 from ...core.atp.received import TrainState
 from ...core.intake.samples import MAX_POSITION_M, MAX_SPEED_MPS, MIN_VARIANCE_M2
-from ...core.physics.train import GRAVITY, Array
+from ...core.physics.train import GRAVITY
 from ..line import TRAIN, Line
 from . import parts
 from .codec import Codec, Fields, New
 from .parts import header, stamp_ns, stamps_ns
-from .refused import Reason, Rejected, finite, within
+from .refused import Reason, Rejected, finite, whole, within
 
 if TYPE_CHECKING:  # the simulator uses these codecs, too, and must not know the estimators
     from ...core.prediction import Prediction
@@ -81,9 +81,7 @@ def read_deceleration(message: Any, _line: Line) -> Deceleration:
 
 def _decelerations(message: Any, _line: Line) -> Deceleration:
     """Read many at once."""
-    along, variance = message.accel.accel.linear.x, message.accel.covariance[0]
-    known = np.isfinite(along) & np.isfinite(variance)
-    return Deceleration(stamps_ns(message.header), _where(known, along), _where(known, variance))
+    return Deceleration(stamps_ns(message.header), *whole(message.accel.accel.linear.x, message.accel.covariance[0]))
 
 
 def write_deceleration(new: New, prediction: Prediction, *, lower: bool = False) -> Fields | None:
@@ -118,12 +116,7 @@ def _states(message: Any, line: Line, least: float = 0.0) -> TrainState:
     place = line.sign * within(message.pose.pose.position.x, MAX_POSITION_M)
     speed = within(message.twist.twist.linear.x, MAX_SPEED_MPS)
     variances = within(np.array([message.pose.covariance[0], message.twist.covariance[0]]), MOST, least)
-    known = np.isfinite([place, speed, *variances]).all(axis=0)
-    return TrainState(stamps_ns(message.header), *(_where(known, one) for one in (place, speed, *np.sqrt(variances))))
-
-
-def _where(known: Any, values: Array) -> Any:
-    return np.where(known, values, np.nan)
+    return TrainState(stamps_ns(message.header), *whole(place, speed, *np.sqrt(variances)))
 
 
 def read_estimated_state(message: Any, line: Line) -> TrainState:

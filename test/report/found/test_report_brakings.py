@@ -37,6 +37,7 @@ from adhesion_node.run import offline
 from adhesion_node.run.brakings import brakings as of_predictions
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.run.score import Truth
+from adhesion_node.wire.line import NOMINAL
 from adhesion_node.wire.settings.setup import setup_of
 from adhesion_node.wire.topics import (
     ATP_STATUS,
@@ -103,7 +104,7 @@ def test_a_table_of_brakings_has_those_of_the_report(tmp_path: Path) -> None:
     write_run(tmp_path / "bag", samples())
     with BagReader(tmp_path / "bag") as reader:
         selection = select_from(reader, [])
-        made = offline.replay(Pipeline(Config(), 1), Truth(), offline.messages(reader, selection)).predictions
+        made = offline.replay(Pipeline(Config(), 1), Truth(), offline.messages(reader, selection, NOMINAL)).predictions
         run, _ = estimate_run(reader, selection, setup_of({"seed": 1}), lambda _: None)
     (row,) = (one.row for one in of_predictions(made))
     (part,) = brakings(run)
