@@ -13,6 +13,7 @@ from __future__ import annotations
 import gc
 import json
 import math
+import os
 import sys
 from collections.abc import Iterator
 from dataclasses import replace
@@ -237,6 +238,7 @@ def test_trains_of_one_process_are_all_served(kind: str, monkeypatch: pytest.Mon
     assert row["calls"] + row["unused"] == pytest.approx(30, abs=12)
     assert row["unused"] <= 12, "what is on its way at the end"
     assert 0.0 < row["median_ms"] <= row["p99_ms"]
+    assert 0.0 < row["cores"] < (os.cpu_count() or 1)
     assert row["cpu_ms_per_position"] > 0.0
     assert 0.0 < row["cpu_p99_ms"] <= row["cpu_max_ms"]
     assert gc.get_freeze_count() == 0, "only while it measures"
@@ -252,6 +254,7 @@ def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str], mon
     assert set(result) == {"versions", "seed", "step", "memory"}
     ways = [(row["rate_hz"], row["estimate_s"]) for row in result["step"]["rows"]]
     assert ways == [(10.0, 0.5), (100.0, 0.5), (10.0, 0.0), (100.0, 0.0)]
+    assert all({"core_percent", "cpu_p99_ms", "p99_ms"} <= set(row) for row in result["step"]["rows"])
     assert result["versions"]["numpy"] == np.__version__
     assert bench.main(["memory", "--minutes", "0.2"]) == 0
     shown = capsys.readouterr().out
