@@ -31,7 +31,7 @@ class Contender(NamedTuple, Generic[Result]):
 
 
 class Timed(NamedTuple, Generic[Result]):
-    """What the calls of a contender took, s, and returned."""
+    """What the calls of a contender took of the processor, s, and returned."""
 
     seconds: list[float]
     results: list[Result]
@@ -46,9 +46,9 @@ def interleave(contenders: Sequence[Contender[Result]]) -> dict[str, Timed[Resul
     for turn in progress(range(rounds), "rounds", rounds):
         for name, run, wanted in contenders:
             if turn * wanted % rounds < wanted:
-                started = time.perf_counter()
+                started = time.process_time()
                 result = run()
-                timed[name].seconds.append(time.perf_counter() - started)
+                timed[name].seconds.append(time.process_time() - started)
                 timed[name].results.append(result)
     return timed
 

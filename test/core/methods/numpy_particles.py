@@ -27,20 +27,21 @@ def filtered(motion: Motion, prior: Gaussian, window: Window, mu: float, draws: 
     states, stepped, logs = np.empty((2, steps + 1, count)), np.empty((2, steps, count)), np.zeros((steps + 1, count))
     states[:, 0] = (prior.mean + draws.start @ np.linalg.cholesky(prior.covariance).T).T
     noise = np.sqrt(np.array(motion.noise(window.dt_s)))[:, :, None] * draws.normal
-    weights, log_likelihood, ess, top = np.ones(count), 0.0, float(count), 0.0
+    weights, log_likelihood, ess = np.ones(count), 0.0, float(count)
     for k in range(steps):
         stepped[:, k] = motion.advance(states[0, k], states[1, k], window.dt_s[k], window.brake[k], mu)
         moved, before = stepped[:, k], logs[k]
         if weights.sum() ** 2 < 0.5 * count * (weights**2).sum():
-            log_likelihood += top + np.log(weights.mean())
+            log_likelihood += np.log(weights.mean())
             moved, before = moved[:, systematic(weights, draws.uniform[k])], np.zeros(count)
         s, v = states[:, k + 1] = moved + noise[:, k]
         logs[k + 1] = before - 0.5 * (window.position_m[k] - s) ** 2 / window.variance_m2[k]
         logs[k + 1] -= 0.5 * (window.speed_mps[k] - v) ** 2 / window.speed_variance[k]
-        top = logs[k + 1].max()
-        weights = np.exp(logs[k + 1] - top)
+        log_likelihood += logs[k + 1].max()
+        logs[k + 1] -= logs[k + 1].max()
+        weights = np.exp(logs[k + 1])
         ess = min(ess, weights.sum() ** 2 / (weights**2).sum())
-    return Pass(Particles(states, stepped, logs), float(log_likelihood + top + np.log(weights.mean())), ess)
+    return Pass(Particles(states, stepped, logs), float(log_likelihood + np.log(weights.mean())), ess)
 
 
 def systematic(weights: Array, offset: float) -> Array:
@@ -56,7 +57,7 @@ def smoothed(motion: Motion, window: Window, particles: Particles) -> Array:
     """Smoothed weights (27), (K + 1, N)."""
     states, stepped, logs = particles
     marginal, spread = np.empty(logs.shape), np.sqrt(np.array(motion.noise(window.dt_s)))
-    marginal[-1] = np.exp(logs[-1] - logs[-1].max())
+    marginal[-1] = np.exp(logs[-1])
     marginal[-1] /= marginal[-1].sum()
     for k in range(window.steps - 1, -1, -1):
         off = (stepped[:, k, :, None] - states[:, k + 1, None, :]) / spread[:, k, None, None]

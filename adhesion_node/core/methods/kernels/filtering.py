@@ -28,6 +28,12 @@ GRAVITY = 9.8
 DT, APPLIED, PLACE, PLACE_VARIANCE, RATE, RATE_VARIANCE = 0, 1, 2, 3, 4, 5
 """Rows of `Given.window`, as in `equation`."""
 
+BITS, WHOLE, LN2 = 1.4426950408889634, 6755399441055744.0, (6.93147180369123816490e-01, 1.90821492927058770002e-10)
+"""1/ln 2; what moves the whole part of a number into its last bits; ln 2 in two parts."""
+
+LEAST = -300.0
+"""Logarithm of the least weight that is told apart."""
+
 
 class Given(NamedTuple):
     """Train, track, the law of the first state, and what was measured."""
@@ -65,7 +71,7 @@ class Particles(NamedTuple):
     stepped: Array
     """Where the noise-free step leads those of the times 0..K-1, (2, K, N)."""
     log_weights: Array
-    """Up to a constant per time, (K + 1, N)."""
+    """(K + 1, N), the greatest of each time 0."""
 
 
 @kernel
@@ -84,14 +90,37 @@ def _limit(given: Given, k: int, resisting: float) -> float:
 
 
 @kernel
+def _exp(x: float) -> float:
+    """exp(x) for -700 < x < 700, to 1e-14: 2^k by the bits of a number, the rest by Taylor's series; no branch."""
+    moved = x * BITS + WHOLE
+    k = moved - WHOLE
+    r = x - k * LN2[0] - k * LN2[1]
+    series = 1.0 / 3628800.0 + r * (1.0 / 39916800.0)
+    series = 1.0 / 40320.0 + r * (1.0 / 362880.0 + r * series)
+    series = 1.0 / 720.0 + r * (1.0 / 5040.0 + r * series)
+    series = 1.0 / 24.0 + r * (1.0 / 120.0 + r * series)
+    series = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * series)))
+    bits = np.float64(series).view(np.int64) + (np.float64(moved).view(np.int64) << 52)
+    return float(np.int64(bits).view(np.float64))
+
+
+@kernel
 def _moved(given: Given, mu: float, states: Array, stepped: Array, k: int) -> None:
     """Noise-free step of the particles at time k, at adhesion `mu`."""
-    dt = given.window[DT, k]
+    dt, unresisted = given.window[DT, k], _limit(given, k, 0.0)
+    by_resistance = _limit(given, k, 1.0) - unresisted
+    c0, c1, c2 = given.resistance[0], given.resistance[1], given.resistance[2]
     for i in range(states.shape[2]):
-        s, v = states[0, k, i], states[1, k, i]
-        resisting = _resistance(given, s, v)
-        slower = v - dt * GRAVITY * (min(mu, _limit(given, k, resisting)) + resisting)
-        stepped[0, k, i], stepped[1, k, i] = s + 0.5 * dt * (v + slower), slower
+        stepped[0, k, i] = given.levels[0]
+    for section in range(given.breaks.size):
+        begins, level = given.breaks[section], given.levels[section + 1]
+        for i in range(states.shape[2]):
+            stepped[0, k, i] = level if states[0, k, i] >= begins else stepped[0, k, i]
+    for i in range(states.shape[2]):
+        v = states[1, k, i]
+        resisting = c0 + v * (c1 + c2 * v) + stepped[0, k, i]
+        slower = v - dt * GRAVITY * (min(mu, unresisted + by_resistance * resisting) + resisting)
+        stepped[0, k, i], stepped[1, k, i] = states[0, k, i] + 0.5 * dt * (v + slower), slower
 
 
 @kernel
@@ -119,28 +148,31 @@ def filtered(given: Given, mu: float, draws: Draws, particles: Particles) -> tup
             states[c, 0, i] = given.mean[c] + start[i, 0] * given.root[c, 0] + start[i, 1] * given.root[c, 1]
     logs[0] = 0.0
     weights, themselves = np.ones(count), np.arange(count)
-    total, square, top, log_likelihood, ess = float(count), float(count), 0.0, 0.0, float(count)
+    total, square, log_likelihood, ess = float(count), float(count), 0.0, float(count)
     for k in range(window.shape[1]):
         _moved(given, mu, states, stepped, k)
         poor = total * total < 0.5 * count * square
         parents = systematic(weights, uniform[k]) if poor else themselves
         if poor:
-            log_likelihood += top + math.log(total / count)
-        by_place, by_speed = -0.5 / window[PLACE_VARIANCE, k], -0.5 / window[RATE_VARIANCE, k]
+            log_likelihood += math.log(total / count)
+        by_place, by_rate = -0.5 / window[PLACE_VARIANCE, k], -0.5 / window[RATE_VARIANCE, k]
+        kept = 0.0 if poor else 1.0
         for i in range(count):
             s = given.spread[0, k] * normal[0, k, i] + stepped[0, k, parents[i]]
             v = given.spread[1, k] * normal[1, k, i] + stepped[1, k, parents[i]]
-            states[0, k + 1, i], states[1, k + 1, i] = s, v
-            before = 0.0 if poor else logs[k, i]
-            logs[k + 1, i] = before + by_place * (window[PLACE, k] - s) ** 2 + by_speed * (window[RATE, k] - v) ** 2
+            states[0, k + 1, i], states[1, k + 1, i], off_s, off_v = s, v, window[PLACE, k] - s, window[RATE, k] - v
+            logs[k + 1, i] = kept * logs[k, i] + by_place * off_s * off_s + by_rate * off_v * off_v
         top = logs[k + 1].max()
+        log_likelihood += top
+        for i in range(count):
+            logs[k + 1, i] -= top
+            weights[i] = _exp(max(logs[k + 1, i], LEAST))
         total, square = 0.0, 0.0
         for i in range(count):
-            weights[i] = math.exp(logs[k + 1, i] - top)
             total += weights[i]
             square += weights[i] ** 2
         ess = min(ess, total**2 / square)
-    return log_likelihood + top + math.log(total / count), ess
+    return log_likelihood + math.log(total / count), ess
 
 
 @kernel

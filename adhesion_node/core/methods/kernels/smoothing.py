@@ -8,7 +8,10 @@
 
 """Marginal particle smoother in a window of K steps with N particles.
 
-Its loops run over plain blocks of numbers, so that the compiler takes several of them at once.
+Its loops run over plain rows of numbers, so that the compiler takes many of them at once, in single precision: a
+pairwise weight to 1e-4, their sums to 1e-5, far below what N particles leave open. No row is summed up along itself,
+as the order of that would depend on the processor: the weights of all pairs are formed twice instead, once for the
+sums over the ancestors, once for the shares.
 """
 
 from __future__ import annotations
@@ -25,89 +28,93 @@ if TYPE_CHECKING:
     from .filtering import Particles
 
 Array = NDArray[np.float64]
+Singles = NDArray[np.float32]
 Indices = NDArray[np.int64]
+Bounds = NDArray[np.uint64]
+"""Never negative, so that no index has to be asked whether it counts from the end."""
 
 MANY, BUCKETS = 64, 64
 """Particles from which on those too far away are left out, and parts into which their range is cut for that."""
 
-REACH = 9.5
+AT_ONCE = 16
+"""Singles that the widest processors take at once."""
+
+REACH = 8.0
 """Standard deviations of the process noise beyond which a particle counts as too far away to be an ancestor."""
 
-LEFT_OUT, SMALLEST_TOTAL = 1e-12, 1e-100
-"""Part of a sum that may be left out at most, and the least sum that has not lost digits."""
+LEFT_OUT = 1e-7
+"""Part of a sum that may be left out at most."""
 
-NEGLIGIBLE = 1e-18
+NEGLIGIBLE = 1e-10
 """Smoothed weight below which a particle is no part of any sum."""
 
-AT_ONCE = 1024
-"""Numbers of a block, which stays in the processor's cache."""
+BITS, UNIT = 1.0 / math.log(2.0), math.sqrt(0.5 / math.log(2.0))
+"""A natural logarithm to the base 2; a standard deviation, so that exp(-x^2/2) is 2^-x^2."""
 
-LEAST_EXPONENT = -300.0
-"""Weights below exp of this are no part of any sum."""
+LEAST_BITS, WHOLE, ONE = np.float32(-80.0), np.float32(12582912.0), np.float32(1.0)
+"""Least power of 2 that is told apart; what moves the whole part of a single into its last bits."""
+
+C1, C2, C3, C4, C5, C6 = (np.float32(math.log(2.0) ** n / math.factorial(n)) for n in range(1, 7))
+"""Taylor's series of 2^x."""
 
 
 class Cloud(NamedTuple):
-    """Particles of one time, in standard deviations of the process noise, with weights or their logarithms."""
+    """Particles of one time: places, in `UNIT` from one of them, and weights, or their logarithms to the base 2."""
 
-    s: Array
-    v: Array
-    weight: Array
-
-
-class Ancestors(NamedTuple):
-    """Of each particle after a step: the first ancestor, and the first one behind them."""
-
-    first: Indices
-    last: Indices
-    least: float
-    """What a row of exponentials must sum to; else it is formed anew of all particles, counted from the likeliest."""
+    s: Singles
+    v: Singles
+    weight: Singles
 
 
-class Memory(NamedTuple):
-    """Where all steps write."""
+class Near(NamedTuple):
+    """Of each particle: the first one near it on the other side of the step, and the first one behind those.
 
-    block: Array
-    buffer: Array
-    far: Indices
+    Both are multiples of `AT_ONCE`, so the clouds are as long.
+    """
+
+    first: Bounds
+    last: Bounds
 
 
 @kernel
-def _exponential(x: Array, buffer: Array) -> None:
-    """exp(x) in place, for -700 < x < 700, to 1e-14: 2^k by the bits of a number, the rest by Taylor's series."""
-    bits = buffer.view(np.int64)
-    for i in range(x.size):
-        buffer[i] = x[i] * 1.4426950408889634 + 6755399441055744.0  # k stands in the last bits
-    for i in range(x.size):
-        k = buffer[i] - 6755399441055744.0
-        r = x[i] - k * 6.93147180369123816490e-01 - k * 1.90821492927058770002e-10
-        series = 1.0 / 3628800.0 + r * (1.0 / 39916800.0)
-        series = 1.0 / 40320.0 + r * (1.0 / 362880.0 + r * series)
-        series = 1.0 / 720.0 + r * (1.0 / 5040.0 + r * series)
-        series = 1.0 / 24.0 + r * (1.0 / 120.0 + r * series)
-        x[i] = 1.0 + r * (1.0 + r * (0.5 + r * (1.0 / 6.0 + r * series)))
-    for i in range(x.size):
-        bits[i] = (bits[i] + 1023) << 52
-    for i in range(x.size):
-        x[i] *= buffer[i]
+def _power(x: np.float32) -> np.float32:
+    """2^x for -126 < x < 127, to 3e-7: the whole part by the bits of a number, the rest by Taylor's series."""
+    moved = x + WHOLE
+    r = x - (moved - WHOLE)
+    series = ONE + r * (C1 + r * (C2 + r * (C3 + r * (C4 + r * (C5 + r * C6)))))
+    bits = np.float32(series).view(np.int32) + (np.float32(moved).view(np.int32) << 23)
+    return np.int32(bits).view(np.float32)
 
 
 @kernel
-def _ordered(along: Array, order: Indices, ends: Indices) -> tuple[float, float]:
-    """Order numbers by the bucket they fall into, and say where each bucket ends; return least and buckets per unit."""
-    least, per = along.min(), (BUCKETS - 1e-6) / max(along.max() - along.min(), 1e-100)
-    ends[:] = 0
-    for i in range(along.size):
-        ends[int((along[i] - least) * per)] += 1
-    for bucket in range(1, BUCKETS):
-        ends[bucket] += ends[bucket - 1]
-    for i in range(along.size - 1, -1, -1):
-        bucket = int((along[i] - least) * per)
-        ends[bucket] -= 1
-        order[ends[bucket]] = i
-    for bucket in range(BUCKETS - 1):
-        ends[bucket] = ends[bucket + 1]
-    ends[BUCKETS - 1] = along.size
-    return least, per
+def _summed(before: Cloud, after: Cloud, near: Near, totals: Singles) -> None:
+    """Sum up w_t^i p(x_t+1^j | x_t^i) over the ancestors of each particle after a step, up to a constant."""
+    totals[:] = 0.0
+    for i in range(near.first.size):
+        s, v, weight = before.s[i], before.v[i], before.weight[i]
+        for j in range(near.first[i], near.last[i]):
+            off_s, off_v = after.s[j] - s, after.v[j] - v
+            totals[j] += _power(max(weight - off_s * off_s - off_v * off_v, LEAST_BITS))
+
+
+@kernel
+def _shared(before: Cloud, after: Cloud, rows: int, near: Near, totals: Singles, least: float, now: Singles) -> None:
+    """Share the smoothed weights after a step among the ancestors (27), save where these sum up to less than that."""
+    now[:] = 0.0
+    for j in range(rows):
+        if totals[j] >= least:
+            s, v, share = after.s[j], after.v[j], after.weight[j] / totals[j]
+            for i in range(near.first[j], near.last[j]):
+                off_s, off_v = before.s[i] - s, before.v[i] - v
+                now[i] += share * _power(max(before.weight[i] - off_s * off_s - off_v * off_v, LEAST_BITS))
+
+
+@kernel
+def _alone(places: Array, logs: Array, after: Array, weight: float, now: Array) -> None:
+    """Share the weight of a particle that no other explains well, counted from its likeliest ancestor."""
+    likely = logs - 0.5 * ((places[0] - after[0]) ** 2 + (places[1] - after[1]) ** 2)
+    likely = np.exp(likely - likely.max())
+    now += weight / likely.sum() * likely
 
 
 @kernel
@@ -123,106 +130,59 @@ def _direction(s: Array, v: Array) -> tuple[float, float]:
 
 
 @kernel
-def _part(cloud: Cloud, first: int, last: int) -> Cloud:
-    return Cloud(cloud.s[first:last], cloud.v[first:last], cloud.weight[first:last])
+def _padded(count: int) -> int:
+    return (count + AT_ONCE - 1) // AT_ONCE * AT_ONCE
 
 
 @kernel
-def _exponents(block: Array, before: Cloud, after: Cloud) -> None:
-    """ln w_t^i p(x_t+1^j | x_t^i) up to a constant, shape (J, I)."""
-    for j in range(block.shape[0]):
-        for i in range(block.shape[1]):
-            off_s, off_v = before.s[i] - after.s[j], before.v[i] - after.v[j]
-            block[j, i] = max(before.weight[i] - 0.5 * (off_s * off_s + off_v * off_v), LEAST_EXPONENT)
+def _ordered(along: Array, least: float, per: float, ends: Indices) -> tuple[Indices, Indices]:
+    """Particles in the order of the buckets they fall into, and those buckets; `ends` tells where each one ends."""
+    order, buckets = np.empty(along.size, dtype=np.int64), np.empty(along.size, dtype=np.int64)
+    ends[:] = 0
+    for i in range(along.size):
+        buckets[i] = int(min(max((along[i] - least) * per, 0.0), BUCKETS - 1.0))
+        ends[buckets[i]] += 1
+    for bucket in range(1, BUCKETS):
+        ends[bucket] += ends[bucket - 1]
+    for i in range(along.size - 1, -1, -1):
+        ends[buckets[i]] -= 1
+        order[ends[buckets[i]]] = i
+    for bucket in range(BUCKETS - 1):
+        ends[bucket] = ends[bucket + 1]
+    ends[BUCKETS - 1] = along.size
+    return order, buckets[order]
 
 
 @kernel
-def _alone(before: Cloud, after: Cloud, j: int, now: Array) -> None:
-    """Share the weight of a particle that no other explains well, counted from its likeliest ancestor."""
-    likely = before.weight - 0.5 * ((before.s - after.s[j]) ** 2 + (before.v - after.v[j]) ** 2)
-    likely = np.exp(likely - likely.max())
-    now += after.weight[j] / likely.sum() * likely
+def _near(buckets: Indices, reach: int, ends: Indices) -> Near:
+    """Who on the other side, where the buckets end so, is within reach."""
+    first, last = np.empty(buckets.size, dtype=np.uint64), np.empty(buckets.size, dtype=np.uint64)
+    for i in range(buckets.size):
+        before = buckets[i] - reach - 1
+        first[i] = (ends[before] if before >= 0 else 0) // AT_ONCE * AT_ONCE
+        last[i] = _padded(ends[min(buckets[i] + reach, BUCKETS - 1)])
+    return Near(first, last)
 
 
 @kernel
-def _shared(block: Array, after: Cloud, least: float, now: Array, far: Indices) -> int:
-    """Share the smoothed weights after a step among ancestors (27); note whose row sums to less than `least`."""
-    found = 0
-    for j in range(block.shape[0]):
-        a, b, c, d = 0.0, 0.0, 0.0, 0.0
-        whole = block.shape[1] // 4
-        for i in range(whole):
-            a += block[j, 4 * i]
-            b += block[j, 4 * i + 1]
-            c += block[j, 4 * i + 2]
-            d += block[j, 4 * i + 3]
-        for i in range(4 * whole, block.shape[1]):
-            a += block[j, i]
-        total = (a + b) + (c + d)
-        if total < least:
-            far[found] = j
-            found += 1
-        else:
-            share = after.weight[j] / total
-            for i in range(block.shape[1]):
-                now[i] += share * block[j, i]
-    return found
+def _sorted(here: Array, there: Array, alive: Indices) -> tuple[Indices, Indices, Near, Near]:
+    """Both sides of a step in order along the widest spread, and who is near whom."""
+    cos, sin = _direction(here[0], here[1])
+    before, after = cos * here[0] + sin * here[1], cos * there[0][alive] + sin * there[1][alive]
+    least, per = before.min(), BUCKETS / max(before.max() - before.min(), 1e-100)
+    ends, others = np.empty(BUCKETS, dtype=np.int64), np.empty(BUCKETS, dtype=np.int64)
+    order, buckets = _ordered(before, least, per, ends)
+    following, their_buckets = _ordered(after, least, per, others)
+    reach = int(min(REACH * per + 1.0, BUCKETS - 1.0))
+    return order, alive[following], _near(buckets, reach, others), _near(their_buckets, reach, ends)
 
 
 @kernel
-def _taken(cloud: Cloud, which: Indices) -> Cloud:
-    return Cloud(cloud.s[which], cloud.v[which], cloud.weight[which])
-
-
-@kernel
-def _near(before: Cloud, after: Cloud, ends: Indices) -> tuple[Cloud, Cloud, Indices, Ancestors]:
-    """Both clouds in order along the widest spread, the first one's order, and who may be an ancestor of each."""
-    (cos, sin), count = _direction(before.s, before.v), after.s.size
-    order, others = np.empty(before.s.size, dtype=np.int64), np.empty(count, dtype=np.int64)
-    along = cos * after.s + sin * after.v
-    _ordered(along, others, ends)
-    least, per = _ordered(cos * before.s + sin * before.v, order, ends)
-    first, last = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
-    for j in range(count):
-        from_bucket = int(min(max((along[others[j]] - REACH - least) * per, 0.0), BUCKETS))
-        to_bucket = int(min(max((along[others[j]] + REACH - least) * per, -1.0), BUCKETS - 1.0))
-        first[j] = ends[from_bucket - 1] if from_bucket > 0 else 0
-        last[j] = max(ends[to_bucket] if to_bucket >= 0 else 0, first[j])
-    least_sum = before.s.size * math.exp(-0.5 * REACH**2) / LEFT_OUT
-    return _taken(before, order), _taken(after, others), order, Ancestors(first, last, least_sum)
-
-
-@kernel
-def _share(before: Cloud, after: Cloud, ancestors: Ancestors, memory: Memory, now: Array) -> None:
-    """Share the weights after a step, of each particle among its ancestors."""
-    rows, done, (first, last, least) = after.s.size, 0, ancestors
-    while done < rows:
-        low, high, until = first[done], last[done], done + 1
-        while until < rows:
-            wider = max(high, last[until]) - min(low, first[until])
-            if wider * (until + 1 - done) > AT_ONCE:
-                break
-            low, high, until = min(low, first[until]), max(high, last[until]), until + 1
-        size = (until - done) * (high - low)
-        part, these, block = _part(before, low, high), _part(after, done, until), memory.block[:size]
-        _exponents(block.reshape(until - done, high - low), part, these)
-        _exponential(block, memory.buffer[:size])
-        found = _shared(block.reshape(until - done, high - low), these, least, now[low:high], memory.far)
-        for one in range(found):
-            _alone(before, these, memory.far[one], now)
-        done = until
-
-
-@kernel
-def _filled(places: Array, weights: Array, least: float, scale: Array, cloud: Cloud) -> int:
-    """Take the particles of more than the least weight; return their number."""
-    found = 0
-    for i in range(weights.size):
-        if weights[i] > least:
-            cloud.s[found], cloud.v[found] = places[0, i] * scale[0], places[1, i] * scale[1]
-            cloud.weight[found] = weights[i]
-            found += 1
-    return found
+def _fill(cloud: Cloud, places: Array, weights: Array, k: int, unit: float, which: Indices, count: int) -> None:
+    """Take so many particles, in that order, as singles."""
+    for i in range(count):
+        cloud.s[i], cloud.v[i] = places[0, which[i]] * UNIT, places[1, which[i]] * UNIT
+        cloud.weight[i] = weights[k, which[i]] * unit
 
 
 @kernel
@@ -233,27 +193,39 @@ def smoothed(particles: Particles, spread: Array) -> Array:
     """
     states, stepped, logs = particles
     steps, count = stepped.shape[1], logs.shape[1]
-    marginal = np.zeros((steps + 1, count))
-    size = max(AT_ONCE, count)
-    memory = Memory(np.empty(size), np.empty(size), np.empty(count, dtype=np.int64))
-    clouds = (
-        Cloud(np.empty(count), np.empty(count), np.empty(count)),
-        Cloud(np.empty(count), np.empty(count), np.empty(count)),
-    )
-    everyone = Ancestors(np.zeros(count, dtype=np.int64), np.full(count, count), SMALLEST_TOTAL)
-    ends, scales = np.empty(BUCKETS, dtype=np.int64), np.ascontiguousarray((1.0 / spread).T)
-    marginal[steps] = np.exp(logs[steps] - logs[steps].max())
+    marginal, here, there = np.empty((steps + 1, count)), np.empty((2, count)), np.empty((2, count))
+    memory = np.zeros((8, _padded(count)), dtype=np.float32)
+    before, after = Cloud(memory[0], memory[1], memory[2]), Cloud(memory[3], memory[4], memory[5])
+    totals, now, alive = memory[6], memory[7], np.empty(count, dtype=np.int64)
+    everyone, whole = np.arange(count), Near(np.zeros(count, np.uint64), np.full(count, now.size, np.uint64))
+    least = count / LEFT_OUT * (math.exp(-0.5 * REACH**2) if count >= MANY else 2.0**LEAST_BITS)
+    marginal[steps] = np.exp(logs[steps])
     marginal[steps] /= marginal[steps].sum()
     for k in range(steps - 1, -1, -1):
-        _filled(stepped[:, k], logs[k], -np.inf, scales[k], clouds[0])
-        clouds[0].weight[:] -= logs[k].max()
-        rows = _filled(states[:, k + 1], marginal[k + 1], NEGLIGIBLE, scales[k], clouds[1])
-        after = _part(clouds[1], 0, rows)
-        if count < MANY:
-            _share(clouds[0], after, everyone, memory, marginal[k])
-        else:
-            before, after, order, ancestors = _near(clouds[0], after, ends)
-            now = np.zeros(count)
-            _share(before, after, ancestors, memory, now)
-            marginal[k][order] = now
+        rows = 0
+        for i in range(count):
+            alive[rows] = i
+            rows += int(marginal[k + 1, i] > NEGLIGIBLE)
+        for c in range(2):  # in standard deviations of the process noise, from one of them
+            origin, per = stepped[c, k, 0], 1.0 / spread[c, k]
+            for i in range(count):
+                here[c, i] = (stepped[c, k, i] - origin) * per
+                there[c, i] = (states[c, k + 1, i] - origin) * per
+        order, kept, ahead, behind = everyone, alive, whole, whole
+        if count >= MANY:
+            order, kept, ahead, behind = _sorted(here, there, alive[:rows])
+        _fill(before, here, logs, k, BITS, order, count)
+        _fill(after, there, marginal, k + 1, 1.0, kept, rows)
+        _summed(before, after, ahead, totals)
+        _shared(before, after, rows, behind, totals, least, now)
+        total = 0.0
+        for i in range(count):
+            marginal[k, order[i]] = now[i]
+            total += marginal[k, order[i]]
+        for j in range(rows):
+            if totals[j] < least:
+                _alone(here, logs[k], there[:, kept[j]], marginal[k + 1, kept[j]], marginal[k])
+                total += marginal[k + 1, kept[j]]
+        for i in range(count):
+            marginal[k, i] /= total
     return marginal

@@ -60,6 +60,7 @@ class ParticleFilter:
         steps, variances = window.steps, np.concatenate((window.variance_m2, window.speed_variance))
         self.given = given(motion, prior, window)
         self.log_constant = -0.5 * float(np.log(2.0 * math.pi * variances[np.isfinite(variances)]).sum())
+        self.passes = 0
         self.draws = filtering.Draws(np.empty((2, steps, count)), np.empty(steps), np.empty((count, 2)))
         self.particles = Particles(
             np.empty((2, steps + 1, count)), np.empty((2, steps, count)), np.empty((steps + 1, count))
@@ -70,8 +71,22 @@ class ParticleFilter:
 
         Resamples systematically where the effective sample size falls below half of the particles.
         """
-        rng.standard_normal(out=self.draws.normal)
-        rng.random(out=self.draws.uniform)
-        rng.standard_normal(out=self.draws.start)
+        self._draw(rng)
         log_likelihood, ess = filtering.filtered(self.given, float(mu), self.draws, self.particles)
         return Pass(self.particles, log_likelihood + self.log_constant, ess)
+
+    def _draw(self, rng: np.random.Generator) -> None:
+        """New noise for every fourth pass, which the next three mirror: in both components, in one, in the other.
+
+        So errors that are odd in the noise cancel over four passes, for a quarter of the drawing.
+        """
+        normal, uniform, start = self.draws
+        rng.random(out=uniform)
+        if self.passes % 4 == 0:
+            rng.standard_normal(out=normal)
+            rng.standard_normal(out=start)
+        else:
+            mirrored = slice(0, 1) if self.passes % 4 == 2 else slice(0, 2)
+            normal[mirrored] *= -1.0
+            start[:, mirrored] *= -1.0
+        self.passes += 1
