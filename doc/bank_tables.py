@@ -33,7 +33,7 @@ MODULES = sorted(path.stem for path in Path(package.__file__).parent.glob("[a-z]
 def parts() -> dict[str, str]:
     """Return the tables by the name of their part."""
     return {
-        "bank kinds": table(("kind", "limits", "drift", "roughness", "restless", "prior"), _kinds()),
+        "bank kinds": table(("kind", "limits", "drift", "grows", "roughness", "restless", "prior"), _kinds()),
         "bank noises": table(("white σ", "slow σ", "lasts, s", "prior"), _noises()),
         "bank laws": table(("law over speed", "prior"), _laws()),
         "bank constants": table(("module", "constant", "value", "what it is"), _constants()),
@@ -43,7 +43,7 @@ def parts() -> dict[str, str]:
 def _kinds() -> Iterator[Sequence[str]]:
     for each in kinds.KINDS:
         limits = "adhesion" if each.slides else "brake" if each.name == "brake" else "no brake"
-        shares = (f"{share:.1%}".replace("%", " %") for share in (each.drift, each.roughness))
+        shares = (f"{share:.1%}".replace("%", " %") for share in (each.drift, each.growth, each.roughness))
         yield f"`{each.name}`", limits, *shares, f"{each.restlessness_mps:g}", f"{each.prior:g}"
 
 

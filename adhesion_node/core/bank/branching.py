@@ -77,10 +77,13 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
     steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
     parts = [bank.with_fresh(MU, mu, std * mu).labelled(HELD, 0, -math.inf, math.log(KINDS[HELD].prior))]
-    for law, (_, probability) in enumerate(laws_of(config)):
+    laws = laws_of(config)
+    for law, (_, probability) in enumerate(laws):
         for kind in SLIDING:
+            grows = KINDS[kind].growth > 0.0  # more than any law does, so that none of them matters
+            share = float(law == len(laws) - 1) if grows else probability
             for off, within in steps:
-                prior = KINDS[kind].prior * probability / len(steps)
+                prior = KINDS[kind].prior * share / len(steps)
                 if prior > 0.0:
                     middle = mu * math.exp(off)
                     part = bank.with_fresh(MU, middle, within * middle).with_fresh(ROUGH, 0.0, KINDS[kind].roughness)

@@ -27,6 +27,8 @@ class Kind(NamedTuple):
     """Standard deviation that unknown decelerations give the speed over 1 s."""
     prior: float
     """Probability when a braking begins."""
+    growth: float = 0.0
+    """Of the adhesion at one speed, in 1 s, relative."""
 
 
 KINDS = (
@@ -36,14 +38,16 @@ KINDS = (
     Kind("even", True, 0.003, 0.02, 0.035, 0.16),
     Kind("rough", True, 0.005, 0.05, 0.05, 0.1),
     Kind("restless", True, 0.02, 0.1, 0.07, 0.03),
+    Kind("drying", True, 0.02, 0.05, 0.05, 0.03, 0.025),
     Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
 )
-FREE, HELD, PASSING = 0, 1, 6
+FREE, HELD, PASSING = 0, 1, 7
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
 
 SLIDES = np.array([kind.slides for kind in KINDS])
 DRIFT = np.array([kind.drift for kind in KINDS])
 ROUGHNESS = np.array([kind.roughness for kind in KINDS])
+GROWTH = np.array([kind.growth for kind in KINDS])
 RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
 
 ROUGHNESS_M, GRADE_M = 100.0, 1500.0

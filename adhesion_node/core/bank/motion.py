@@ -149,7 +149,9 @@ def model_of(config: Config) -> moving.Model:
         breaks=breaks,
         levels=levels,
         laws=np.array([(law.floor, law.gain_kmh, law.offset_kmh, law.scale) for law, _ in laws_of(config)]),
-        kinds=np.column_stack((SLIDES, kinds.DRIFT, kinds.ROUGHNESS, kinds.RESTLESSNESS)).astype(np.float64),
+        kinds=np.column_stack(
+            (SLIDES.astype(np.float64), kinds.DRIFT, kinds.ROUGHNESS, kinds.RESTLESSNESS, kinds.GROWTH)
+        ),
         noises=np.column_stack((kinds.WHITE, kinds.SLOW, kinds.LASTS)),
         lengths=np.array([kinds.ROUGHNESS_M, kinds.GRADE_M]),
         free=np.array([kinds.FREE_STD, kinds.FREE_S]),

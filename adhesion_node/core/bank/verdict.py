@@ -64,7 +64,7 @@ BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
 
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
-BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.05
+BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
 """A change of the rail counts for the way ahead after so long, or once it is so probable; before its border is passed,
 if all that say so are so probable together."""
 
@@ -156,7 +156,7 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.specific_brake(
         config.train.full_pressure_pa
     )
-    if slides < 1.0 - CLAIMED and part > 1.0 - error and not dumps:
+    if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not dumps:
         return Regime.BRAKE_LIMITED
     return Regime.COASTING
 

@@ -75,11 +75,18 @@ def bank_of(
 
 
 def braked_run(
-    mu: float, seed: int, seconds: float, dt_s: float = 0.1, speed_mps: float = 70.0, std_m: float = 0.3
+    mu: float,
+    seed: int,
+    seconds: float,
+    dt_s: float = 0.1,
+    speed_mps: float = 70.0,
+    std_m: float = 0.3,
+    growth: float = 0.0,
 ) -> tuple[Array, Array, Array]:
-    """Times, true (s, v) and measured positions of a train that begins to brake at 5 s, with adhesion `mu`.
+    """Times, true (s, v) and measured positions of a train that begins to brake at 5 s.
 
-    It runs before that under the traction that holds its speed.
+    It runs before that under the traction that holds its speed. The adhesion `mu` grows from then on by the share
+    `growth` a second.
     """
     rng, fine = np.random.default_rng(seed), 10
     count = round(seconds / dt_s)
@@ -88,8 +95,9 @@ def braked_run(
     for index in range(count):
         truth[index] = s, v
         for step in range(fine):
-            braked = index * dt_s + step * h >= 5.0
-            slowing = 9.8 * (min(mu, FULL) + float(specific_resistance(np.array(v)))) if braked else 0.0
+            since_s = index * dt_s + step * h - 5.0
+            braked, gives = since_s >= 0.0, mu * float(np.exp(growth * since_s))
+            slowing = 9.8 * (min(gives, FULL) + float(specific_resistance(np.array(v)))) if braked else 0.0
             s, v = s + h * v - 0.5 * h * h * slowing, v - h * slowing
     times = dt_s * np.arange(count, dtype=np.float64)
     return times, truth, np.asarray(truth[:, 0] + std_m * rng.standard_normal(count))

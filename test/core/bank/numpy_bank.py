@@ -77,7 +77,8 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     by_law = [law(slower) / law(speed) for law, _ in laws_of(config)]
     free = np.exp(-dt_s / kinds.FREE_S)
     lasting, noise = np.ones(bank.mean.shape), np.zeros(bank.mean.shape)
-    lasting[:, MU] = np.where(kind == FREE, free, np.where(SLIDES[kind], np.choose(bank.law, by_law), 1.0))
+    grown = np.choose(bank.law, by_law) * np.exp(kinds.GROWTH[kind] * dt_s)
+    lasting[:, MU] = np.where(kind == FREE, free, np.where(SLIDES[kind], grown, 1.0))
     lasting[:, ROUGH] = np.exp(-way_m / kinds.ROUGHNESS_M)
     lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
     lasting[:, OFFSET] = np.exp(-dt_s / kinds.LASTS[bank.noise])

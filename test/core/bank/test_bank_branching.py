@@ -63,8 +63,11 @@ def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
     priors = {kind: float(bank.weight @ (bank.kind == kind)) for kind in range(1, len(KINDS))}
     total = sum(kind.prior for kind in KINDS[1:])
     assert priors == pytest.approx({kind: KINDS[kind].prior / total for kind in priors})
-    laws = [float(sliding.weight @ (sliding.law == law)) / float(sliding.weight.sum()) for law in range(3)]
+    grows = np.array([kind.growth > 0.0 for kind in KINDS])[sliding.kind]
+    steady = sliding.part(~grows)
+    laws = [float(steady.weight @ (steady.law == law)) / float(steady.weight.sum()) for law in range(3)]
     assert laws == pytest.approx([0.9, 0.05, 0.05])
+    assert set(sliding.law[grows]) == {2}
     for noise in range(3):
         assert float(bank.weight @ (bank.noise == noise)) == pytest.approx(start.weight[noise])
     assert np.all(bank.born_s == -math.inf)

@@ -111,6 +111,18 @@ def test_the_whole_bank_finds_what_the_filter_finds_that_knows_all(seed: int, mu
     assert covariance[SPEED, SPEED] >= 0.8 * oracle.covariance[1, 1]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_rail_that_gets_drier_is_followed(seed: int) -> None:
+    """By 2.5 % a second: who takes it for steady is 15 % behind."""
+    times, _, positions = braked_run(0.05, seed, 25.0, growth=0.025)
+    config = replace(CONFIG, law_probability=0.3)
+    memory: Memory | None = None
+    for each in measurements(times, positions, 0.3):
+        memory = followed(config, memory, each, lambda: UNKNOWN) if memory else met(config, each)
+    assert memory is not None
+    assert memory.bank.mean_of(MU) == pytest.approx(0.05 * np.exp(0.025 * 20.0), rel=0.05)
+
+
 def test_a_brake_that_the_rail_bears_is_found() -> None:
     memory = run(CONFIG, 4, 0.2, 25.0)[-1]
     assert float(memory.bank.weight @ (memory.bank.kind == HELD)) > 0.5

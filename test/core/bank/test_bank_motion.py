@@ -62,7 +62,7 @@ def rate(x: Array, label: tuple[int, int, int], braking: Braking, rotating: floa
         result[MU] = -mu / 5.0
     elif KINDS[kind].slides:
         bend = (LAWS[law](v + 1e-4) - LAWS[law](v - 1e-4)) / 2e-4 / LAWS[law](v)
-        result[MU] = mu * bend * -slowing
+        result[MU] = mu * (bend * -slowing + KINDS[kind].growth)
     result[ROUGH], result[GRADE] = -rough * v / ROUGHNESS_M, -grade * v / GRADE_M
     result[OFFSET] = -x[OFFSET] / NOISES[noise].lasts_s
     return result

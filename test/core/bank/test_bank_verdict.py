@@ -23,11 +23,13 @@ from scipy.stats import norm
 from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.bank.following import Memory
 from adhesion_node.core.bank.kernels import mixture as mixtures
-from adhesion_node.core.bank.kinds import KINDS, PASSING
+from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING
 from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, resistance, use
 from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
+from adhesion_node.core.bank.wheels import WheelsSeen
 from adhesion_node.core.belief.rail import Rail
+from adhesion_node.core.belief.regime import Regime
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import PressureSample
 from adhesion_node.core.physics.braking import curve
@@ -131,11 +133,13 @@ def test_rolling_axles_may_slide_under_the_whole_brake(share: float, counted: fl
         assert ahead.mu == pytest.approx([max(counted * used, known)] * 6, rel=0.01)
 
 
-@pytest.mark.parametrize(("probability", "counts"), [(0.04, False), (0.06, True)])
+@pytest.mark.parametrize(("probability", "counts"), [(0.15, False), (0.25, True)])
 def test_a_border_counts_for_the_way_ahead_once_it_is_probable(probability: float, counts: bool) -> None:
+    """All three together that say so."""
     steady = ahead_bank(0.05, 50.0, [2])
     passing = ahead_bank(0.01, 50.0, [PASSING])._replace(born_s=np.array([-60.0]))
-    both = joined([steady, passing])._replace(log_weight=np.log([1.0 - probability, probability]))
+    both = joined([steady, passing, passing, passing])
+    both = both._replace(log_weight=np.log([1.0 - probability, *[probability / 3.0] * 3]))
     aheads = [found(CONFIG, memory_of(bank, Braking(FULL), 3), NOTHING, NOTHING).ahead for bank in (steady, both)]
     assert (max(aheads[1].mu) < 0.5 * min(aheads[0].mu)) == counts
     assert counts or aheads[1].mu == pytest.approx(aheads[0].mu)
@@ -150,6 +154,18 @@ def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:
 def memory_of(bank: Bank, braking: Braking, seen: int) -> Memory:
     pressed = BrakeSeen((PressureSample(10 * S, FULL_PA),), FULL_PA, FULL_PA, None, 10 * S)
     return Memory(bank, 10 * S, 1.0, brake=pressed, braking=braking, seen=seen, known=NOTHING)
+
+
+@pytest.mark.parametrize(
+    ("sliding", "regime"),
+    [(None, Regime.BRAKE_LIMITED), (0, Regime.BRAKE_LIMITED), (1, Regime.COASTING), (2, Regime.ADHESION_LIMITED)],
+)
+def test_what_limits_is_said_by_the_wheels_and_where_some_slide_by_nothing(sliding: int | None, regime: Regime) -> None:
+    """Of four axles; to the train's motion it is the brake in each of the cases."""
+    memory = memory_of(bank_of([HELD], spread=0.0), Braking(FULL), 3)
+    slid = () if sliding is None else tuple(10 * S if axle < sliding else None for axle in range(4))
+    memory = memory._replace(wheels=WheelsSeen((1.0,) * len(slid), 0, 0.03, slid, (10 * S,) * len(slid)))
+    assert found(CONFIG, memory, NOTHING, NOTHING).regime is regime
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -43,7 +43,7 @@ class Model(NamedTuple):
     laws: Array
     """floor, gain, offset, scale of each law, shape (L, 4)."""
     kinds: Array
-    """Whether it slides, drift, roughness, restlessness of each kind, shape (K, 4); the first one is free."""
+    """Whether it slides, drift, roughness, restlessness, growth of each kind, shape (K, 5); the first one is free."""
     noises: Array
     """White part, least white one, slow part, least slow one, time that lasts, shape (N, 5)."""
     lengths: Array
@@ -144,7 +144,7 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
             lasting[MU], added[MU] = free, model.free[0] ** 2 * (1.0 - free**2)
         else:
             bent = _law(model, law[h], slower) / _law(model, law[h], v)
-            lasting[MU] = bent if model.kinds[k, 0] > 0.0 else 1.0
+            lasting[MU] = bent * math.exp(model.kinds[k, 4] * dt) if model.kinds[k, 0] > 0.0 else 1.0
             added[MU] = (model.kinds[k, 1] * x[MU]) ** 2 * dt
         lasting[ROUGH], lasting[GRADE] = math.exp(-way_m / model.lengths[0]), math.exp(-way_m / model.lengths[1])
         lasting[OFFSET] = math.exp(-dt / n[4])
