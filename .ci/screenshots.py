@@ -27,6 +27,7 @@ import pandas as pd
 from browser import open_page
 
 from adhesion_node.bag import BagReader
+from adhesion_node.bench.__main__ import main as bench
 from adhesion_node.report.__main__ import main as report
 from adhesion_node.report.read.recorded import read_run
 from adhesion_node.study.__main__ import main as study
@@ -117,6 +118,11 @@ def supervision() -> None:
     study(["intervention", "--bags", str(BAGS), "--figures", str(PICTURES)])
 
 
+def growth() -> None:
+    """How the cost grows, on this machine."""
+    bench(["growth", "--figures", str(PICTURES)])
+
+
 def patch_fall() -> None:
     """The first run of a case of `study real`."""
     place = ["--figures", str(folder() / "real"), "--cache", str(folder() / "cache")]
@@ -171,7 +177,7 @@ def fleet() -> None:
     photograph((folder() / "fleet" / "report.html").as_uri(), "fleet", 1250)
 
 
-PICTURED = (tunnel_entry, leaves, patches, changing, supervision, patch_fall, report_, fleet, live)
+PICTURED = (tunnel_entry, leaves, patches, changing, supervision, growth, patch_fall, report_, fleet, live)
 """Every picture."""
 
 

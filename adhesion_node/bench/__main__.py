@@ -19,6 +19,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from ..command.options import DONE, help_texts, json_option, report, run_tool
+from ..study.trial.figures import add_figure_options, figures_of
 from . import against, gaussian, growth, normal, particle, step
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
@@ -79,7 +80,12 @@ def _report(options: Options) -> Section:
 
 
 def _growth(options: Options) -> Section:
-    return {"settings": {"rounds": GROWTH_ROUNDS}, "rows": growth.compare(GROWTH_ROUNDS, options.seed)}
+    rows = growth.compare(GROWTH_ROUNDS, options.seed)
+    if (figures := figures_of(options)) is not None:
+        from .growth_figure import draw  # no other benchmark draws
+
+        draw(rows, figures.place("growth"))
+    return {"settings": {"rounds": GROWTH_ROUNDS}, "rows": rows}
 
 
 def _against(options: Options) -> Section:
@@ -109,6 +115,7 @@ def main(args: Sequence[str] | None = None) -> int:
         "bench",
         "bench particle gaussian --rounds 20",
         "bench step memory --json -",
+        "bench growth --figures .",
         "bench trains",
         "bench --against HEAD~10",
     )
@@ -122,6 +129,7 @@ def main(args: Sequence[str] | None = None) -> int:
     add("--seconds", type=float, default=20.0, help="of them on their way (default %(default)s)")
     add("--hours", type=float, default=0.5, help="of the recording that is replayed and reported (default %(default)s)")
     add("--against", metavar="REV", help="a revision of this clone, for the benchmark against, which is then run, too")
+    add_figure_options(parser, "how the cost grows")
     add("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
     return run_tool(parser, _run, args)
 

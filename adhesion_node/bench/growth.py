@@ -6,7 +6,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""How the cost grows, each with the exponent of a power law: with rate, trains, hypotheses, and a window's length."""
+"""How the cost grows, each with the exponent of a power law.
+
+The bank carries all nuisance parameters as components of its state, whose number is compiled in: one that is known for
+certain has a variance of 0. So what is varied are those that are uncertain.
+"""
 
 import time
 from collections.abc import Callable, Sequence
@@ -30,10 +34,14 @@ SECONDS = 60.0
 STEPS = 200
 """Steps of the bank that are timed together."""
 
+NUISANCE = ("grade_std", "profile_std", "resistance_std", "mass_std", "brake_std", "rotating_mass_std")
+"""Settings by which one is uncertain."""
+
 SIZES: dict[str, Sequence[int]] = {
     "rate_hz": (5, 10, 20, 50, 100),
     "trains": (1, 2, 4, 8),
     "hypotheses": (10, 20, 40, 80, 160),
+    "nuisance": (1, 2, 4, 6),
     "window": (25, 50, 100, 200),
 }
 
@@ -44,6 +52,7 @@ def compare(rounds: int, seed: int) -> list[dict[str, Any]]:
         "rate_hz": lambda rate: _journey_ms(Config(), float(rate), 1, seed),
         "trains": lambda trains: _journey_ms(Config(), 10.0, trains, seed),
         "hypotheses": lambda count: _step_ms(count, seed),
+        "nuisance": lambda count: _journey_ms(_uncertain_in(count), 10.0, 1, seed),
         "window": lambda window: _journey_ms(replace(Config(), method="rail_condition", window=window), 10.0, 1, seed),
     }
     least = {(name, size): np.inf for name, sizes in SIZES.items() for size in sizes}
@@ -60,6 +69,12 @@ def compare(rounds: int, seed: int) -> list[dict[str, Any]]:
             for size, ms in zip(sizes, found, strict=True)
         ]
     return rows
+
+
+def _uncertain_in(count: int) -> Config:
+    """Nominal settings but for nuisance parameters behind the first so many, which are known for certain."""
+    certain: dict[str, Any] = dict.fromkeys(NUISANCE[count:], 0.0)
+    return replace(Config(), **certain)
 
 
 def _journey_ms(config: Config, rate_hz: float, trains: int, seed: int) -> float:

@@ -27,7 +27,18 @@ import pytest
 from oracles import Linear, make_window, rts
 
 from adhesion_node.bench import __main__ as bench
-from adhesion_node.bench import against, gaussian, growth, normal, particle, recording, scene, step, trains
+from adhesion_node.bench import (
+    against,
+    gaussian,
+    growth,
+    growth_figure,
+    normal,
+    particle,
+    recording,
+    scene,
+    step,
+    trains,
+)
 from adhesion_node.bench.timing import Contender, figures, interleave
 from adhesion_node.core.belief.gaussian import Gaussian
 
@@ -195,8 +206,18 @@ def test_what_grows_has_an_exponent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "SIZES", {"trains": (1, 4), "hypotheses": (20, 40), "rate_hz": (5, 20)})
     rows = growth.compare(1, seed=1)
     assert [(row["grows"], row["size"]) for row in rows][:3] == [("trains", 1), ("trains", 4), ("hypotheses", 20)]
+    assert rows[0]["exponent"] == rows[1]["exponent"]
     ms = {row["size"]: row["ms"] for row in rows if row["grows"] == "trains"}
     assert rows[0]["exponent"] == pytest.approx(math.log(ms[4] / ms[1]) / math.log(4.0))
+
+
+def test_what_grows_is_drawn_with_its_exponent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(growth, "SECONDS", 3.0)
+    monkeypatch.setattr(growth, "SIZES", {name: sizes[:2] for name, sizes in growth.SIZES.items()})
+    assert bench.main(["growth", "--figures", str(tmp_path), "--format", "svg", "--json", str(tmp_path / "rows")]) == 0
+    drawn = (tmp_path / "growth.svg").read_text(encoding="utf-8")
+    for row in json.loads((tmp_path / "rows").read_text(encoding="utf-8"))["growth"]["rows"]:
+        assert f"{growth_figure.NAMES[row['grows']]}: {round(row['exponent'], 1) + 0.0:.1f}" in drawn
 
 
 OTHER = """
