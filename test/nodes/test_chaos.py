@@ -17,7 +17,9 @@ from pathlib import Path
 
 import messages
 import pytest
-from chaos import DEEDS, Done, Kept, Recorded, kept, script, table
+from chaos import table
+from disturbed.deeds import DEEDS, Done, script
+from disturbed.kept import Kept, Recorded, kept
 from rclpy.serialization import serialize_message
 
 from adhesion_node.bag import BagWriter

@@ -48,7 +48,7 @@ def test_messages_pass_within_a_fresh_context(
     run: int, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
     assert _talk(context, executor, spin_until) == [1.0, 2.0, 3.0]
-    nodes = {name for name in next(iter(executor.get_nodes())).get_node_names()}
+    nodes = set(next(iter(executor.get_nodes())).get_node_names())
     assert nodes == {"talker", "listener"}, "nodes of another test or of another program are seen"
 
 

@@ -57,7 +57,7 @@ def test_the_page_says_what_the_brakings_showed(report: str) -> None:
         page.on("request", lambda request: asked.append(request.url))
         page.goto(report)
         assert page.locator("h1").inner_text() == "3 brakings"
-        assert {name: told for name, told in rows(page, 0)} == {
+        assert dict(rows(page, 0)) == {
             "Brakings": "3",
             "Trains": "2",
             "Recordings": "2",
