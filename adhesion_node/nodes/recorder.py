@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
@@ -30,12 +30,12 @@ from ..wire import topics
 from ..wire.messages.parts import stamp_ns
 from ..wire.settings.telling import TELLING
 from ..wire.topic import Topic
-from .log_time import SimulatedTime
 from .offers import offered
 from .ros import runtime
 from .ros.diagnostics import Diagnostics, Finding, Told
 from .ros.params import SettingsNode, declare
 from .ros.qos import PROFILES, subscribe
+from .waiting import Message, Waiting
 
 EXAMPLES = ("recorder --output my_run", "recorder --output my_run --ros-args -p use_sim_time:=true -r __ns:=/train1")
 
@@ -49,9 +49,6 @@ stands still or is slow. A busy machine misses rounds, so it does not change wha
 """
 
 NO_CLOCK = "no /clock yet, what comes waits for it: is the simulator running? Else leave use_sim_time out"
-
-HELD = 10_000
-"""Messages that wait for the first /clock at most."""
 
 MIN_FREE_MB = 100.0
 
@@ -70,17 +67,6 @@ LATCHED_SUBSCRIPTION = QoSProfile(
 """Also receives the curve published before the recorder came."""
 
 
-class _Message(NamedTuple):
-    """A received message that waits for its log time. Sorts by the time of publishing."""
-
-    published_ns: int
-    arrival: int
-    name: str
-    type: str
-    cdr: bytes
-    stamp_ns: int
-
-
 class Recorder(SettingsNode):
     """Records `topics.RECORDED` under their resolved names into the new directory `output`.
 
@@ -88,9 +74,9 @@ class Recorder(SettingsNode):
     message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder does
     not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks.
 
-    What comes before the first /clock waits for it, the newest `HELD` messages: it is of its header's stamp where that
-    is of the same time, else of the first /clock. So a recording begins when its time begins. Where /clock never comes
-    the stamps stand for it.
+    What comes before the first /clock waits for it, the newest `waiting.HELD` messages: it is of its header's stamp
+    where that is of the same time, else of the first /clock. So a recording begins when its time begins. Where /clock
+    never comes the stamps stand for it.
 
     `heard` counts the messages received by topic. Call `close` at the end. Raises ValueError when `output` exists. A
     callback or `close` raises OSError when the disk is full; `close` makes the recording complete up to there all the
@@ -105,15 +91,12 @@ class Recorder(SettingsNode):
         super().__init__("recorder", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, TELLING, quiet=True)
         self._simulated = bool(self.get_parameter("use_sim_time").value)
-        self._time = SimulatedTime()
-        self._last_ns = 0
         self.heard: Counter[Topic] = Counter()
         self._arrivals = 0
         self._rounds = deque([0] * ROUNDS, maxlen=ROUNDS)
         """Arrivals at the latest rounds."""
         self._oldest_unsaved = 0
-        self._pending: list[_Message] = []
-        self._given_up = 0
+        self._waiting = Waiting()
         self._lost: Counter[Topic] = Counter()
         if self._simulated:
             subscribe(self, topics.CLOCK, self._on_clock)
@@ -137,9 +120,9 @@ class Recorder(SettingsNode):
         self._writer.check_disk()
         due = self._rounds[0]
         self._rounds.append(self._arrivals)
-        if self._time.begun:
+        if self._waiting.begun:
             self._release(lambda message: message.arrival <= due)
-        elif self._pending:
+        elif self._waiting:
             self.get_logger().warning(NO_CLOCK, once=True)
         if self._writer.unsaved and self._oldest_unsaved <= due:
             self._writer.flush()
@@ -156,18 +139,18 @@ class Recorder(SettingsNode):
 
     def _told(self) -> Told:
         found = [Finding(Severity.OK, f"recording to {self._writer.path}")]
-        if self._simulated and not self._time.begun:
+        if self._simulated and not self._waiting.begun:
             found.append(Finding(Severity.WARN, NO_CLOCK))
-        if self._given_up:
-            found.append(Finding(Severity.WARN, f"{self._given_up} messages given up: they waited for /clock"))
+        if given_up := self._waiting.given_up:
+            found.append(Finding(Severity.WARN, f"{given_up} messages given up: they waited for /clock"))
         if self._lost:
             names = ", ".join(topic.name for topic in self._lost)
             found.append(Finding(Severity.WARN, f"messages lost on the way, {self._lost.total()} at least: {names}"))
         numbers = {
             "written": sum(self.counts.values()),
             "bytes": self._writer.size,
-            "waiting": len(self._pending),
-            "dropped": self._given_up,
+            "waiting": len(self._waiting),
+            "dropped": self._waiting.given_up,
             "lost": self._lost.total(),
         }
         return found, {"file": str(self._writer.file), **{name: str(number) for name, number in numbers.items()}}
@@ -189,12 +172,13 @@ class Recorder(SettingsNode):
             exact, stamp_ns = self._canonical(name, topic.type, cdr)
             self._arrivals += 1
             self.heard[topic] += 1
-            message = _Message(info["source_timestamp"], self._arrivals, name, topic.type, exact, stamp_ns)
-            if self._simulated:
-                self._pending.append(message)
-                self._limit_what_waits()
-            else:
+            message = Message(info["source_timestamp"], self._arrivals, name, topic.type, exact, stamp_ns)
+            if not self._simulated:
                 self._write(message, self.get_clock().now().nanoseconds)
+            elif not self._waiting.takes(message):
+                self.get_logger().warning(
+                    f"no /clock: of {len(self._waiting)} messages that wait for it the oldest is given up", once=True
+                )
 
         return receive
 
@@ -211,34 +195,21 @@ class Recorder(SettingsNode):
     def _on_clock(self, message: Any, info: Mapping[str, int]) -> None:
         """Write what was published before the /clock before this one."""
         self.heard[topics.CLOCK] += 1
-        before = self._time.tick(info["source_timestamp"], topics.CLOCK.read(message))
+        before = self._waiting.time.tick(info["source_timestamp"], topics.CLOCK.read(message))
         if before is not None:
             self._release(lambda message: message.published_ns < before.published_ns)
             self._writer.advance(before.clock_ns)
 
-    def _limit_what_waits(self) -> None:
-        if not self._time.begun and len(self._pending) > HELD:
-            del self._pending[0]
-            self._given_up += 1
-            self.get_logger().warning(
-                f"no /clock: of {HELD} messages that wait for it the oldest is given up", once=True
-            )
-
-    def _release(self, ready: Callable[[_Message], bool]) -> None:
+    def _release(self, ready: Callable[[Message], bool]) -> None:
         """Write the waiting messages that are ready in the order of publishing."""
-        due = sorted(filter(ready, self._pending))
-        self._pending = [message for message in self._pending if not ready(message)]
-        for message in due:
-            without_ns = message.stamp_ns or self._last_ns
-            begun = self._time.begun
-            self._write(message, self._time.of(message.published_ns, message.stamp_ns) if begun else without_ns)
+        for message, log_ns in self._waiting.released(ready):
+            self._write(message, log_ns)
 
-    def _write(self, message: _Message, log_ns: int) -> None:
-        self._last_ns = max(log_ns, 0)  # a stamp may lie before 1970, a log time may not
-        try:
-            self._writer.write(message.name, message.type, message.cdr, self._last_ns)
+    def _write(self, message: Message, log_ns: int) -> None:
+        try:  # a stamp may lie before 1970, a log time may not
+            self._writer.write(message.name, message.type, message.cdr, max(log_ns, 0))
         except OSError:
-            self._pending = []  # the recording ends here, not with a gap
+            self._waiting.clear()  # the recording ends here, not with a gap
             raise
         first = self._writer.unsaved == 1
         self._oldest_unsaved = message.arrival if first else min(self._oldest_unsaved, message.arrival)

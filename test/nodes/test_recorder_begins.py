@@ -20,7 +20,7 @@ from rclpy.parameter import Parameter
 from test_recorder import S, clock, simulated, stamped, start
 
 from adhesion_node.bag import BagReader, select_from
-from adhesion_node.nodes import recorder
+from adhesion_node.nodes import recorder, waiting
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.recorder import Recorder
@@ -88,7 +88,7 @@ def test_what_waits_for_a_clock_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(recorder, "HELD", 5)
+    monkeypatch.setattr(waiting, "HELD", 5)
     recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], sim=True)
     for number in range(8):
         ends[POSITION].publish(stamped(POSITION, (number + 1) * S))
