@@ -38,7 +38,6 @@ from ..run.results import rows_to
 from ..wire.settings.setup import Setup, setup_of
 from .drawn.page import report_page
 from .drawn.page_data import Subject
-from .drawn.picture import draw
 from .drawn.table import table
 from .fleet import is_table
 from .found.distances import FIXED_MU
@@ -73,10 +72,9 @@ def _work(options: argparse.Namespace) -> int:
     given = parameters_of(options)
     setup, output = setup_of(given), Path(options.output)
     subjects = [_subject(path, name, options, setup) for path, name in _named(options.bags)]
-    html = report_page(", ".join(subject.name for subject in subjects), subjects, options.target, given)
-    output.mkdir(parents=True, exist_ok=True)
-    page = output / "report.html"
-    page.write_text(html, encoding="utf-8")
+    page = _page(output, subjects, options, given)
+    from .drawn.picture import draw  # only now: what the messages and the page took is free, and no table is drawn
+
     result: dict[str, Any] = {"page": str(page), "train": setup.train, "runs": []}
     texts, identified = [f"train: {setup.train}"], False
     for subject in subjects:
@@ -93,6 +91,14 @@ def _work(options: argparse.Namespace) -> int:
     written = filter(None, (str(page), options.out))
     report(options.json, result, "\n\n".join([*texts, "\n".join(written)]))
     return DONE if identified else FAILED
+
+
+def _page(output: Path, subjects: Sequence[Subject], options: argparse.Namespace, given: Mapping[str, Any]) -> Path:
+    html = report_page(", ".join(subject.name for subject in subjects), subjects, options.target, given)
+    output.mkdir(parents=True, exist_ok=True)
+    page = output / "report.html"
+    page.write_text(html, encoding="utf-8")
+    return page
 
 
 def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:

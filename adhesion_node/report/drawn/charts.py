@@ -8,7 +8,7 @@
 
 """The charts of a run over time, the same in its picture and on its page: lines and ranges."""
 
-from functools import lru_cache
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -48,24 +48,29 @@ class Chart(NamedTuple):
         return 1.08 * float(np.nanmin(values)), 1.08 * float(np.nanmax(values))
 
 
-@lru_cache
-def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
-    """Return the charts: adhesion, speed, forces, braking distance, and what is saved of it while the train brakes."""
+def charts(run: Run, target_kmh: float, train: Train) -> Iterator[Chart]:
+    """Yield adhesion, speed, forces, braking distance, and what is saved of it while the train brakes.
+
+    One after the other, as a day's lines are long.
+    """
     planned = distances(run, target_kmh * KMH, train)
     at, seen = run.speed.t_ns, run.learnt
     worst, to_target = f"fixed worst case {FIXED_MU}", f"Braking distance to {target_kmh:.0f} km/h"
     bound = "lower bound" if run.confidence is None else f"lower bound, {run.confidence:.0%} confidence"
-    adhesion = (
+    yield _chart(
+        *("Adhesion coefficient", 5),
         Line(worst, "fixed", Series(at, np.full(at.size, FIXED_MU))),
         Line("true", "truth", run.true_mu),
         Line(bound, "bound", run.mu_lower),
         *_told(run, "prior, not identified", "at least, the brake limits", "identified"),
     )
-    speed = (
+    yield _chart(
+        *("Speed, km/h", 2),
         Line("true", "truth", run.true_speed.map(lambda mps: mps / KMH)),
         Line("estimated", "nominal", run.speed.map(lambda mps: mps / KMH)),
     )
-    forces = (
+    yield _chart(
+        *("Forces, kN", 1),
         Line("brake B", "fixed", run.pressure.map(lambda pa: train.brake_force(pa) / 1e3)),
         Line("adhesion F, true", "truth", run.true_mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
         *(
@@ -74,25 +79,23 @@ def charts(run: Run, target_kmh: float, train: Train) -> list[Chart]:
             if line.label
         ),
     )
-    distance = (
+    yield _chart(
+        *(f"{to_target}, m", 1),
         Line(worst, "fixed", Series(at, planned.fixed)),
         Line("true", "truth", true_way(run, target_kmh * KMH)),
         Line("safe curve, by the lower bound", "bound", Series(at, planned.longest)),
         Line("nominal curve, by μ̂", "nominal", Series(at, planned.identified)),
     )
-    saved = (
+    yield _chart(
+        *(f"{to_target} saved, m", 1),
         Line(worst, "fixed", Series(at, np.zeros(at.size))),
         Line("at least, by the lower bound", "bound", Series(at[seen], planned.saved_at_least[seen])),
         Line("by μ̂, where something is claimed", "nominal", Series(at[seen], planned.saved[seen])),
     )
-    table = (
-        ("Adhesion coefficient", 5, adhesion),
-        ("Speed, km/h", 2, speed),
-        ("Forces, kN", 1, forces),
-        (f"{to_target}, m", 1, distance),
-        (f"{to_target} saved, m", 1, saved),
-    )
-    return [Chart(title, digits, [line for line in lines if line.series.t_ns.size]) for title, digits, lines in table]
+
+
+def _chart(title: str, digits: int, *lines: Line) -> Chart:
+    return Chart(title, digits, [line for line in lines if line.series.t_ns.size])
 
 
 def _told(run: Run, prior: str, at_least: str, identified: str) -> list[Line]:

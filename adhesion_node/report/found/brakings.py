@@ -38,10 +38,9 @@ class Braking(NamedTuple):
 @lru_cache
 def brakings(run: Run) -> list[Braking]:
     """Return the brakings in their order."""
-    under_brake = _under_brake(run).tolist()
-    told = list(zip(run.speed.t_ns.tolist(), run.speed.values.tolist(), strict=True))
-    parts = split(range(len(told)), under_brake.__getitem__, told.__getitem__)
-    return [Braking(told[part[0]][0], told[part[-1]][0], part[0], part[-1]) for part in parts]
+    (t_ns, speed), under_brake = run.speed, _under_brake(run)
+    parts = split(range(t_ns.size), under_brake.item, lambda at: (t_ns.item(at), speed.item(at)))
+    return [Braking(t_ns.item(part[0]), t_ns.item(part[-1]), part[0], part[-1]) for part in parts]
 
 
 def _under_brake(run: Run) -> NDArray[np.bool_]:

@@ -8,6 +8,8 @@
 
 """What happened in a run, in its order: regimes, changes of the rail, levels of the ATP monitor, what was not well."""
 
+from itertools import chain
+
 from ...core.atp.supervision import Level
 from ..read.run import Run
 from ..read.series import Series
@@ -36,5 +38,5 @@ def events(run: Run) -> list[Event]:
 
 def text_changes(series: Series) -> list[tuple[int, str]]:
     """Times and texts at which a series of texts changes, the first included; "" is left out."""
-    rows = zip(series.t_ns.tolist(), map(str, series.values), ["", *map(str, series.values)], strict=False)
-    return [(t_ns, text) for t_ns, text, before in rows if text not in ("", before)]
+    rows = zip(series.t_ns, series.values, chain([""], series.values), strict=False)
+    return [(int(t_ns), str(text)) for t_ns, text, before in rows if text not in ("", before)]

@@ -20,6 +20,7 @@ from ...run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_
 from ...run.seen import Seen
 from ..read.dropped import dropped
 from ..read.run import Run
+from ..read.series import in_rows
 from .braking_row import bound_kept, row_of
 from .brakings import brakings, rises
 from .distances import distances, true_way
@@ -82,7 +83,7 @@ def why_not(run: Run) -> str | None:
     seen, times = Seen(), run.speed.t_ns
     pressure = run.pressure.at(times) if run.pressure.t_ns.size else np.full(times.shape, np.nan)
     columns = times, run.regimes_at(times), run.mu.at(times), run.mu_lower.at(times), run.speed.values, pressure
-    for t_ns, regime, mu, bound, speed, pressure_pa in zip(*(column.tolist() for column in columns), strict=True):
+    for t_ns, regime, mu, bound, speed, pressure_pa in in_rows(*columns):
         seen.note(t_ns, regime, mu, bound, speed, None if math.isnan(pressure_pa) else pressure_pa)
     return seen.why_not()
 

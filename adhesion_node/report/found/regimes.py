@@ -8,13 +8,16 @@
 
 """The regimes of a run over time, and in words."""
 
+from functools import lru_cache, reduce
 from itertools import groupby
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
 
 from ...core import Regime
 from ..read.run import Run
+from ..read.series import in_rows
 
 IN_WORDS = {
     Regime.COASTING.name: "nothing is claimed",
@@ -32,10 +35,11 @@ class Band(NamedTuple):
     regime: str
 
 
+@lru_cache
 def bands(run: Run) -> list[Band]:
     """Regimes over time: an estimate's regime holds since the estimate before it."""
     ends = run.seconds(run.regime.t_ns)
     starts = np.concatenate(([0.0], ends))[:-1]
-    rows = [row for row in zip(starts, ends, run.regime.values, strict=True) if row[2]]
-    grouped = (list(group) for _, group in groupby(rows, key=lambda row: str(row[2])))
-    return [Band(float(group[0][0]), float(group[-1][1]), str(group[0][2])) for group in grouped]
+    known = (Band(*row) for row in in_rows(starts, ends, run.regime.values) if row[2])
+    grouped = (group for _, group in groupby(known, key=attrgetter("regime")))
+    return [reduce(lambda first, later: first._replace(end_s=later.end_s), group) for group in grouped]

@@ -13,6 +13,7 @@ from collections.abc import Iterator
 
 from ...run.results import COLUMNS, LEARNT, Row
 from ..read.run import Run
+from ..read.series import in_rows
 
 KEYS = ("mu_std", "window", *LEARNT)
 """What the diagnostics are asked for; they tell five digits."""
@@ -36,7 +37,7 @@ def rows_of(run: Run, sign: int) -> Iterator[Row]:
     }
     numbers = {name: series[name].exactly(times) for name in COLUMNS if name in series}
     columns = {"t_ns": times, **numbers, "regime": run.regimes_at(times)}
-    for values in zip(*(columns[name].tolist() for name in COLUMNS), strict=True):
+    for values in in_rows(*(columns[name] for name in COLUMNS)):
         known = (None if value == "" or (isinstance(value, float) and math.isnan(value)) else value for value in values)
         row = dict(zip(COLUMNS, known, strict=True))
         braking = row["braking"]

@@ -8,6 +8,8 @@
 
 """The run of a recording that holds sensor messages alone: what the estimator makes of them, offline."""
 
+import sys
+from array import array
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
@@ -15,7 +17,7 @@ import numpy as np
 
 from ...bag import BagReader
 from ...command.options import progress
-from ...core import Prediction
+from ...core import Estimate, Prediction
 from ...core.intake.samples import DemandSample, PressureSample
 from ...run import offline
 from ...run.offline import Recorded
@@ -27,11 +29,11 @@ from ...wire.settings.setup import Setup
 from ...wire.topic import Frame
 from ...wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH
 from .dropped import listed
-from .gathered import Numbers, Texts
 from .inputs import Inputs
 from .messages import read_topics, sample_of
 from .predicted import Curves
 from .run import Run
+from .series import Series
 
 
 def estimate_run(
@@ -40,38 +42,25 @@ def estimate_run(
     """Run the recorded topics of `selection` (recorded name to ours) through the estimator; write each estimate.
 
     Return the run, whose braking distances to `targets`, m/s, are those of every curve, and by recorded topic how many
-    messages do not decode. Raises ValueError when nothing could be
-    estimated.
+    messages do not decode. Raises ValueError when nothing could be estimated.
     """
     pipeline, inputs, lost = Pipeline(setup.config, setup.seed), Inputs(), Counter[str]()
-    mu, mu_lower, position, speed = (Numbers() for _ in range(4))
-    regime, changes, safe, nominal = Texts(), Texts(), Curves(targets), Curves(targets)
+    estimates, safe, nominal = _Estimates(), Curves(targets), Curves(targets)
     recorded = progress(offline.messages(reader, selection, setup.line), "messages")
     for made in _predictions(pipeline, inputs, _noting(inputs, lost, recorded, setup.line), setup.line):
         write(row_of(pipeline, made, setup.line.sign))
-        e = made.estimate
-        values = e.mu, e.mu_lower, e.position_m, e.speed_mps
-        for numbers, value in zip((mu, mu_lower, position, speed), values, strict=True):
-            numbers.add(e.t_ns, value)
-        regime.add(e.t_ns, e.regime.name)
-        changes.add(e.t_ns, str(e.changes))
+        estimates.note(made.estimate)
         for curves, curve in ((safe, made.safe), (nominal, made.nominal)):
             if curve is not None:
-                places = e.position_m + curve.distance_m
-                curves.add(np.array([e.t_ns]), places[np.newaxis], curve.speed_mps[np.newaxis])
+                places = made.estimate.position_m + curve.distance_m
+                curves.add(np.array([made.estimate.t_ns]), places[np.newaxis], curve.speed_mps[np.newaxis])
     if pipeline.last is None:
         dropped = listed(pipeline.dropped) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")
     read_topics(reader, [(DIAGNOSTICS, inputs.creep.take)])
-    run = inputs.run._replace(
-        mu=mu.series,
-        mu_lower=mu_lower.series,
-        position=position.series,
-        speed=speed.series,
-        regime=regime.series,
+    run = estimates.put_into(inputs.run)._replace(
         safe=safe,
         nominal=nominal,
-        changes=changes.series,
         counts={  # under the keys that they have in the diagnostics
             "measurements": str(pipeline.measurements),
             "accepted": str(pipeline.accepted),
@@ -82,6 +71,32 @@ def estimate_run(
         },
     )
     return run, {theirs: lost[ours] for theirs, ours in selection.items() if ours in lost}
+
+
+class _Estimates:
+    """The numbers and texts of estimates, while they are made; their series have one array of times."""
+
+    def __init__(self) -> None:
+        self._t_ns = array("q")
+        self._numbers = {name: array("d") for name in ("mu", "mu_lower", "position", "speed")}
+        self._texts = {name: list[str]() for name in ("regime", "changes")}
+
+    def note(self, e: Estimate) -> None:
+        """Take an estimate."""
+        self._t_ns.append(e.t_ns)
+        for numbers, value in zip(self._numbers.values(), (e.mu, e.mu_lower, e.position_m, e.speed_mps), strict=True):
+            numbers.append(value)
+        for texts, text in zip(self._texts.values(), (e.regime.name, str(e.changes)), strict=True):
+            texts.append(sys.intern(text))
+
+    def put_into(self, run: Run) -> Run:
+        """Return the run with their series."""
+        stamps = np.frombuffer(self._t_ns, dtype=np.int64)
+        order = np.argsort(stamps, kind="stable")
+        t_ns = stamps[order]
+        numbers = {name: Series(t_ns, np.frombuffer(column)[order]) for name, column in self._numbers.items()}
+        texts = {name: Series(t_ns, np.array(column, object)[order]) for name, column in self._texts.items()}
+        return Run(**{**run._asdict(), **numbers, **texts})
 
 
 def _predictions(pipeline: Pipeline, inputs: Inputs, recorded: Iterable[Recorded], line: Line) -> Iterator[Prediction]:

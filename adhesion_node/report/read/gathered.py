@@ -35,32 +35,43 @@ class Numbers:
 
     def __init__(self, value: Callable[[Any], Any] = _itself) -> None:
         self._value = value
-        self._t_ns, self._log_ns, self._values = array("q"), array("q"), array("d")
+        self._t_ns, self._values = array("q"), array("d")
 
     def take(self, sample: Sample) -> None:
         """Take a sample, of one message or of many."""
         value = math.nan if sample.read is None else self._value(sample.read)
         if isinstance(sample.t_ns, np.ndarray):
             self._t_ns.frombytes(sample.t_ns.tobytes())
-            self._log_ns.frombytes(sample.log_ns.tobytes())
             self._values.frombytes(np.broadcast_to(np.float64(value), sample.t_ns.shape).tobytes())
         else:
-            self.add(sample.t_ns, value, sample.log_ns)
+            self.add(sample.t_ns, value)
 
-    def add(self, t_ns: int, value: float, log_ns: int = 0) -> None:
+    def add(self, t_ns: int, value: float) -> None:
         """Take a value."""
         self._t_ns.append(t_ns)
-        self._log_ns.append(log_ns)
         self._values.append(value)
 
     @property
     def series(self) -> Series:
         """The values by their stamps, which may have come late: log times do not tell."""
-        t_ns = np.array(self._t_ns, dtype=np.int64)
+        t_ns = np.frombuffer(self._t_ns, dtype=np.int64)
         order = np.argsort(t_ns, kind="stable")
-        return Series(t_ns[order], np.array(self._values)[order])
+        return Series(t_ns[order], np.frombuffer(self._values)[order])
 
-    def stamped_by(self, *beside: Numbers) -> Series:
+
+class Logged(Numbers):
+    """The same with the log times of the messages, by which those without a stamp find one."""
+
+    def __init__(self, value: Callable[[Any], Any] = _itself) -> None:
+        super().__init__(value)
+        self._log_ns = array("q")
+
+    def take(self, sample: Sample) -> None:
+        """Take a sample, of one message or of many."""
+        super().take(sample)
+        self._log_ns.frombytes(np.asarray(sample.log_ns, dtype=np.int64).tobytes())
+
+    def stamped_by(self, *beside: Logged) -> Series:
         """The values of messages without a stamp: each takes that of the message of `beside` logged nearest to it.
 
         What is published together is logged together, so a lost message leaves a gap and moves no other one. Of several

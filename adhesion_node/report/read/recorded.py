@@ -19,7 +19,7 @@ from ...wire import topics
 from ...wire.line import NOMINAL, Line
 from ...wire.messages.results import Status
 from ..ahead import TOLD
-from .gathered import Keyed, Numbers, Texts
+from .gathered import Keyed, Logged, Numbers, Texts
 from .inputs import Inputs
 from .messages import Sample, Take, read_topics, with_key
 from .predicted import Curves
@@ -35,10 +35,10 @@ def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = (), 
     The braking distances to `targets`, m/s, are those of every curve. Raises ValueError when the recording holds no
     estimates.
     """
-    position, speed = Numbers(attrgetter("position_m")), Numbers(attrgetter("speed_mps"))
+    position, speed = Numbers(attrgetter("position_m")), Logged(attrgetter("speed_mps"))
     # mu stands in its stamped form, the deceleration -mu g, where that was recorded.
-    stamped = Numbers(lambda read: -read.acceleration_mps2 / GRAVITY)
-    mu, mu_lower, told, inputs, levels = Numbers(), Numbers(), _Told(), Inputs(), Texts()
+    stamped = Logged(lambda read: -read.acceleration_mps2 / GRAVITY)
+    mu, mu_lower, told, inputs, levels = Logged(), Logged(), _Told(), Inputs(), Texts()
     position_std, speed_std = Numbers(attrgetter("position_std_m")), Numbers(attrgetter("speed_std_mps"))
     values, said = Keyed(keys), Keyed(TOLD)
     curves = {topic: Curves(targets) for topic in (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)}

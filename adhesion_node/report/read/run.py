@@ -10,7 +10,7 @@
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,9 +64,9 @@ class Run(NamedTuple):
         """At which estimates the train braked and its adhesion could be seen, or that it is enough; shape (n,)."""
         return np.asarray(self.regimes_at(self.speed.t_ns) != Regime.COASTING.name)
 
-    def regimes_at(self, t_ns: Times) -> NDArray[np.str_]:
+    def regimes_at(self, t_ns: Times) -> NDArray[Any]:
         """Regimes of the estimates of those times by name; "" where none is recorded."""
-        return self.regime.exactly(t_ns, "").astype(np.str_)
+        return self.regime.exactly(t_ns, "")
 
     def __eq__(self, other: object) -> bool:
         """A run is itself alone, so that what follows from it can be kept."""
