@@ -6,13 +6,13 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Recordings: rosbag2 directories of MCAP files, written so that an interrupted one stays readable."""
+"""Recordings: rosbag2 directories of MCAP files."""
 
-from .reader import BagReader
-from .recordings import Record
+from .read.reader import BagReader
+from .read.recordings import Record
 from .selection import parse_remap, select, select_from
 from .types import deserialize, encode, serialize, typestore
-from .writer import BagWriter, Limits
+from .write.writer import BagWriter, Limits
 
 __all__ = [
     "BagReader",

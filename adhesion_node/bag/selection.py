@@ -11,7 +11,7 @@
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..wire import topics
-from .reader import BagReader
+from .read.reader import BagReader
 from .types import same_name
 
 _OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}

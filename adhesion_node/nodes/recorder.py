@@ -23,7 +23,7 @@ from rclpy.clock import ClockType
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ..bag import BagWriter, Limits, deserialize, serialize
-from ..bag.writer import MB
+from ..bag.write.writer import MB
 from ..command.options import help_texts, run_tool
 from ..core.atp.supervision import Severity
 from ..wire import topics

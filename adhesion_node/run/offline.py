@@ -18,7 +18,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..bag import BagReader, Record
-from ..bag.together import read_together
+from ..bag.read.together import read_together
 from ..command.options import DONE, FAILED, progress, report
 from ..core import Outcome
 from ..core.intake.samples import PressureSample, Sample

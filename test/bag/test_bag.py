@@ -28,7 +28,7 @@ from rosbags.rosbag2 import Reader
 
 from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize, typestore
 from adhesion_node.bag.qos import LATCHED
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, RECORDED, WHEEL_SPEED
 
 

@@ -30,7 +30,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.core.intake.samples import MAX_POSITION_M
 from adhesion_node.tools import import_csv, recover
 from adhesion_node.tools.log import format as log_format

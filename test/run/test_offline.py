@@ -25,7 +25,7 @@ from conftest import ROOT
 from rclpy.serialization import serialize_message
 
 from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.command import options as cli
 from adhesion_node.core import Config, Estimate, Measurement, finish, init, step
 from adhesion_node.nodes import replay

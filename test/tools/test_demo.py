@@ -23,8 +23,9 @@ from matplotlib.image import imread
 from rclpy.executors import SingleThreadedExecutor
 from test_recording_survives import assert_complete, file_size_limit
 
-from adhesion_node.bag import BagReader, part
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag import BagReader
+from adhesion_node.bag.write import part
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.core import Estimate
 from adhesion_node.core.physics.adhesion import DRY, WET
 from adhesion_node.core.physics.track import LEVEL

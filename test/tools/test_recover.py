@@ -24,7 +24,7 @@ from test_recording_survives import file_size_limit
 from adhesion_node.bag import BagReader, BagWriter, Limits
 from adhesion_node.bag.qos import LATCHED
 from adhesion_node.bag.types import Definition
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.tools import recover
 from adhesion_node.wire.topics import BRAKING_CURVE, POSITION
 

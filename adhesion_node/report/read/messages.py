@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...bag import BagReader, Record
-from ...bag.together import MOST_TOGETHER, together
+from ...bag.read.together import MOST_TOGETHER, together
 from ...wire.line import NOMINAL, Line
 from ...wire.messages.parts import stamp_ns, stamps_ns
 from ...wire.messages.refused import Rejected

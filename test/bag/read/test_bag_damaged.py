@@ -30,7 +30,7 @@ from recorded import S, write_steps
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 
 from adhesion_node.bag import BagReader, Record, typestore
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.wire.topics import POSITION
 
 WRITER_THAT_IS_KILLED = """

@@ -19,7 +19,7 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
-from adhesion_node.bag.chunk import HEAD, Message, unpack
+from adhesion_node.bag.read.chunk import HEAD, Message, unpack
 
 
 def chunk_of(content: bytes, checksum: int | None = None) -> bytes:

@@ -28,9 +28,9 @@ from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import Qos
 from zstandard import ZstdError
 
+from ..qos import parse
+from ..types import Definition
 from .chunk import HEAD, Message, unpack
-from .qos import parse
-from .types import Definition
 
 _UNREADABLE = (error, ValueError, OverflowError, MemoryError, EOFError, McapError, ZstdError, RuntimeError)
 """What the decoders raise on bytes that are not what they seem."""

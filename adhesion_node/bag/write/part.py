@@ -20,9 +20,9 @@ from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
-from .metadata import File, Topic
-from .qos import profiles
-from .types import Definition
+from ..metadata import File, Topic
+from ..qos import profiles
+from ..types import Definition
 
 CHUNK_BYTES = 64 * 1024
 """Size before compression from which a chunk is ended."""

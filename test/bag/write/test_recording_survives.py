@@ -34,8 +34,8 @@ from rosbags.rosbag2 import Reader
 from test_recorder import clock, has_messages, recording_process, stamped, start
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
-from adhesion_node.bag.part import MARGIN_BYTES, STEP_BYTES
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.part import MARGIN_BYTES, STEP_BYTES
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.ros.qos import SENSOR_PUBLISHER, advertise
 from adhesion_node.tools import recover

@@ -18,10 +18,10 @@ from typing import NamedTuple, Self
 
 from rosbags.interfaces import Qos
 
-from .metadata import LATEST_NS, File, Topic, document
+from ..metadata import LATEST_NS, File, Topic, document
+from ..qos import RELIABLE
+from ..types import Definition, definition, type_hash
 from .part import Part, message_bound
-from .qos import RELIABLE
-from .types import Definition, definition, type_hash
 
 MB = 1_000_000
 

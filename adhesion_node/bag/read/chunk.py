@@ -19,7 +19,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Schema
 from zstandard import ZstdDecompressor
 
-from .metadata import LATEST_NS
+from ..metadata import LATEST_NS
 
 HEAD = Struct("<BQ")
 """Opcode and length of a record."""

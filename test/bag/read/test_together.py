@@ -20,9 +20,9 @@ from hypothesis import example, given
 from hypothesis import strategies as some
 
 from adhesion_node.bag import Record
-from adhesion_node.bag.statuses import TYPE as DIAGNOSTICS
-from adhesion_node.bag.statuses import statuses
-from adhesion_node.bag.together import MOST_TOGETHER, TRAJECTORY, read_together, together
+from adhesion_node.bag.read.statuses import TYPE as DIAGNOSTICS
+from adhesion_node.bag.read.statuses import statuses
+from adhesion_node.bag.read.together import MOST_TOGETHER, TRAJECTORY, read_together, together
 from adhesion_node.bag.types import deserialize, encode, new, serialize, typestore
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import CRH3

@@ -15,9 +15,9 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from ..wire.messages.refused import Reason, Rejected
+from ...wire.messages.refused import Reason, Rejected
+from ..types import UnknownTypeError, deserialize
 from .mcap_file import McapFile, TopicInfo
-from .types import UnknownTypeError, deserialize
 
 
 class Record(NamedTuple):

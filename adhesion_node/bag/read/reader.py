@@ -13,14 +13,14 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, Self
 
-from ..wire.messages.refused import Rejected
+from ...wire.messages.refused import Rejected
+from ..metadata import Metadata, read_metadata
+from ..types import same_name
 from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
-from .metadata import Metadata, read_metadata
 from .recordings import McapRecording, Record, Recording
 from .statuses import TYPE as DIAGNOSTICS
 from .statuses import statuses
-from .types import same_name
 
 
 class BagReader:

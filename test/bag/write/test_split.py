@@ -28,7 +28,7 @@ from test_recorder import clock, publishers, simulated, stamped
 from test_recording_survives import assert_complete, indexed, metadata
 
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record
-from adhesion_node.bag.writer import file_name
+from adhesion_node.bag.write.writer import file_name
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.tools import recover

@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 from rosbags.interfaces import Nodetype
 
-from ..wire.line import Line
-from ..wire.messages.refused import Rejected
-from ..wire.topic import Topic
+from ...wire.line import Line
+from ...wire.messages.refused import Rejected
+from ...wire.topic import Topic
+from ..types import deserialize, typestore
 from .recordings import Record
-from .types import deserialize, typestore
 
 MOST_TOGETHER = 256
 """Messages that are read together: what is theirs stays in the processor's cache."""
