@@ -120,4 +120,5 @@ def _curve_bytes(curve: BrakingCurve | None) -> bytes:
     if curve is None:
         return struct.pack("<q", 0)
     columns = (curve.distance_m, curve.speed_mps, curve.deceleration_mps2, curve.time_s)
-    return struct.pack("<q", curve.speed_mps.size) + b"".join(column.astype("<f8").tobytes() for column in columns)
+    numbers = [column.astype("<f8", copy=False).tobytes() for column in columns]
+    return b"".join([struct.pack("<q", curve.speed_mps.size), *numbers])

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -133,16 +133,16 @@ class Memory(NamedTuple):
         )
 
 
-def _with_position(memory: Memory, measurement: Measurement, predicted: Off | None) -> Memory:
+def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen | None) -> Memory:
     """Take a position in; the first one places the train, with what there is of slow error in it."""
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
     course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
     if predicted is not None:
         course = course.deviating(measurement.t_ns, predicted.stds)
-    if memory.is_placed:
-        ahead = None if predicted is None else predicted.ahead
-        if ahead is not None and ahead.bank is bank:
-            innovation, white = ahead.innovation, ahead.white
+    is_foreseen = predicted is not None and predicted.bank is bank
+    if is_foreseen or memory.is_placed:
+        if predicted is not None and is_foreseen:
+            innovation, white = predicted.innovation, predicted.white
         else:
             seen = position_seen(bank, measurement.position_m, declared)
             innovation, white = seen.innovation, seen.variances
@@ -159,25 +159,6 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Off | No
     placed = placed.with_fresh(OFFSET, 0.0, np.sqrt(slow))
     placed.covariance[:, POSITION, OFFSET] = placed.covariance[:, OFFSET, POSITION] = -slow
     return memory._replace(bank=placed, declared_m=declared, course=course, fixes=memory.fixes + 1)
-
-
-class Off(NamedTuple):
-    """Deviation of a measured position from what was foreseen."""
-
-    metres: float
-    std_m: float
-    """Of what was foreseen and of the position, over all hypotheses."""
-    nearest: float
-    """In standard deviations, without sign, by the hypothesis nearest."""
-    moved: Memory | None = None
-    """What was foreseen, ..."""
-    ahead: Foreseen | None = None
-    """... with the position beside it."""
-
-    @property
-    def stds(self) -> float:
-        """In standard deviations by the hypothesis nearest."""
-        return math.copysign(self.nearest, self.metres)
 
 
 def met(config: Config, measurement: Measurement) -> Memory:
@@ -208,7 +189,11 @@ def met(config: Config, measurement: Measurement) -> Memory:
 
 
 def followed(
-    config: Config, memory: Memory, measurement: Measurement, rail: Callable[[], Rail], predicted: Off | None = None
+    config: Config,
+    memory: Memory,
+    measurement: Measurement,
+    rail: Callable[[], Rail],
+    predicted: Foreseen | None = None,
 ) -> Memory:
     """The train followed up to a measurement, which is taken in.
 
@@ -219,70 +204,63 @@ def followed(
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
     for until_ns in _steps(before_ns, measurement.t_ns, speeds):
-        if (
-            memory is start
-            and predicted is not None
-            and predicted.moved is not None
-            and predicted.moved.t_ns == until_ns
-        ):
-            memory = predicted.moved
-        else:
-            memory = _moved(config, memory, until_ns)
-        since_ns, before_ns = before_ns, until_ns
+        ahead = predicted.bank if predicted is not None and until_ns == measurement.t_ns else None
+        bank = _bank_at(config, memory, until_ns) if ahead is None or memory is not start else ahead
+        since_ns, before_ns, braking = before_ns, until_ns, memory.braking
+        now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
+        brake = memory.brake.after(config, now, measurement.demand_pa)
+        memory = memory._replace(
+            bank=bank,
+            t_ns=until_ns,
+            since_s=memory.since_s + (until_ns - memory.t_ns) / S,
+            brake=brake,
+            braking=_braking(config, memory, brake, until_ns),
+        )
         if measurement.imu:
-            now = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
-            memory = _felt(config, memory, now) if now else memory
+            felt = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
+            memory = _felt(config, memory, felt, braking) if felt else memory
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
                 variance = config.speed_std_mps**2 if speed.variance is None else speed.variance
                 seen = speed_seen(memory.bank, speed.speed_mps, variance + SPEED_ERROR_MPS**2)
                 memory = memory.told(seen, fixes=2)
-        brake = memory.brake.after(
-            config, (each for each in pressures if since_ns < each.t_ns <= until_ns), measurement.demand_pa
-        )
-        memory = memory._replace(brake=brake, braking=_braking(config, memory, brake, until_ns))
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
     return _judged(config, _with_wheels(config, memory, measurement), rail)
 
 
-def off(config: Config, memory: Memory, measurement: Measurement) -> Off:
-    """How far the measured position lies from what was foreseen; 0 if none was."""
+def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
+    """How far the measured position, if there is one, lies from what is foreseen."""
     if not (measurement.has_position and memory.is_placed):
-        return Off(0.0, 1.0, 0.0)
-    dt_s, std_m = max((measurement.t_ns - memory.t_ns) / S, 0.0), math.sqrt(measurement.variance_m2)
-    before = memory.bank, dt_s, memory.braking, memory.declared_m
-    ahead = foreseen(config, *before, measurement.position_m, std_m)
-    moved_on = memory._replace(bank=ahead.bank, t_ns=measurement.t_ns, since_s=memory.since_s + dt_s)
-    return Off(ahead.off_m, ahead.std_m, ahead.nearest, moved_on, ahead)
+        return Foreseen()
+    before = memory.bank, (measurement.t_ns - memory.t_ns) / S, memory.braking, memory.declared_m
+    return foreseen(config, *before, measurement.position_m, math.sqrt(measurement.variance_m2))
 
 
-def _steps(from_ns: int, to_ns: int, speeds: Sequence[SpeedSample] = ()) -> Iterator[int]:
+def _steps(from_ns: int, to_ns: int, speeds: Sequence[SpeedSample] = ()) -> Sequence[int]:
     """Ends of the steps up to a time: where speeds were measured, and no step too long."""
     if not speeds and to_ns - from_ns <= STEP_S * S:
-        yield to_ns
-        return
+        return (to_ns,)
+    ends: list[int] = []
     for until_ns in (*sorted({each.t_ns for each in speeds if from_ns < each.t_ns < to_ns}), to_ns):
         count = max(math.ceil((until_ns - from_ns) / (STEP_S * S)), 1)
-        for index in range(1, count + 1):
-            yield from_ns + (until_ns - from_ns) * index // count
+        ends += [from_ns + (until_ns - from_ns) * index // count for index in range(1, count + 1)]
         from_ns = until_ns
+    return ends
 
 
-def _moved(config: Config, memory: Memory, until_ns: int) -> Memory:
-    dt_s = (until_ns - memory.t_ns) / S
-    if dt_s <= 0.0:
-        return memory
-    bank = moved(config, memory.bank, dt_s, memory.braking, memory.declared_m)
-    return memory._replace(bank=bank, t_ns=until_ns, since_s=memory.since_s + dt_s)
+def _bank_at(config: Config, memory: Memory, until_ns: int) -> Bank:
+    if until_ns <= memory.t_ns:
+        return memory.bank
+    return moved(config, memory.bank, (until_ns - memory.t_ns) / S, memory.braking, memory.declared_m)
 
 
-def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample]) -> Memory:
-    """Take in the mean of some accelerations."""
+def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Braking) -> Memory:
+    """Take in the mean of some accelerations, felt while the brake worked so."""
     mean = sum(each.acceleration_mps2 for each in felt) / len(felt)
     variances = [config.imu_std_mps2**2 if each.variance is None else each.variance for each in felt]
     variance = sum(variances) / len(felt) ** 2
-    return memory.told(acceleration_seen(config, memory.bank, mean, variance, memory.braking))
+    return memory.told(acceleration_seen(config, memory.bank, mean, variance, braking))
 
 
 def _pressures(measurement: Measurement) -> tuple[PressureSample, ...]:
@@ -356,7 +334,7 @@ def misled(config: Config, memory: Memory) -> Memory:
     before = memory._replace(bank=closed(bank).with_fresh(MU, half, half), t_ns=t_ns, seen=0, past=())
     ahead = before
     for until_ns in _steps(t_ns, memory.t_ns):
-        ahead = _moved(config, ahead, until_ns)
+        ahead = ahead._replace(bank=_bank_at(config, ahead, until_ns), t_ns=until_ns)
     return ahead._replace(misled=True, since_s=0.0)
 
 

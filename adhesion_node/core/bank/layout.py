@@ -64,8 +64,7 @@ class Bank(NamedTuple):
 
     def believing(self, mean: Array, covariance: Array, log_weight: Array) -> Bank:
         """With these beliefs and weights under the same labels."""
-        labels = self.noise, self.law, self.kind
-        return Bank(mean, covariance, log_weight, *labels, self.born_s, self.changed_s)
+        return Bank(mean, covariance, log_weight, *self[3:])
 
     def normalised(self, least: float = -math.inf) -> Bank:
         """With probabilities that sum to 1, the logarithm of each no less than `least`."""

@@ -17,6 +17,7 @@ Roughness rho and grade gamma fade with the way, the slow error of the positions
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -103,19 +104,24 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
 
 
 class Foreseen(NamedTuple):
-    """A bank that has been moved on, and a position beside it."""
+    """How far a measured position is off what was foreseen; nothing, if none was."""
 
-    bank: Bank
-    innovation: Array
+    metres: float = 0.0
+    std_m: float = 1.0
+    """Standard deviation of that over all hypotheses."""
+    nearest: float = 0.0
+    """In standard deviations, without sign, by the hypothesis nearest."""
+    bank: Bank | None = None
+    """What was foreseen."""
+    innovation: Array = np.empty(0)
     """Of the position under each hypothesis, m, shape (H,)."""
-    white: Array
+    white: Array = np.empty(0)
     """Variance of its white error, m^2, shape (H,)."""
-    off_m: float
-    """Mean innovation."""
-    std_m: float
-    """Its standard deviation over all hypotheses."""
-    nearest: float
-    """The least one, in its own standard deviations."""
+
+    @property
+    def stds(self) -> float:
+        """In standard deviations by the hypothesis nearest."""
+        return math.copysign(self.nearest, self.metres)
 
 
 def foreseen(
@@ -129,8 +135,10 @@ def foreseen(
 ) -> Foreseen:
     """As `moved`, and how far a position is off, whose declared standard deviation is only a hint."""
     step = _step(dt_s, braking, declared_m)
-    found = moving.foreseen(model_of(config)[:], bank[:], step, position_m, position_std_m)
-    return Foreseen(bank.believing(*found[:2], bank.log_weight), *found[2:])
+    mean, covariance, innovation, white, metres, std_m, nearest = moving.foreseen(
+        model_of(config)[:], bank[:], step, position_m, position_std_m
+    )
+    return Foreseen(metres, std_m, nearest, bank.believing(mean, covariance, bank.log_weight), innovation, white)
 
 
 def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.StepNumbers:

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..belief.rail import Rail
 from ..intake.samples import Measurement
-from .following import Memory, Off, followed
+from .following import Memory, followed
 from .layout import POSITION
+from .motion import Foreseen
 from .plausible import Course
 
 if TYPE_CHECKING:
@@ -48,7 +49,7 @@ class Stepping(NamedTuple):
     stepped_m: float = -math.inf
     """Where the positions stepped last."""
 
-    def after(self, config: Config, memory: Memory, measurement: Measurement, off: Off) -> Stepping:
+    def after(self, config: Config, memory: Memory, measurement: Measurement, off: Foreseen) -> Stepping:
         """Take in a measurement; its position, if it has one, lies so far off what `memory` had foreseen."""
         if not measurement.has_position:
             return self._replace(since=(*self.since, measurement)) if self.before is not None else self

@@ -90,7 +90,7 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     stream = stream.since(first_ns)
     now_ns = _newest(inbox.now_ns, sample)
     inbox = inbox.with_stream(type(sample), stream.delayed(now_ns - sample.t_ns), now_ns)
-    return _with(overtaken, Pushed(*release(gate, inbox, inbox.anchors.excess)))
+    return _with(overtaken, Pushed(*release(gate, inbox, 0)))
 
 
 def _overtaken(gate: Gate, inbox: Inbox, sample: Any) -> tuple[Event, ...]:

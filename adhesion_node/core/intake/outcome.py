@@ -86,7 +86,7 @@ def counted(counts: Mapping[Outcome, int], *events: Event) -> Mapping[Outcome, i
     """The counts with those of the events added."""
     if not events:
         return counts
-    added = dict(counts.copy() if isinstance(counts, MappingProxyType) else counts)
+    added = counts.copy() if isinstance(counts, MappingProxyType) else dict(counts)
     for event in events:
         added[event.outcome] += 1
     return MappingProxyType(added)

@@ -14,7 +14,6 @@ paired with does not depend on the order of arrival.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -104,7 +103,7 @@ class Inbox(NamedTuple):
     """Newest anchor that was released."""
     anchors: Stream = Stream()
     """Anchors that wait."""
-    others: Mapping[type[Any], Stream] = MappingProxyType({})
+    others: MappingProxyType[type[Any], Stream] = MappingProxyType({})
     suspects: tuple[Any, ...] = ()
     """Samples stamped far from all others, set aside: at most one of each sensor."""
     late: tuple[int, int] = (0, 0)
@@ -118,36 +117,31 @@ class Inbox(NamedTuple):
 
     def with_stream(self, kind: type[Any], stream: Stream, now_ns: int) -> Inbox:
         """The inbox with another stream in place of that sensor's, and its newest stamp of any."""
-        return self._replace(others=MappingProxyType({**self.others, kind: stream}), now_ns=now_ns)
+        return self._replace(others=MappingProxyType(self.others | {kind: stream}), now_ns=now_ns)
 
 
-def is_present(inbox: Inbox, source: Source, t_ns: int) -> bool:
-    """Whether a sensor is there: heard not long before, and so by now, whatever the order of arrival.
+def is_present(inbox: Inbox, source: Source, stream: Stream | None, t_ns: int) -> bool:
+    """Whether a sensor is there, of what it has measured: heard not long before, so by now, whatever came first.
 
     In the beginning each may still come.
     """
     if inbox.begun_ns <= t_ns <= inbox.begun_ns + source.wait_ns:
         return True
-    stream = inbox.others.get(source.kind)
     return stream is not None and stream.has_between(t_ns - PRESENT_NS, t_ns - source.wait_ns)
 
 
-def _known_ns(inbox: Inbox, source: Source, t_ns: int) -> int:
+def _known_ns(inbox: Inbox, source: Source, stream: Stream, t_ns: int) -> int:
     """Up to when the samples of a sensor are used at a time: what was not waited for must have been there before."""
-    return t_ns if is_present(inbox, source, t_ns) else t_ns - source.wait_ns
+    return t_ns if is_present(inbox, source, stream, t_ns) else t_ns - source.wait_ns
 
 
-def value_of(inbox: Inbox, source: Source, t_ns: int) -> Any | None:
+def value_of(inbox: Inbox, source: Source, stream: Stream, t_ns: int) -> Any | None:
     """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
-    stream = inbox.others.get(source.kind)
-    latest = None if stream is None else stream.latest(_known_ns(inbox, source, t_ns))
+    latest = stream.latest(_known_ns(inbox, source, stream, t_ns))
     return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest
 
 
-def each_of(inbox: Inbox, source: Source, t_ns: int) -> tuple[Any, ...]:
+def each_of(inbox: Inbox, source: Source, stream: Stream, t_ns: int) -> tuple[Any, ...]:
     """The samples of a sensor up to a time that are not used up, the newest ones where they are too many."""
-    stream = inbox.others.get(source.kind)
-    if stream is None:
-        return ()
     before_ns = t_ns if inbox.released_ns is None else min(inbox.released_ns, t_ns)
-    return stream.unspent(before_ns - source.age_ns, _known_ns(inbox, source, t_ns))[-MOST_EACH:]
+    return stream.unspent(before_ns - source.age_ns, _known_ns(inbox, source, stream, t_ns))[-MOST_EACH:]

@@ -34,20 +34,17 @@ def release(gate: Gate, inbox: Inbox, count: int, until_ns: int | None = None) -
 
     Up to `until_ns` no tick waits.
     """
-    anchors, matched = inbox.anchors.samples, list[Matched]()
-    taken = 0
-    while (turn := _turn(gate, inbox, anchors[taken:][:1], taken < count, until_ns)) is not None:
+    left = len(inbox.anchors.samples) - count
+    matched: list[Matched] = []
+    while (turn := _turn(gate, inbox, len(inbox.anchors.samples) > left, until_ns)) is not None:
         inbox, values = _given_out(gate, inbox, turn)
         matched.append(Matched(turn, values))
-        taken += not isinstance(turn, Tick)
-    if taken:
-        inbox = inbox._replace(anchors=inbox.anchors._replace(samples=anchors[taken:]))
     return inbox, tuple(matched)
 
 
-def _turn(gate: Gate, inbox: Inbox, waiting: tuple[Any, ...], forced: bool, until_ns: int | None) -> Any | None:
+def _turn(gate: Gate, inbox: Inbox, forced: bool, until_ns: int | None) -> Any | None:
     """The anchor or tick that may be released next, in order; None: wait."""
-    tick_ns = _next_tick_ns(gate, inbox)
+    tick_ns, waiting = _next_tick_ns(gate, inbox), inbox.anchors.samples
     near_ns = gate.tick_ns // NEAR_TICK
     if tick_ns is not None and not (waiting and waiting[0].t_ns <= tick_ns + near_ns):
         due = until_ns is not None and tick_ns <= until_ns
@@ -75,24 +72,27 @@ def _is_ready(gate: Gate, inbox: Inbox, anchor: Any, near_ns: int) -> bool:
 
 
 def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, ...]]:
-    """The samples of the time of an anchor or tick; those that come once are used up."""
+    """The samples of the time of an anchor or tick, which waits no longer; those that come once are used up."""
     t_ns, sources = turn.t_ns, () if isinstance(turn, Measurement) else gate.sources
     if _begins(gate, inbox, t_ns):
         inbox = inbox._replace(begun_ns=t_ns)
-    values, spent = list[Any](), dict[type[Any], Stream]()
+    values: list[Any] = []
+    spent: dict[type[Any], Stream] = {}
     for source in sources:  # at every anchor: quicker than to make tuple and dictionary at once
         stream = inbox.others.get(source.kind)
         if stream is None:
             values.append(() if source.each else None)
         elif source.each:
-            values.append(each_of(inbox, source, t_ns))
+            values.append(each_of(inbox, source, stream, t_ns))
             if values[-1]:
-                spent[source.kind] = stream._replace(spent_ns=values[-1][-1].t_ns)
+                spent[source.kind] = stream.spent(values[-1][-1].t_ns)
         else:
-            values.append(value_of(inbox, source, t_ns))
-    others = MappingProxyType({**inbox.others, **spent}) if spent else inbox.others
-    anchored_ns = inbox.anchored_ns if isinstance(turn, Tick) else t_ns
-    return inbox._replace(released_ns=t_ns, anchored_ns=anchored_ns, others=others), tuple(values)
+            values.append(value_of(inbox, source, stream, t_ns))
+    others = MappingProxyType(inbox.others | spent) if spent else inbox.others
+    if isinstance(turn, Tick):
+        return inbox._replace(released_ns=t_ns, others=others), tuple(values)
+    anchors = inbox.anchors.after_first()
+    return inbox._replace(released_ns=t_ns, anchored_ns=t_ns, anchors=anchors, others=others), tuple(values)
 
 
 def _begins(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
@@ -109,10 +109,10 @@ def _lacks(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
     """Whether a sensor that is there has not come as far as a time, and is to be waited for by the anchors' stamps."""
     newest_ns = inbox.anchors.newest_ns
     for source in gate.sources:  # at every anchor: quicker than `any`
-        waits = newest_ns is None or t_ns > newest_ns - source.wait_ns
-        stream = inbox.others.get(source.kind) if waits else None
-        if waits and (stream is None or not stream.has_reached(t_ns)) and is_present(inbox, source, t_ns):
-            return True
+        if newest_ns is None or t_ns > newest_ns - source.wait_ns:
+            stream = inbox.others.get(source.kind)
+            if (stream is None or not stream.has_reached(t_ns)) and is_present(inbox, source, stream, t_ns):
+                return True
     return False
 
 
@@ -139,10 +139,11 @@ def _earliest(gate: Gate, inbox: Inbox, sources: Iterable[Source], before_ns: in
     """The first tick at which one of the sensors has told something since what was released before."""
     ticks = []
     for source in sources:
-        new_ns = inbox.stream(source.kind).next_ns(before_ns)
+        stream = inbox.stream(source.kind)
+        new_ns = stream.next_ns(before_ns)
         if new_ns is not None:
             t_ns = before_ns - (before_ns - new_ns) // gate.tick_ns * gate.tick_ns
-            if not is_present(inbox, source, t_ns):
+            if not is_present(inbox, source, stream, t_ns):
                 t_ns = before_ns - (before_ns - new_ns - source.wait_ns) // gate.tick_ns * gate.tick_ns
             ticks.append(t_ns)
     return min(ticks, default=None)

@@ -70,6 +70,14 @@ class Stream(NamedTuple):
         lag_ns = max(behind_ns * 5 // 4, self.lag_ns * 4 // 5)
         return self if lag_ns == self.lag_ns else Stream(*self[:4], lag_ns)
 
+    def spent(self, t_ns: int) -> Stream:
+        """The stream, its samples up to a stamp used up."""
+        return Stream(self.samples, self.newest_ns, self.allowed_ns, t_ns, self.lag_ns)
+
+    def after_first(self) -> Stream:
+        """Without its first sample."""
+        return Stream(self.samples[1:], *self[1:])
+
     @property
     def excess(self) -> int:
         """Samples beyond the most that are kept."""

@@ -88,6 +88,7 @@ def test_a_correction(position_m: float) -> None:
 def test_how_far_a_position_is_off(position_m: float) -> None:
     ours = motion.foreseen(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9, position_m, 1.3)
     bank = motion.moved(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9)
+    assert ours.bank is not None
     for one, other in zip(ours.bank, bank, strict=True):
         np.testing.assert_array_equal(one, other)
     seen = seeing.position_seen(bank, position_m, 1.3)
@@ -97,7 +98,7 @@ def test_how_far_a_position_is_off(position_m: float) -> None:
     mean = float(bank.weight @ seen.innovation)
     spread = float(bank.weight @ (variance + np.square(seen.innovation - mean)))
     nearest = float((np.abs(seen.innovation) / np.sqrt(variance)).min())
-    assert (ours.off_m, ours.std_m, ours.nearest) == pytest.approx((mean, np.sqrt(spread), nearest), rel=1e-12)
+    assert (ours.metres, ours.std_m, ours.nearest) == pytest.approx((mean, np.sqrt(spread), nearest), rel=1e-12)
 
 
 @pytest.mark.parametrize("held", [HELD, PASSING])
