@@ -297,7 +297,7 @@ def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Me
     rim = wheels.fastest(config, measurement.wheels[-1])
     if rim is not None and memory.braked and rim > config.slowest_mps:
         error = math.hypot(WHEEL_SHARE, wheels.error) * rim
-        bank = not_slower(bank, rim - error, error).normalised()
+        bank = not_slower(bank, rim, error).normalised()
     return memory._replace(wheels=wheels, bank=bank)
 
 

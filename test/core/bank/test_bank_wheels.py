@@ -17,6 +17,7 @@ import pytest
 from banks import S
 
 from adhesion_node.core.bank.following import Memory, followed, met
+from adhesion_node.core.bank.layout import SPEED
 from adhesion_node.core.bank.wheels import FRESH_NS, SLID_NS, WheelsSeen, told
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
@@ -180,3 +181,18 @@ def test_radii_are_learnt_whatever_a_released_cylinder_seems_to_hold(idle_pa: fl
     assert memory.wheels.learnt > 50
     assert memory.wheels.radius == pytest.approx(WORN, rel=3e-3)
     assert memory.wheels.share(memory.t_ns) is None
+
+
+def test_the_fastest_rim_bounds_the_speed_while_positions_are_out() -> None:
+    """20 s at 40 m/s, then 12 s of the full brake on a rail that gives 0.03, which nothing but an axle tells."""
+    memory: Memory | None = None
+    creep = np.array([0.0, 0.3, 0.2, 0.5])
+    for index in range(320):
+        t_ns, braked_s = S + index * 100 * MS, max(0.1 * (index - 200), 0.0)
+        speed = 40.0 - 9.8 * 0.037 * braked_s
+        wheels = (sample(t_ns, speed, creep * (braked_s > 0.0), EVEN),)
+        where = (4.0 * index, 0.04) if braked_s == 0.0 else (0.0, math.inf)
+        measured = Measurement(t_ns, *where, 410e3 * (braked_s > 0.0), wheels=wheels)
+        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
+    assert memory is not None
+    assert memory.bank.mean_of(SPEED) >= 0.997 * speed
