@@ -29,7 +29,7 @@ from ..core import Prediction
 from ..core.config import Config
 from ..run.offline import Recorded, messages, predictions
 from ..run.pipeline import Pipeline
-from ..run.results import row_of
+from ..run.results.rows import row_of
 from ..wire.line import ATMOSPHERE_PA, NOMINAL
 from ..wire.messages.results import Status
 from ..wire.topics import BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS

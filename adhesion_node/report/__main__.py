@@ -34,7 +34,7 @@ from ..command.options import (
 from ..core.physics.train import KMH
 from ..run.offline import parameters_of
 from ..run.pipeline import off_track
-from ..run.results import rows_to
+from ..run.results.rows import rows_to
 from ..wire.settings.setup import Setup, setup_of
 from .drawn.page import report_page
 from .drawn.page_data import Subject

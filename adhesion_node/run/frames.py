@@ -32,8 +32,8 @@ from ..core import (
 )
 from ..core.physics.train import Array
 from .pipeline import BACK_M, Pipeline
-from .results import COLUMNS, Row, row_of
-from .seen import Seen, pressure_of
+from .results.rows import COLUMNS, Row, row_of
+from .results.seen import Seen, pressure_of
 
 MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "brake_demand", "acceleration")
 """Columns beside `time` and those of the axles; m, m^2, m/s, Pa above the atmosphere, m/s^2."""

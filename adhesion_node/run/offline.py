@@ -33,9 +33,9 @@ from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_MU, TRUTH_
 from .engine import EstimatorPipeline
 from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
-from .results import row_of, rows_to
-from .score import Identified, Point, Truth, mean_relative_error_percent
-from .seen import MANY, Seen, pressure_of
+from .results.rows import row_of, rows_to
+from .results.score import Identified, Point, Truth, mean_relative_error_percent
+from .results.seen import MANY, Seen, pressure_of
 
 Recorded = tuple[str, Any, int]
 """Our name of a message's topic; the message, what was read of it, or why it is refused; its log time in ns."""

@@ -26,9 +26,9 @@ from ..bag import BagReader, select_from
 from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
 from ..command.running import Arrays, add_running_options, run_all, running
 from ..run import offline
-from ..run.brakings import BRAKING, CELL, CELL_M, brakings
 from ..run.pipeline import Pipeline
-from ..run.rail_map import map_of
+from ..run.results.brakings import BRAKING, CELL, CELL_M, brakings
+from ..run.results.rail_map import map_of
 from ..wire.files.train import read_train
 from ..wire.settings.nodes import TRAIN_FILE
 from ..wire.settings.setup import setup_of

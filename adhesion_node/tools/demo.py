@@ -50,7 +50,7 @@ from ..report.read.recorded import read_run
 from ..report.read.run import Run
 from ..run import offline
 from ..run.pipeline import Pipeline
-from ..run.score import Truth
+from ..run.results.score import Truth
 from ..wire.messages.parts import NS
 from ..wire.settings.setup import setup_of
 from ..wire.topics import ATP_STATUS

@@ -24,7 +24,7 @@ from test_offline import samples
 import adhesion_node
 from adhesion_node import Config, Curve, Grade, Measurement, Track, Train, Tunnel, estimate, finish, init, step
 from adhesion_node.nodes import replay
-from adhesion_node.run.results import COLUMNS
+from adhesion_node.run.results.rows import COLUMNS
 from adhesion_node.tools import import_csv
 
 

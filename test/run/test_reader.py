@@ -27,7 +27,7 @@ from adhesion_node.run.offline import Recorded
 from adhesion_node.run.offline import replay as replayed
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.run.reader import Reader
-from adhesion_node.run.score import Truth
+from adhesion_node.run.results.score import Truth
 from adhesion_node.wire.line import Line
 from adhesion_node.wire.messages.codec import plain
 from adhesion_node.wire.messages.refused import Rejected

@@ -17,7 +17,7 @@ import pandas as pd
 import pytest
 from test_offline import NO_TRUTH, samples, write_run
 
-from adhesion_node.run.rail_map import map_of
+from adhesion_node.run.results.rail_map import map_of
 from adhesion_node.tools import brakings
 
 

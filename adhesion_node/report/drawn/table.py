@@ -14,7 +14,7 @@ from typing import TypeVar
 import numpy as np
 
 from ...core.physics.train import CRH3, KMH, Train
-from ...run.seen import is_known
+from ...run.results.seen import is_known
 from ..found.distances import FIXED_MU, distances
 from ..found.findings import why_not
 from ..read.run import Run

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import KMH
-from ...run.brakings import BRAKING, CELL_M
-from ...run.rail_map import map_of
+from ...run.results.brakings import BRAKING, CELL_M
+from ...run.results.rail_map import map_of
 
 RAIL = ("place_m", "length_m", "date", "seen", "limited", "mu", "mu_lowest", "used", "mu_lower")
 

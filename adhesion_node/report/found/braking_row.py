@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ...core import Regime
 from ...core.physics.train import KMH
-from ...run.score import CONVERGED_AFTER_MPS
+from ...run.results.score import CONVERGED_AFTER_MPS
 from ..read.run import Run
 from ..read.series import Series
 from .brakings import Braking, rises

@@ -14,8 +14,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...run.brakings import split
-from ...run.seen import BRAKED_PA
+from ...run.results.brakings import split
+from ...run.results.seen import BRAKED_PA
 from ..read.run import Run
 from ..read.series import Series
 

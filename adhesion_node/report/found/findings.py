@@ -16,8 +16,8 @@ import numpy as np
 
 from ...core import Config, Regime
 from ...core.physics.train import KMH
-from ...run.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
-from ...run.seen import Seen
+from ...run.results.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
+from ...run.results.seen import Seen
 from ..read.dropped import dropped
 from ..read.run import Run
 from ..read.series import in_rows

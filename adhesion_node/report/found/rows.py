@@ -11,7 +11,7 @@
 import math
 from collections.abc import Iterator
 
-from ...run.results import COLUMNS, LEARNT, Row
+from ...run.results.rows import COLUMNS, LEARNT, Row
 from ..read.run import Run
 from ..read.series import in_rows
 

@@ -22,7 +22,7 @@ from ...core.intake.samples import DemandSample, PressureSample
 from ...run import offline
 from ...run.offline import Recorded
 from ...run.pipeline import Pipeline
-from ...run.results import Write, row_of
+from ...run.results.rows import Write, row_of
 from ...wire.line import Line
 from ...wire.messages.refused import Rejected
 from ...wire.settings.setup import Setup

@@ -26,7 +26,7 @@ from ...core.config import Config
 from ...core.physics.adhesion import WET
 from ...core.physics.motion import Motion
 from ...core.physics.train import KMH
-from ...run.score import CONVERGED_AFTER_MPS
+from ...run.results.score import CONVERGED_AFTER_MPS
 from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cramer_rao import MEAN_OF_STD, Bound, Path, Start, bound, speed_lost, std_that_stays_within

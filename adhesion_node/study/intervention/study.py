@@ -32,7 +32,7 @@ from ...core.physics.train import CRH3, GRAVITY, KMH
 from ...core.prediction import Prediction
 from ...run import offline
 from ...run.pipeline import Pipeline
-from ...run.score import Truth
+from ...run.results.score import Truth
 from ...wire.line import NOMINAL
 from ..trial.estimators import EXACT
 from ..trial.figures import Place, add_figure_options, figures_of

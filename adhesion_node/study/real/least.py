@@ -37,7 +37,7 @@ from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
 
 from ...core.physics.train import GRAVITY, Array
-from ...run.score import CONVERGED_AFTER_MPS
+from ...run.results.score import CONVERGED_AFTER_MPS
 from .cases import Case
 from .score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M
 from .trials import SLOWEST_MPS

@@ -27,9 +27,9 @@ from ...command.running import Arrays, add_running_options, run_all, running
 from ...core import Config
 from ...core.belief.rail_map import RailMap
 from ...core.physics.train import Array
-from ...run.brakings import CELL_M, brakings
 from ...run.pipeline import Pipeline
-from ...run.rail_map import map_of
+from ...run.results.brakings import CELL_M, brakings
+from ...run.results.rail_map import map_of
 from ...wire.files.rail_map import map_of_rows
 from ..trial.estimators import through
 from ..trial.text import Column, lines

@@ -37,7 +37,7 @@ from numpy.typing import NDArray
 
 from ...core import Regime
 from ...core.physics.train import Array
-from ...run.score import CONVERGED_AFTER_MPS
+from ...run.results.score import CONVERGED_AFTER_MPS
 from ..trial.score import TWO_SIDED_95, statistic
 from ..trial.trials import Rows
 from .trials import SLOWEST_MPS, Found

@@ -23,7 +23,7 @@ from sim_node.train.plant import ADHESION_LIMITED
 from ...command.running import Arrays, Running, run_all
 from ...core import Config, Regime
 from ...core.prediction import Prediction
-from ...run.score import CONVERGED_AFTER_MPS
+from ...run.results.score import CONVERGED_AFTER_MPS
 from .estimators import WAYS, Estimator, Lane, LaneResult
 from .world import World, simulate, stopping_m
 

@@ -22,7 +22,7 @@ from ...command.running import Running, add_running_options, running
 from ...core.physics import braking
 from ...core.physics.adhesion import WET, AdhesionLaw
 from ...core.physics.train import CRH3, KMH, Array
-from ...run.score import CONVERGED_AFTER_MPS
+from ...run.results.score import CONVERGED_AFTER_MPS
 from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from ..trial.trials import Results, Rows, each_trial, grouped

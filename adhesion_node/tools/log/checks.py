@@ -20,7 +20,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import KMH, Array
-from ...run.seen import FASTEST_MPS
+from ...run.results.seen import FASTEST_MPS
 from .format import PLACES, POSITION_UNITS, PRESSURE_UNITS, PRESSURES, SPEED_UNITS, TIME_UNITS, Format, option
 from .rows import Flags
 from .whole import Log, moment

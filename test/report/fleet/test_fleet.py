@@ -20,7 +20,7 @@ import pytest
 
 from adhesion_node.report.__main__ import main
 from adhesion_node.report.fleet.rail import low_spots, over_dates, read_fleet, spread
-from adhesion_node.run.brakings import BRAKING
+from adhesion_node.run.results.brakings import BRAKING
 
 DAY_NS = 86_400_000_000_000
 START_NS = 1_700_000_000_000_000_000

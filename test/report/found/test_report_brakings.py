@@ -34,9 +34,9 @@ from adhesion_node.report.read.estimated import estimate_run
 from adhesion_node.report.read.run import Run
 from adhesion_node.report.read.series import NONE, Series
 from adhesion_node.run import offline
-from adhesion_node.run.brakings import brakings as of_predictions
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.run.score import Truth
+from adhesion_node.run.results.brakings import brakings as of_predictions
+from adhesion_node.run.results.score import Truth
 from adhesion_node.wire.line import NOMINAL
 from adhesion_node.wire.settings.setup import setup_of
 from adhesion_node.wire.topics import (

@@ -17,7 +17,7 @@ import pytest
 
 from adhesion_node.core import Config, Estimate, Regime
 from adhesion_node.core.prediction import Prediction
-from adhesion_node.run.score import Truth, mean_relative_error_percent
+from adhesion_node.run.results.score import Truth, mean_relative_error_percent
 from adhesion_node.study.trial.estimators import Lane, LaneResult, Output
 from adhesion_node.study.trial.score import Curve, converged_kmh, of_runs, over_speed, relative_percent, score
 from adhesion_node.study.trial.trials import DROP, ROW, TRIAL, Results, Rows, _arrays, each_trial

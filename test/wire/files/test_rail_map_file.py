@@ -16,7 +16,7 @@ import pandas as pd
 import pytest
 
 from adhesion_node.core.belief.rail_map import Piece
-from adhesion_node.run.rail_map import map_of
+from adhesion_node.run.results.rail_map import map_of
 from adhesion_node.wire.files.rail_map import UNKNOWN_STD, read_rail_map
 from adhesion_node.wire.settings.setup import setup_of
 

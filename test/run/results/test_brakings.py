@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from adhesion_node.core import Config, Estimate, Prediction, Regime, predict
-from adhesion_node.run.brakings import brakings
+from adhesion_node.run.results.brakings import brakings
 
 S = 10**9
 ADHESION, BRAKE, NOTHING = Regime.ADHESION_LIMITED, Regime.BRAKE_LIMITED, Regime.COASTING

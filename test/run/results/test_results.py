@@ -27,7 +27,7 @@ from adhesion_node.nodes import replay
 from adhesion_node.run import offline
 from adhesion_node.run.offline import Recorded
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.run.results import COLUMNS, LEARNT
+from adhesion_node.run.results.rows import COLUMNS, LEARNT
 from adhesion_node.wire.line import NOMINAL
 
 

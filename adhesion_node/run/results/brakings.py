@@ -15,9 +15,9 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from ..core import Prediction, Regime
-from ..core.physics.train import KMH
-from .results import length_m
+from ...core import Prediction, Regime
+from ...core.physics.train import KMH
+from .rows import length_m
 
 BRAKING = np.dtype(
     [

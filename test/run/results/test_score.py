@@ -13,7 +13,7 @@ from __future__ import annotations
 import pytest
 
 from adhesion_node.core import Config, Estimate, Regime
-from adhesion_node.run.score import Truth, mean_relative_error_percent
+from adhesion_node.run.results.score import Truth, mean_relative_error_percent
 
 S = 10**9
 FULL_PA = 410e3

@@ -13,7 +13,7 @@ from __future__ import annotations
 import pytest
 
 from adhesion_node.run.pipeline import BACKWARDS
-from adhesion_node.run.seen import Seen
+from adhesion_node.run.results.seen import Seen
 
 S = 10**9
 

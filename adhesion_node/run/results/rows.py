@@ -14,11 +14,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ..core import Prediction
-from ..core.bank.kinds import KINDS
-from ..core.bank.learnt import KIND, QUANTITIES, learnt
-from ..core.physics.braking import BrakingCurve
-from .pipeline import Pipeline
+from ...core import Prediction
+from ...core.bank.kinds import KINDS
+from ...core.bank.learnt import KIND, QUANTITIES, learnt
+from ...core.physics.braking import BrakingCurve
+from ..pipeline import Pipeline
 
 Row = dict[str, Any]
 

@@ -12,9 +12,9 @@ import math
 from collections import deque
 from collections.abc import Iterator
 
-from ..core import Config, Regime
-from ..core.physics.train import KMH
-from .pipeline import BACKWARDS, Pipeline
+from ...core import Config, Regime
+from ...core.physics.train import KMH
+from ..pipeline import BACKWARDS, Pipeline
 
 BRAKES_MPS2, SPAN_S = 0.3, 3.0
 """A train that slows down less, over such a time, does not brake so that it tells of the adhesion."""

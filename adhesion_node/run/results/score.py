@@ -14,8 +14,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from ..core import Config
-from ..core.physics.train import KMH
+from ...core import Config
+from ...core.physics.train import KMH
 
 CONVERGED_AFTER_MPS = 30.0 * KMH
 """Speed lost under the brake after which the paper's estimates count as converged."""
