@@ -135,9 +135,9 @@ class Line:
         return status
 
 
-@pytest.fixture
-def line(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Line:
-    overrides = [Parameter(name, value=value) for name, value in SETTINGS.items()]
+def supervised(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil, **values: Any) -> Line:
+    """Return a line whose monitor has judged once."""
+    overrides = [Parameter(name, value=value) for name, value in {**SETTINGS, **values}.items()]
     monitor = AtpMonitor(context=context, namespace=NAMESPACE, parameter_overrides=overrides)
     driver = Node("driver", context=context, namespace=NAMESPACE)
     executor.add_node(monitor)
@@ -145,6 +145,11 @@ def line(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUnt
     made = Line(executor, spin_until, monitor, driver)
     made.next_status(lambda: made.set_time(START_S))  # the watchdog's first
     return made
+
+
+@pytest.fixture
+def line(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Line:
+    return supervised(context, executor, spin_until)
 
 
 def t_ns(offset_s: float = 0.0) -> int:
@@ -218,14 +223,7 @@ def test_a_clock_that_stands_still_is_an_emergency(
 def test_a_clock_that_stops_after_the_last_judgement_is_seen(
     context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
-    quick = {**SETTINGS, "clock_timeout_s": 0.5, "check_rate_hz": 10.0}
-    overrides = [Parameter(name, value=value) for name, value in quick.items()]
-    monitor = AtpMonitor(context=context, namespace=NAMESPACE, parameter_overrides=overrides)
-    driver = Node("driver", context=context, namespace=NAMESPACE)
-    executor.add_node(monitor)
-    executor.add_node(driver)
-    made = Line(executor, spin_until, monitor, driver)
-    made.next_status(lambda: made.set_time(START_S))
+    made = supervised(context, executor, spin_until, clock_timeout_s=0.5, check_rate_hz=10.0)
     made.set_time(START_S + 0.05)  # less than a tick of the watchdog: nothing judges at this time
     told: list[str] = []
 

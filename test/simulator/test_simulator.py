@@ -14,17 +14,16 @@ import os
 import subprocess
 import sys
 import time
-from collections import defaultdict
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from conftest import SpinUntil
+from published import Sent, by_topic, sent
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 
 from sim_node.nodes import simulator
 from sim_node.nodes.simulator import Simulator
@@ -35,28 +34,12 @@ from sim_node.train.run import run
 from sim_node.train.scenario import find
 from sim_node.train.sensors import SensorSettings
 
-ROS_OWN = ("/rosout", "/parameter_events", "/diagnostics")
-Sent = list[tuple[str, Any]]
+__all__ = ["sent"]
 
 
 def _simulator(context: Context, *, paced: bool = False, **parameters: Any) -> Simulator:
     overrides = [Parameter(name, value=value) for name, value in parameters.items()]
     return Simulator(paced=paced, context=context, parameter_overrides=overrides)
-
-
-@pytest.fixture
-def sent(monkeypatch: pytest.MonkeyPatch) -> Sent:
-    """Everything published on our topics, as (absolute topic name, message), in the order of publishing."""
-    record: Sent = []
-    publish = Publisher.publish
-
-    def recording(self: Publisher, message: Any) -> None:
-        if self.topic_name not in ROS_OWN:
-            record.append((self.topic_name, message))
-        publish(self, message)
-
-    monkeypatch.setattr(Publisher, "publish", recording)
-    return record
 
 
 def _destroy(node: Node) -> None:
@@ -70,13 +53,6 @@ def _drive(simulator: Simulator) -> int:
         samples += 1
     _destroy(simulator)
     return samples
-
-
-def _by_topic(sent: Sent) -> dict[str, list[Any]]:
-    lists: dict[str, list[Any]] = defaultdict(list)
-    for topic, message in sent:
-        lists[topic].append(message)
-    return lists
 
 
 def _nanoseconds(stamp: Any) -> int:
@@ -98,7 +74,7 @@ def test_all_sensors_of_a_sample_share_their_stamp(context: Context, sent: Sent)
             context, rate_hz=4.0, start_time_s=12.5, scenario="cruise", speed_std_mps=0.1, wheel_speed_std_radps=0.1
         )
     )
-    lists = _by_topic(sent)
+    lists = by_topic(sent)
     expected = [12_500_000_000 + k * 250_000_000 for k in range(241)]
     assert [_nanoseconds(m.clock) for m in lists["/clock"]] == expected
     for topic in ("/position", "/speed", "/wheel_speed", "/brake_pressure", "/truth/state"):
@@ -110,7 +86,7 @@ def test_messages_carry_the_run_and_its_variances(context: Context, sent: Sent) 
     parameters: dict[str, Any] = {"position_std_m": 0.3, "pressure_std_pa": 500.0, "speed_std_mps": 0.2}
     parameters["wheel_speed_std_radps"] = 0.1
     _drive(_simulator(context, scenario="tunnel_exit", seed=4, rate_hz=2.0, **parameters))
-    lists = _by_topic(sent)
+    lists = by_topic(sent)
     expected = list(run(find("tunnel_exit"), 0.5, 4, SensorSettings(**parameters)))
     assert [m.pose.pose.position.x for m in lists["/position"]] == [r.position_m for _, r in expected]
     assert {m.pose.covariance[0] for m in lists["/position"]} == {0.3**2}
@@ -129,14 +105,14 @@ def test_messages_carry_the_run_and_its_variances(context: Context, sent: Sent) 
 
 def test_pressure_is_absolute(context: Context, sent: Sent) -> None:
     _drive(_simulator(context, rate_hz=1.0))
-    pressures = [m.fluid_pressure for m in _by_topic(sent)["/brake_pressure"]]
+    pressures = [m.fluid_pressure for m in by_topic(sent)["/brake_pressure"]]
     assert pressures[:20] == [101325.0] * 20
     assert set(pressures[20:]) == {511325.0}
 
 
 def test_adhesion_drops_as_published_when_the_brake_comes_on(context: Context, sent: Sent) -> None:
     _drive(_simulator(context, scenario="tunnel_entry"))
-    mu = [m.data for m in _by_topic(sent)["/truth/mu"]]
+    mu = [m.data for m in by_topic(sent)["/truth/mu"]]
     assert mu[199:201] == pytest.approx([0.1432, 0.0726], abs=1.5e-4)
 
 
@@ -156,7 +132,7 @@ def test_a_real_train_sends_what_its_drive_holds_in_order_of_arrival(
     expected = [(f"/{m.topic.name}", m.t_ns - round((START_S - 500.0) * 1e9)) for _, m in driven.messages]
     assert stamps == expected[: len(stamps)]
     assert len(stamps) > 250
-    lists = _by_topic(sent)
+    lists = by_topic(sent)
     clocks = [_nanoseconds(m.clock) * 1e-9 for m in lists["/clock"]]
     assert clocks == sorted(clocks)
     assert len(clocks) == len(stamps) + len(lists["/truth/mu"]) == len(stamps) + len(lists["/truth/state"])
@@ -198,14 +174,14 @@ def test_a_sensor_parameter_leaves_the_truth_alone(context: Context, sent: Sent)
     for parameters in changes:
         sent.clear()
         _drive(_simulator(context, rate_hz=1.0, **parameters))
-        lists = _by_topic(sent)
+        lists = by_topic(sent)
         truths.append((lists["/truth/state"], lists["/truth/mu"]))
     assert truths[0] == truths[1]
 
 
 def test_a_dropout_misses_the_position_only(context: Context, sent: Sent) -> None:
     samples = _drive(_simulator(context, rate_hz=2.0, dropout_fraction=0.5))
-    lists = _by_topic(sent)
+    lists = by_topic(sent)
     assert len(lists["/brake_pressure"]) == len(lists["/clock"]) == samples
     assert 0.3 * samples < len(lists["/position"]) < 0.7 * samples
 

@@ -17,11 +17,12 @@ from typing import Any
 import pytest
 from conftest import SpinUntil
 from messages import message_class
+from published import ROS_OWN, Sent, by_topic, sent
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from test_simulator import ROS_OWN, Sent, _by_topic, _destroy, _nanoseconds, _simulator, sent
+from test_simulator import _destroy, _nanoseconds, _simulator
 
 from adhesion_node.nodes.ros.qos import subscribe
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH
@@ -74,7 +75,7 @@ def test_nothing_is_published_before_the_subscribers_are_there(
     assert sent == []
     executor.add_node(_Listener(context))
     spin_until(executor, lambda: simulator.finished)
-    assert len(_by_topic(sent)["/position"]) == 61
+    assert len(by_topic(sent)["/position"]) == 61
 
 
 def test_who_is_found_a_little_later_misses_nothing(
@@ -109,7 +110,7 @@ def test_the_node_lives_on_when_told_to(
     simulator = _simulator(context, paced=True, exit_at_end=False, **RUN_OF_61)
     executor.add_node(simulator)
     spin_until(executor, lambda: sum(not timer.is_canceled() for timer in simulator.timers) == 1)
-    assert len(_by_topic(sent)["/position"]) == 61
+    assert len(by_topic(sent)["/position"]) == 61
     assert not simulator.finished
 
 

@@ -10,40 +10,24 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from typing import Any
 
 import pytest
+from published import Sent, by_topic, sent
 from rclpy.context import Context
 from rclpy.parameter import Parameter
-from rclpy.publisher import Publisher
 
 from adhesion_node.wire.topics import CLOCK, CREEP_INPUTS, SPEED, TRACTION_FORCE, TRUTH_MU, WHEEL_SPEED
 from sim_node.nodes.slip_simulator import SlipSimulator
 from sim_node.slip import plant as slip
 from sim_node.slip.scenario import find
 
-Sent = list[tuple[str, Any]]
+__all__ = ["sent"]
 
 
 def _simulator(context: Context, **parameters: Any) -> SlipSimulator:
     overrides = [Parameter(name, value=value) for name, value in parameters.items()]
     return SlipSimulator(paced=False, context=context, parameter_overrides=overrides)
-
-
-@pytest.fixture
-def sent(monkeypatch: pytest.MonkeyPatch) -> Sent:
-    """Everything published on our topics, as (topic name, message), in the order of publishing."""
-    record: Sent = []
-    publish = Publisher.publish
-
-    def recording(self: Publisher, message: Any) -> None:
-        if self.topic_name not in ("/rosout", "/parameter_events"):
-            record.append((self.topic_name, message))
-        publish(self, message)
-
-    monkeypatch.setattr(Publisher, "publish", recording)
-    return record
 
 
 def test_a_sample_is_published_in_order_with_one_stamp(context: Context, sent: Sent) -> None:
@@ -52,9 +36,7 @@ def test_a_sample_is_published_in_order_with_one_stamp(context: Context, sent: S
         assert simulator.tick()
     order = ["/clock", "/truth/mu", "/speed", "/traction_force", "/wheel_speed"]
     assert [topic for topic, _ in sent] == order * 3
-    lists: dict[str, list[Any]] = defaultdict(list)
-    for topic, message in sent:
-        lists[topic].append(message)
+    lists = by_topic(sent)
     expected = list(zip(range(3), slip.run(find("creep_dry"), 0.01, 3), strict=False))
     for index, (truth, measured) in expected:
         t_ns = 12_500_000_000 + index * 10_000_000

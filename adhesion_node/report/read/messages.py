@@ -20,7 +20,6 @@ from ...wire.messages.parts import stamp_ns, stamps_ns
 from ...wire.messages.refused import Rejected
 from ...wire.messages.results import Status
 from ...wire.topic import Frame, Topic
-from .series import Times
 
 
 class Sample(NamedTuple):
@@ -69,7 +68,7 @@ def _hand_over(reader: BagReader, topic: Topic, records: Sequence[Record], line:
         samples = [sample_of(topic, one, record.log_ns, line) for record, one in reader.decoded(records)]
     else:
         log_ns = np.array([record.log_ns for record in records], dtype=np.int64)
-        samples = [_samples_of(topic, message, log_ns, line)]
+        samples = [_sample(topic.together, stamps_ns, message, log_ns, line)]
     for sample in samples:
         for take in takes:
             take(sample)
@@ -77,20 +76,17 @@ def _hand_over(reader: BagReader, topic: Topic, records: Sequence[Record], line:
 
 def sample_of(topic: Topic, message: Any, log_ns: int, line: Line) -> Sample:
     """Read a message."""
-    header = getattr(message, "header", None)
-    t_ns = log_ns if header is None else stamp_ns(header)
-    try:
-        return Sample(log_ns, t_ns, topic.read(message, line))
-    except Rejected:
-        return Sample(log_ns, t_ns, None)
+    return _sample(topic.read, stamp_ns, message, log_ns, line)
 
 
-def _samples_of(topic: Topic, message: Any, log_ns: Times, line: Line) -> Sample:
-    """Read many messages that stand as one."""
+def _sample(
+    read: Callable[[Any, Line], Any], stamped: Callable[[Any], Any], message: Any, log_ns: Any, line: Line
+) -> Sample:
+    """Read one message, or many that stand as one."""
     header = getattr(message, "header", None)
-    t_ns = log_ns if header is None else stamps_ns(header)
+    t_ns = log_ns if header is None else stamped(header)
     try:
-        return Sample(log_ns, t_ns, topic.together(message, line))
+        return Sample(log_ns, t_ns, read(message, line))
     except Rejected:
         return Sample(log_ns, t_ns, None)
 
