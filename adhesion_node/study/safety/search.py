@@ -22,7 +22,7 @@ from ...core.atp.received import NS_PER_S
 from ...core.atp.supervision import Level
 from ...core.physics.train import Array
 from .case import EPOCH_NS, FREE_S, Case, Target, draw, estimated, told
-from .faults import FAULTS
+from .faults.table import FAULTS
 from .truth import allowed
 
 GRID_S = 0.01

@@ -24,7 +24,7 @@ import numpy as np
 
 from ...command.running import Arrays, add_running_options, run_all, running
 from ..trial.text import Column, lines
-from .faults import FAULTS
+from .faults.table import FAULTS
 from .search import Outcome, case_of, outcome
 
 CHUNK = 2000

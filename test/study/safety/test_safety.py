@@ -25,7 +25,7 @@ from adhesion_node.core.atp.config import SupervisionConfig
 from adhesion_node.core.atp.received import TrainState
 from adhesion_node.study import __main__ as study
 from adhesion_node.study.safety import study as safety
-from adhesion_node.study.safety.faults import FAULTS
+from adhesion_node.study.safety.faults.table import FAULTS
 from adhesion_node.study.safety.search import Outcome, case_of, outcome
 from adhesion_node.study.safety.truth import Brake
 
