@@ -8,84 +8,222 @@
 
 """Mutation testing: a sample of small changes to the last commit's core, and those that no test notices.
 
-Usage: mutation.py [--part PART] [--mutants N] [--seed N], with the extra `mutation`. Cosmic Ray makes the mutants, in a
-clone; settings' declarations are left out, as tests hold them equal to defaults.yaml and to doc/parameters.md.
+Usage: mutation.py [--part PART] [--mutants N] [--seed N] [--workers N] [--kept FOLDER], with the extra `mutation`.
+Cosmic Ray makes the mutants, in clones. Each is shown to the tests that reach its line, the quickest first, until one
+fails. Settings' declarations are left out: tests hold them equal to defaults.yaml and to doc/parameters.md.
 """
 
 import argparse
+import json
+import multiprocessing
 import os
 import random
 import re
-import shlex
+import resource
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
+from collections.abc import Callable
+from difflib import unified_diff
 from pathlib import Path
 
-from cosmic_ray.work_db import WorkDB, use_db
-from cosmic_ray.work_item import WorkerOutcome, WorkResult
+import coverage
+import hypothesis
+import numba
+import pytest
+from cosmic_ray.commands.init import _all_work_items
+from cosmic_ray.mutating import use_mutation
+from cosmic_ray.plugins import get_operator
+from cosmic_ray.work_item import MutationSpec
+from scipy import special
 
 ROOT = Path(__file__).resolve().parent.parent
-PARTS = {
-    "atp": ("core/atp", "test/core/atp"),
-    "physics": ("core/physics", "test/core/physics --ignore=test/core/physics/test_trains.py"),
-    "intake": ("core/intake", "test/core/intake"),
-    "prediction": ("core/prediction.py", "test/core/test_prediction.py"),
-}
-"""Module or package under adhesion_node, and the tests that must notice."""
+CORE = Path("adhesion_node/core")
+PARTS = ("atp", "bank", "belief", "creep", "estimator", "intake", "methods", "physics")
+"""Folders of the core; the estimator is the modules beside them."""
 
 MEANINGLESS = re.compile(r".*(Bit|Shift|_Mod|FloorDiv|RemoveDecorator|ExceptionReplacer|_Is|_IsNot|ZeroIteration).*")
 """Operators whose mutants fail at once, or change an annotation alone."""
 
-PYTEST = f"{sys.executable} -m pytest -q -x -p no:cacheprovider --noconftest --hypothesis-profile=ci -o addopts="
-"""Without the set-up that all tests share, which compiles kernels: these need neither ROS nor the bank."""
+TESTS = {
+    False: [
+        *("--doctest-modules", str(CORE), "test/core"),
+        *("--ignore-glob=*/test_trains.py", "--ignore-glob=*/test_faults_simulated.py"),  # of the simulator, and slow
+        *(f"test/run/test_{name}.py" for name in ("pipeline", "seen", "frames", "results", "score")),
+    ],
+    True: [
+        *("test/core/bank", "test/core/methods"),
+        *(f"--ignore-glob=*/test_{name}.py" for name in ("detection", "condition", "changes", "noise")),
+        *("-k", "not (compiled or wanders or whole_bank or ten_minutes or never_lowers or converge or weak_brake)"),
+    ],
+}
+"""Who must notice, by whether it is a kernel's mutant: those run uncompiled, as nothing else tells what is reached."""
+
+BUDGET_S = 10.0
+"""Seconds of the processor for the tests of one mutant, by what they take without it; the last may go beyond."""
+
+LIMIT_S = 6.0 * BUDGET_S
+"""A mutant that takes longer never ends."""
+
+LOADED = (numba, special)
+"""Loaded once: each mutant's tests run in a fork."""
+
+
+class Recorder:
+    """Plugin of pytest: which lines each passed test reaches, and the seconds of the processor that it takes."""
+
+    def __init__(self, data: Path) -> None:
+        self.coverage = coverage.Coverage(str(data), source=[str(CORE)], config_file=False)
+        self.coverage.set_option("run:relative_files", True)
+        self.taken_s: dict[str, float] = {}
+        self.began = 0.0
+
+    def pytest_runtest_logstart(self, nodeid: str) -> None:
+        """Begin a test."""
+        self.coverage.switch_context(nodeid)
+        self.began = time.process_time()
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """End a part of a test: set-up, call or tear-down."""
+        if not report.passed:  # it wants a node's fixtures, say
+            self.taken_s[report.nodeid] = float("inf")
+        elif report.when == "teardown":
+            self.taken_s.setdefault(report.nodeid, time.process_time() - self.began)
 
 
 def main() -> int:
     """Return 0 where nine of ten mutants are killed."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--part", action="append", choices=PARTS, help="what is mutated (default: all)")
-    parser.add_argument("--mutants", type=int, default=50, help="of each part (default %(default)s)")
+    parser.add_argument("--mutants", type=int, default=300, help="how many in all (default %(default)s)")
     parser.add_argument("--seed", type=int, default=1, help="of the sample (default %(default)s)")
+    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="side by side (default %(default)s)")
+    parser.add_argument("--kept", type=Path, help="folder of clones and of what tests reach: for more runs of a commit")
     options = parser.parse_args()
-    killed = total = 0
+    survived: Counter[str] = Counter()
+    total: Counter[str] = Counter()
+    fork = multiprocessing.get_context("fork")
     with tempfile.TemporaryDirectory() as folder:
-        subprocess.run(["git", "clone", "--quiet", str(ROOT), folder], check=True)
-        for part in options.part or PARTS:
-            survivors, of = mutated(Path(folder), part, options.mutants, random.Random(options.seed))
-            killed, total = killed + of - len(survivors), total + of
-            print(*survivors, f"{part}: {of - len(survivors)} of {of} killed", sep="\n", flush=True)
-    print(f"{killed / total:.0%} of {total} mutants killed")
-    return 0 if killed >= 0.9 * total else 1
+        kept = (options.kept or Path(folder)).resolve()
+        clones = fork.SimpleQueue()
+        for number in range(options.workers):
+            clones.put(cloned(kept / str(number)))
+        os.chdir(kept / "0")
+        chosen = sample(options.part or PARTS, options.mutants, random.Random(options.seed))
+        with fork.Pool(options.workers, lambda: os.chdir(clones.get())) as pool:
+            if not (kept / "True.json").exists():
+                pool.starmap(record, [(kept, False), (kept, True)], chunksize=1)
+            for mutation, difference, status in pool.imap_unordered(tried, [(kept, mutation) for mutation in chosen]):
+                total[part_of(mutation)] += 1
+                if not status:
+                    survived[part_of(mutation)] += 1
+                    print(difference, flush=True)
+    for part, of in sorted(total.items()):
+        print(f"{part}: {of - survived[part]} of {of} killed")
+    killed = total.total() - survived.total()
+    print(f"{killed / total.total():.0%} of {total.total()} mutants killed")
+    return 0 if killed >= 0.9 * total.total() else 1
 
 
-def mutated(clone: Path, part: str, count: int, rng: random.Random) -> tuple[list[str], int]:
-    """Try mutants of a part; return the differences that survived, and how many were tried."""
-    module, tests = PARTS[part]
-    session, config = clone / f"{part}.sqlite", clone / f"{part}.toml"
-    command = f"{PYTEST} --doctest-modules adhesion_node/{module} {tests}"
-    began = time.monotonic()
-    environment = os.environ | {"PYTHONPATH": f"{clone}:{clone / 'test'}", "PYTHONDONTWRITEBYTECODE": "1"}
-    subprocess.run(shlex.split(command), cwd=clone, env=environment, check=True, stdout=sys.stderr)
-    limit_s = 60.0 + 5.0 * (time.monotonic() - began)
-    config.write_text(
-        f'[cosmic-ray]\nmodule-path = "adhesion_node/{module}"\ntimeout = {limit_s:.0f}\n'
-        f'excluded-modules = ["**/config.py"]\ntest-command = "{command}"\n[cosmic-ray.distributor]\nname = "local"\n',
-        encoding="utf-8",
-    )
-    cosmic_ray = [str(Path(sys.executable).with_name("cosmic-ray"))]
-    subprocess.run([*cosmic_ray, "init", config.name, session.name], cwd=clone, check=True)
-    with use_db(str(session), WorkDB.Mode.open) as db:
-        every = sorted(db.work_items, key=lambda item: str(item.mutations))
-        useful = [item for item in every if not MEANINGLESS.match(item.mutations[0].operator_name)]
-        chosen = {item.job_id for item in rng.sample(useful, min(count, len(useful)))}
-        left_out = WorkResult(worker_outcome=WorkerOutcome.SKIPPED)
-        db.set_multiple_results([item.job_id for item in every if item.job_id not in chosen], left_out)
-    subprocess.run([*cosmic_ray, "exec", config.name, session.name], cwd=clone, env=environment, check=True)
-    with use_db(str(session), WorkDB.Mode.open) as db:
-        tried = [result for job, result in db.results if job in chosen]
-    return [str(result.diff) for result in tried if not result.is_killed], len(tried)
+def cloned(folder: Path) -> Path:
+    """Return a clone of the last commit, its modules compiled: a mutant's file is newer than that."""
+    if folder.exists():
+        return folder
+    subprocess.run(["git", "clone", "--quiet", str(ROOT), str(folder)], check=True)
+    subprocess.run([sys.executable, "-m", "compileall", "-q", CORE.parent, "test"], cwd=folder, check=True)
+    return folder
+
+
+def part_of(mutation: MutationSpec) -> str:
+    """Return the part that a mutant is in."""
+    below = mutation.module_path.relative_to(CORE).parts
+    return below[0] if len(below) > 1 else "estimator"
+
+
+def sample(parts: list[str], count: int, rng: random.Random) -> list[MutationSpec]:
+    """Return mutants of some parts, drawn from all of them alike."""
+    modules = [path for path in sorted(CORE.rglob("*.py")) if path.name != "config.py"]
+    every = [item.mutations[0] for item in _all_work_items(modules, {})]
+    useful = [one for one in every if part_of(one) in parts and not MEANINGLESS.match(one.operator_name)]
+    return rng.sample(useful, min(count, len(useful)))
+
+
+def record(kept: Path, uncompiled: bool) -> None:
+    """Write which line of the core each test reaches, and what it takes."""
+    recorder = Recorder(kept / f"{uncompiled}.coverage")
+
+    def run() -> int:
+        recorder.coverage.start()
+        status = tests_run(TESTS[uncompiled], uncompiled, recorder)
+        recorder.coverage.stop()
+        recorder.coverage.save()
+        kept.joinpath(f"{uncompiled}.json").write_text(json.dumps(recorder.taken_s), encoding="utf-8")
+        return int(status in (pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.INTERRUPTED))
+
+    if forked(run, None):
+        raise RuntimeError(f"the tests {' '.join(TESTS[uncompiled])} cannot be collected: run them by pytest")
+
+
+def tried(task: tuple[Path, MutationSpec]) -> tuple[MutationSpec, str, int]:
+    """Return a mutant, its difference, and the status of its tests: 0 where none noticed it."""
+    kept, mutation = task
+    uncompiled = "kernels" in mutation.module_path.parts
+    tests = tests_of(kept, mutation, uncompiled)
+    with use_mutation(mutation.module_path, get_operator(mutation.operator_name)(), mutation.occurrence) as codes:
+        difference = "\n".join(
+            unified_diff(*(code.splitlines() for code in codes), str(mutation.module_path), n=1, lineterm="")
+        )
+        status = forked(lambda: tests_run(["-x", "--doctest-modules", *tests], uncompiled), LIMIT_S) if tests else 0
+    return mutation, difference, status
+
+
+def tests_of(kept: Path, mutation: MutationSpec, uncompiled: bool) -> list[str]:
+    """Return the tests that reach a mutant's line; of one that is run as it is imported those that reach its file."""
+    data = coverage.CoverageData(str(kept / f"{uncompiled}.coverage"))
+    data.read()
+    by_line = data.contexts_by_lineno(str(mutation.module_path))
+    lines = range(mutation.start_pos[0], mutation.end_pos[0] + 1)
+    taken_s = json.loads(kept.joinpath(f"{uncompiled}.json").read_text(encoding="utf-8"))
+    able = {test for line in lines for test in by_line.get(line, [""])}
+    if "" in able:
+        able = {test for tests in by_line.values() for test in tests}
+    chosen, budget_s = [], BUDGET_S
+    for test in sorted(able & taken_s.keys(), key=lambda test: (taken_s[test], test)):
+        if budget_s > 0.0 and taken_s[test] < LIMIT_S:
+            chosen.append(test)
+            budget_s -= taken_s[test]
+    return chosen
+
+
+def tests_run(arguments: list[str], uncompiled: bool, *plugins: object) -> int:
+    """Run tests in this process, without the set-up that all share: none of them needs ROS. Return pytest's status."""
+    numba.config.DISABLE_JIT = uncompiled
+    os.environ |= {"OPENBLAS_NUM_THREADS": "1", "NUMBA_DISABLE_JIT": str(int(uncompiled))}
+    sys.dont_write_bytecode = not plugins
+    sys.path[:0] = [os.getcwd(), os.path.join(os.getcwd(), "test")]
+    quick = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
+    hypothesis.settings.register_profile("quick", derandomize=True, deadline=None, max_examples=60, phases=quick)
+    hypothesis.settings.load_profile("quick")
+    options = ["-q", "--noconftest", "-p", "no:cacheprovider", "-o", "addopts="]
+    return int(pytest.main([*options, *arguments], plugins))
+
+
+def forked(run: Callable[[], int], limit_s: float | None) -> int:
+    """Return the status of what runs in a process of its own, silently, not 0 where that is ended by the limit."""
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            os.dup2(1, 2)
+            if limit_s is not None:
+                resource.setrlimit(resource.RLIMIT_CPU, (int(limit_s), int(limit_s)))
+            status = run()
+        finally:
+            os._exit(status)
+    return os.waitpid(child, 0)[1]
 
 
 if __name__ == "__main__":

@@ -40,6 +40,14 @@ def test_a_train_may_be_three_standard_deviations_ahead_and_faster() -> None:
     assert decision.reading.distance_to_target_m == 5000.0 - position
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_curve_lies_ahead_of_its_train_whichever_way_places_count(sign: int) -> None:
+    places = CURVE._replace(position_m=3000.0, sign=sign).places_m
+    assert places[0] == 3000.0
+    assert places[-1] == pytest.approx(3000.0 + sign * 1000.0)  # 40 m/s at 0.8 m/s²
+    assert np.all(sign * np.diff(places) > 0.0)
+
+
 def test_since_its_state_a_train_may_have_accelerated() -> None:
     config = replace(CONFIG, acceleration_mps2=1.0, traction_cut_off_s=0.0)
     state = TrainState(NOW_NS - SECOND_NS, 1000.0, 40.0)

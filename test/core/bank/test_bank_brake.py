@@ -99,6 +99,13 @@ def test_behind_a_dump_small_swings_tell_that_the_protection_is_at_work(every_ms
             assert not brake.rising
 
 
+def test_a_valve_that_holds_a_cylinder_low_for_two_seconds_is_no_release() -> None:
+    samples = sampled(lambda time: cycling(10.0, 150e3)(min(time, 5.0)), 6.3)
+    assert samples[-1].pressure_pa == 150e3
+    newest = seen(CYLINDER, samples)[-1]
+    assert (newest.demanded_pa, newest.applied_pa) == (FULL_PA, FULL_PA)
+
+
 @pytest.mark.parametrize("config", [CYLINDER, MEAN])
 def test_behind_a_dump_a_steady_or_falling_pressure_is_the_drivers_again(config: Config) -> None:
     def pressure(time: float) -> float:
@@ -182,6 +189,7 @@ def test_a_brake_being_applied_is_told_from_a_steady_one() -> None:
             assert brake.rising
         elif time > 3.0:
             assert not brake.rising
+    assert not any(brake.rising for brake in seen(CYLINDER, sampled(lambda time: 3e5 * (1.0 + 0.05 * time), 6.0)))
     assert not BrakeSeen().known
     assert not BrakeSeen().rising
 
