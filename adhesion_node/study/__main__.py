@@ -9,74 +9,72 @@
 """`study NAME`: reproduces the figures of the papers."""
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
-from .bound import study as bound
-from .he import study as creep
-from .intervention import study as intervention
-from .real import remembered
-from .real import study as real
-from .robust import study as robust
-from .safety import study as safety
-from .xie import distances, sensitivity, tables, tune_ekf
 
 PURPOSE = "Reproduces the figures of the papers, and shows what follows from them."
 
 STUDIES = {
-    "distances": (distances, "braking distances and times beside the published ones", "--runs 200"),
+    "distances": ("xie.distances", "braking distances and times beside the published ones", "--runs 200"),
     "tables": (
-        tables,
+        "xie.tables",
         "Tables 2 and 3: accuracy over Monte-Carlo runs, beside two Kalman filters",
         "--runs 200 --figures figures",
     ),
-    "sensitivity": (sensitivity, "the same against position noise, window, step and particles", "--runs 10"),
+    "sensitivity": ("xie.sensitivity", "the same against position noise, window, step and particles", "--runs 10"),
     "robust": (
-        robust,
+        "robust.study",
         "the method `rail_condition` where rail, sensors or train are not what it believes, and under faults",
         "--runs 40",
     ),
     "real": (
-        real,
+        "real.study",
         "the estimator on trains, rails and sensors that share no model with it, held against goals",
         "--runs 20 --only leaves,wet --figures figures",
     ),
     "remembered": (
-        remembered,
+        "real.remembered",
         "the safe curve at the first second of braking, with what earlier trains saw of the rail and without",
         "--runs 4",
     ),
-    "bound": (bound, "the posterior Cramér-Rao bound of mu over a braking", "--json -"),
+    "bound": ("bound.study", "the posterior Cramér-Rao bound of mu over a braking", "--json -"),
     "intervention": (
-        intervention,
+        "intervention.study",
         "where the ATP monitor brakes by the identified adhesion and by fixed values",
         "--json table.json --figures figures",
     ),
     "safety": (
-        safety,
+        "safety.study",
         "trains that need more way than they have left, and whether the ATP monitor says so, whatever goes wrong",
         "--cases 1000000 --json safety.json",
     ),
     "creep": (
-        creep,
+        "he.study",
         "the creep curve: three experiments of the paper and what it leaves out",
         "--runs 20 --figures figures",
     ),
-    "tune-ekf": (tune_ekf, "the search behind the tuned Kalman filter of the tables", "--runs 10"),
+    "tune-ekf": ("xie.tune_ekf", "the search behind the tuned Kalman filter of the tables", "--runs 10"),
 }
+"""Module, what it shows, and options of an example. A module is loaded where its study is asked for."""
 
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run one study."""
     parser = argparse.ArgumentParser("study", **help_texts(PURPOSE, *(f"study {name}" for name in STUDIES)))
     studies = parser.add_subparsers(metavar="NAME", required=True)
-    for name, (study, summary, options) in STUDIES.items():
-        texts = help_texts(study.__doc__ or summary, f"study {name}", f"study {name} {options}")
+    asked = {*(sys.argv[1:] if args is None else args), *os.environ.get("COMP_LINE", "").split()}
+    for name, (module, summary, options) in STUDIES.items():
+        study = import_module(f".{module}", __package__) if name in asked else None
+        texts = help_texts((study and study.__doc__) or summary, f"study {name}", f"study {name} {options}")
         own = studies.add_parser(name, help=summary, parents=[json_option()], **texts)
-        study.add_options(own)
-        own.set_defaults(run=study.run)
+        if study:
+            study.add_options(own)
+            own.set_defaults(run=study.run)
     return run_tool(parser, _run, args)
 
 

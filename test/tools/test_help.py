@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import importlib
 import re
+import subprocess
 import sys
 
 import pytest
@@ -81,6 +82,14 @@ def offers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
     shared = "import adhesion_node.study.__main__, adhesion_node.tools.brakings, adhesion_node.tools.demo"
     assert [call.returncode for call in ended(calls, folder / "calls", shared)] == [0] * len(calls)
     return {line: {word.strip() for word in answer.read_text().splitlines()} for line, answer in answers.items()}
+
+
+def test_a_study_is_loaded_where_it_is_asked_for() -> None:
+    """A worker process loads the main module, too."""
+    told = "import sys, adhesion_node.study.__main__; print(*(name for name in sys.modules if 'node' in name))"
+    loaded = subprocess.run([sys.executable, "-c", told], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    ours = {name for name in loaded.split() if name.startswith(("adhesion_node.", "sim_node"))}
+    assert {name for name in ours if ".command" not in name} == {"adhesion_node.study", "adhesion_node.study.__main__"}
 
 
 @pytest.mark.parametrize(("line", "expected"), COMPLETED)

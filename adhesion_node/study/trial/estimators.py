@@ -177,7 +177,7 @@ class Way(NamedTuple):
     run: Callable[[Estimator, Sequence[Lane]], LaneResults]
     weight: float
     """Work of a lane, in that of a Kalman filter, about."""
-    lanes: int = 200
+    lanes: int = 50
     """In a task."""
 
 

@@ -94,7 +94,7 @@ class SimulatedRun(NamedTuple):
     """Truth by stamp, ns; a stamp that is no time of the run stands for the time when its message was born."""
 
 
-@lru_cache(maxsize=10)  # a small study takes the same few runs with every estimator
+@lru_cache(maxsize=20)  # two worlds' runs of a task, which are taken with every estimator
 def simulate(world: World, seed: int) -> SimulatedRun:
     """Simulate a run of `world`."""
     born, sent = dict[int, Truth](), list[Sent]()

@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import cache
 from itertools import islice, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,7 +24,7 @@ from adhesion_node.command.running import Arrays, Running, file_name, load, save
 from adhesion_node.core import Config
 from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning
 from adhesion_node.study.trial.estimators import WAYS, Estimator, Lane
-from adhesion_node.study.trial.trials import ROW, Trials, grouped
+from adhesion_node.study.trial.trials import ROW, Results, Trials, grouped
 from adhesion_node.study.trial.world import Refusal, World, simulate, ticks
 from adhesion_node.wire.topics import ADHESION_INPUTS
 from sim_node.faults.plan import Plan
@@ -43,10 +44,28 @@ def _quick() -> Arrays:
 
 
 def test_seeds_are_divided_so_that_each_comes_once() -> None:
-    tasks = QUICK._replace(seeds=230).tasks()
-    assert [task.seeds for task in tasks] == [100, 100, 30]  # from two starts each
+    tasks = QUICK._replace(seeds=60).tasks()
+    assert [task.seeds for task in tasks] == [25, 25, 10]  # from two starts each
     seeds = [seed for task in tasks for seed in range(task.first_seed, task.first_seed + task.seeds)]
-    assert seeds == list(range(1000, 1230))
+    assert seeds == list(range(1000, 1060))
+
+
+def test_what_is_of_the_same_seeds_is_run_one_after_the_other(monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[Trials] = []
+
+    def noted(tasks: list[Trials], where: Running, as_given: bool) -> list[Any]:
+        assert as_given
+        given.extend(tasks)
+        return [{name: np.full(1, task.first_seed) for name in Results._fields} for task in tasks]
+
+    monkeypatch.setattr("adhesion_node.study.trial.trials.run_all", noted)
+    wanted = [(name, QUICK._replace(seeds=60)) for name in ("one", "other")]
+    found = grouped(wanted, Running(Path()))
+    assert [task.first_seed for task in given] == [1000, 1000, 1025, 1025, 1050, 1050]
+    assert {name: some.seconds.tolist() for name, some in found.items()} == {
+        "one": [1000, 1025, 1050],
+        "other": [1000, 1025, 1050],
+    }
 
 
 def test_trials_come_back_from_the_cache_whole(tmp_path: Path) -> None:
