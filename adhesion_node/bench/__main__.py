@@ -20,7 +20,8 @@ from typing import Any
 
 from ..command.options import DONE, help_texts, json_option, report, run_tool
 from ..study.trial.figures import add_figure_options, figures_of
-from . import against, gaussian, growth, normal, particle, step
+from . import against, growth, step
+from .peers import gaussian, normal, particle
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
 

@@ -237,7 +237,7 @@ def test_only_bench_imports_its_peers() -> None:
     named = re.compile(rf"^\s*(from|import) ({'|'.join(PEERS)})\b", re.MULTILINE)
     importing = {path for path in sources() if named.search(path.read_text(encoding="utf-8"))}
     assert {path.name for path in importing} == {f"{peer}_smoother.py" for peer in PEERS}
-    assert {path.parent.name for path in importing} == {"bench"}
+    assert {path.parent.name for path in importing} == {"peers"}
 
 
 HEAD = """\

@@ -13,9 +13,9 @@ from typing import Any
 import gtsam
 import numpy as np
 
-from ..core.methods.kernels import equation
-from ..core.methods.rail_condition.problem import Problem
-from ..core.physics.train import Array
+from ...core.methods.kernels import equation
+from ...core.methods.rail_condition.problem import Problem
+from ...core.physics.train import Array
 
 
 def built(problem: Problem, solved: equation.Solved, trajectory: Array, kappa: float) -> Any:

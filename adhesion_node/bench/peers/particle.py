@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core.methods.particle_em.em import ParticleEStep, maximise
-from ..core.physics.train import Array
-from .scene import MU, Scene, Update, braking_window, maximised
-from .timing import SLOW, Contender, Timed, beside, interleave
+from ...core.methods.particle_em.em import ParticleEStep, maximise
+from ...core.physics.train import Array
+from ..scene import MU, Scene, Update, braking_window, maximised
+from ..timing import SLOW, Contender, Timed, beside, interleave
 
 OURS, MCMC, EXACT = "ours, exact", "particles, MCMC O(N)", "particles, exact O(N^2)"
 

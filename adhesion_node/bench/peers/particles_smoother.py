@@ -15,8 +15,8 @@ import particles
 from particles import distributions
 from particles.state_space_models import Bootstrap, StateSpaceModel
 
-from ..core.physics.train import Array
-from .scene import Scene
+from ...core.physics.train import Array
+from ..scene import Scene
 
 UNSEEN_M = 1e6
 """Standard deviation of the measurement at time 0, which the package wants and the window does not have."""

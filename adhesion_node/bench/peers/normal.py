@@ -19,13 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from ..core.methods.rail_condition.problem import Belief, Model, Problem
-from ..core.methods.rail_condition.smoother import KappaSearch, smooth
-from ..core.physics.adhesion import WET
-from ..core.physics.train import Array
+from ...core.methods.rail_condition.problem import Belief, Model, Problem
+from ...core.methods.rail_condition.smoother import KappaSearch, smooth
+from ...core.physics.adhesion import WET
+from ...core.physics.train import Array
+from ..scene import braking_window
+from ..timing import SLOW, Contender, beside, interleave
 from . import bare_loop
-from .scene import braking_window
-from .timing import SLOW, Contender, beside, interleave
 
 BARE, OURS, SEARCHED = "bare compiled loop", "ours, one call", "ours, in the search for kappa"
 BUILT, ELIMINATED = "GTSAM, building it", "GTSAM, eliminating it"

@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from ..core.belief.gaussian import Gaussian
-from ..core.belief.window import Window
-from ..core.physics.motion import Motion
-from ..core.physics.train import Array
-from .scene import Scene, Update, maximised
+from ...core.belief.gaussian import Gaussian
+from ...core.belief.window import Window
+from ...core.physics.motion import Motion
+from ...core.physics.train import Array
+from ..scene import Scene, Update, maximised
 
 SPEED_STEP_MPS = 1e-3
 

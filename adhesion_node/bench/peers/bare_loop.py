@@ -11,8 +11,8 @@
 As little as a machine can do for it: nothing is checked, named or kept, and every array is there already.
 """
 
-from ..core.compiled import kernel
-from ..core.physics.train import Array
+from ...core.compiled import kernel
+from ...core.physics.train import Array
 
 G = 9.8
 

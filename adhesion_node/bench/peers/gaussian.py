@@ -18,11 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from ..core.methods.rail_condition.problem import Belief, Model, Problem
-from ..core.methods.rail_condition.smoother import KappaSearch, posterior, smooth
-from ..core.physics.adhesion import SpeedLaw
-from .scene import Scene, Update, braking_window
-from .timing import SLOW, Contender, Timed, beside, interleave
+from ...core.methods.rail_condition.problem import Belief, Model, Problem
+from ...core.methods.rail_condition.smoother import KappaSearch, posterior, smooth
+from ...core.physics.adhesion import SpeedLaw
+from ..scene import Scene, Update, braking_window
+from ..timing import SLOW, Contender, Timed, beside, interleave
 
 OURS, PASS = "ours, converged", "filterpy, one RTS pass"
 FIFTY, CONVERGED = "filterpy, 50 EM iterations", "filterpy, EM converged"
