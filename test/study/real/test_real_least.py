@@ -15,8 +15,19 @@ import pytest
 
 from adhesion_node.core.physics.train import GRAVITY, Array
 from adhesion_node.study.real.cases import chosen
-from adhesion_node.study.real.least import FACTOR_STD, FAR_M, FAST_MPS, STEP_S, Course, least, on_the_mean, std_of
+from adhesion_node.study.real.least import (
+    FACTOR_STD,
+    FAR_M,
+    FAST_MPS,
+    PITCH_STD,
+    STEP_S,
+    Course,
+    least,
+    on_the_mean,
+    std_of,
+)
 from sim_node.real.sensors.fitted import FITTED, Mounted
+from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss
 from sim_node.real.sensors.speed import Speedometer
 from sim_node.real.sensors.timing import Timing
@@ -67,6 +78,13 @@ def test_swings_that_no_sensor_sees_in_time_stay() -> None:
     mounted = tuple(FITTED["white"].sensors.values())
     alone = 0.08 * 0.1 / np.sqrt(round(1.0 / STEP_S) + 1)
     assert std_of(COURSE, 140, present(140), mounted, swings) == pytest.approx(alone, rel=0.15)
+
+
+def test_an_accelerometer_is_known_as_the_train_pitches() -> None:
+    """One without any noise, on a train whose factor is known beforehand by half: what is left is the pitch."""
+    sure = Imu(bias_std_mps2=0.0, white_std_mps2=1e-6, mounting_std_rad=0.0)
+    left = std_of(COURSE, 140, present(140), [Mounted(sure, Timing(rate_hz=1.0 / STEP_S), "one")], NO_SWINGS)
+    assert left == pytest.approx(0.08 / np.hypot(1.0 / PITCH_STD, 1.0 / FACTOR_STD), rel=1e-3)
 
 
 @pytest.mark.parametrize(("more", "fewer"), [("gnss_doppler", "gnss"), ("gnss_imu", "gnss"), ("gnss", "gnss_1hz")])
