@@ -139,10 +139,10 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
     course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
     if predicted is not None:
         course = course.deviating(measurement.t_ns, predicted.stds)
-    is_foreseen = predicted is not None and predicted.bank is bank
-    if is_foreseen or memory.is_placed:
-        if predicted is not None and is_foreseen:
-            innovation, white = predicted.innovation, predicted.white
+    known = predicted if predicted is not None and predicted.bank is bank else None
+    if known is not None or memory.is_placed:
+        if known is not None:
+            innovation, white = known.innovation, known.white
         else:
             seen = position_seen(bank, measurement.position_m, declared)
             innovation, white = seen.innovation, seen.variances
