@@ -15,7 +15,7 @@ import numpy as np
 from ...core.physics.train import KMH, Array
 from ..trial.drawing import draw_lines, picture
 from ..trial.figures import Figures
-from .study import Case, Nominal
+from .nominal import Case, Nominal
 
 LOST_KMH = np.linspace(5.0, 150.0, 300)
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.lib.recfunctions import repack_fields
 
 from ...command.running import add_running_options, running
-from ..bound.study import Case, nominal
+from ..bound.nominal import Case, nominal
 from ..trial.figures import add_figure_options, figures_of
 from ..trial.score import over_speed, score
 from ..trial.text import Column, lines
