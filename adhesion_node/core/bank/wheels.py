@@ -35,7 +35,7 @@ UNEQUAL = 0.01
 UNLEARNT = 0.03
 """Error of the radius of a wheel of which nothing was learnt: wear."""
 
-LEARNING_MPS, LEARNING_SHARE = 5.0, 0.03
+LEARNING_MPS, LEARNING_SHARE = 5.0, 0.04
 """Radii are learnt from this speed on, where it is known to this share."""
 
 
