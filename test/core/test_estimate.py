@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 
 from adhesion_node.core import Config, Estimate, Regime
-from adhesion_node.core.estimate import blind_estimate
+from adhesion_node.core.belief.gaussian import Gaussian
+from adhesion_node.core.belief.rail import Rail
+from adhesion_node.core.estimate import Knowledge, blind_estimate
 from adhesion_node.core.intake.plausibility import STRONGEST_MPS2
+from adhesion_node.core.methods.protocol import Fit, Verdict
 from adhesion_node.core.physics.adhesion import SNOW
 
 S = 10**9
@@ -37,3 +40,13 @@ def test_unseen_nothing_of_what_was_identified_is_said_any_more(method: str) -> 
     assert blind.mu == pytest.approx(float(SNOW(np.array(40.0))), rel=0.01)
     assert 0.0 < blind.mu_lower <= blind.mu < SEEN.mu
     assert blind.mu_std > SEEN.mu_std
+
+
+def test_windows_are_numbered_on_and_one_without_measurements_is_none() -> None:
+    """By its number each has random numbers of its own."""
+    belief = Gaussian(np.array([900.0, 30.0]), np.eye(2))
+    seen = Verdict(Regime.ADHESION_LIMITED, Rail(0.07, 0.01, 0.06), belief, None, 0.07, True, Fit(window=20))
+    first = Knowledge().after(S, seen)
+    nothing = first.after(2 * S, seen._replace(mu=None, changed=False, fit=Fit()))
+    assert [each.windows for each in (first, nothing, nothing.after(3 * S, seen))] == [1, 1, 2]
+    assert (nothing.mu, nothing.changes, nothing.t_ns, nothing.position_m) == (0.07, 1, 2 * S, 900.0)

@@ -177,3 +177,11 @@ def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu:
     assert np.sqrt(after.covariance[0, MU, MU]) == pytest.approx(std, rel=5e-3)
     both = float((likely * (rail - mean) * factor).sum() / likely.sum())
     assert after.covariance[0, MU, BRAKE] == pytest.approx(both, abs=5e-3 * std * 0.1)
+
+
+@pytest.mark.parametrize(("off", "loses"), [(-1.0, 0.0), (1.0, 0.5), (2.0, 2.0)])
+def test_what_is_slower_than_a_rim_loses_by_the_square_of_its_deviation(off: float, loses: float) -> None:
+    rim = off * 0.5 - speed_seen(BANK, 0.0, 0.25).innovation  # by what each foresees of it
+    for index, speed in enumerate(rim):
+        lost = BANK.log_weight - not_slower(BANK, speed, 0.5).log_weight
+        assert lost[index] == pytest.approx(loses)

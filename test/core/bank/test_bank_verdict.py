@@ -24,7 +24,7 @@ from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.bank.following import Memory
 from adhesion_node.core.bank.kernels import mixture as mixtures
 from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING
-from adhesion_node.core.bank.layout import GRADE, MU, ROUGH, SPEED, Bank, joined
+from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, resistance, use
 from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
 from adhesion_node.core.bank.wheels import WheelsSeen
@@ -38,6 +38,9 @@ from adhesion_node.core.physics.train import CRH3, Array
 CONFIG = Config(method="bank")
 NOTHING = Rail(0.05, 0.04, 0.02)
 WANTED = (0.01, 0.025, 0.05, 0.5, 0.975)
+
+
+SMOOTH = [kind.name for kind in KINDS].index("smooth")
 
 
 class Mixture(NamedTuple):
@@ -166,6 +169,27 @@ def test_what_limits_is_said_by_the_wheels_and_where_some_slide_by_nothing(slidi
     slid = () if sliding is None else tuple(10 * S if axle < sliding else None for axle in range(4))
     memory = memory._replace(wheels=WheelsSeen((1.0,) * len(slid), 0, 0.03, slid, (10 * S,) * len(slid)))
     assert found(CONFIG, memory, NOTHING, NOTHING).regime is regime
+
+
+def limits(kind: int, used: float, told: float = 0.0) -> Regime:
+    """Without wheels, of a train that slows down for this reason by this part of its full brake."""
+    bank = bank_of([kind], spread=0.0).with_fresh(ROUGH, 0.0, 0.0)
+    bank.mean[:, MU], bank.mean[:, BRAKE] = used * FULL, 1.0
+    bank = bank._replace(covariance=1e-8 * bank.covariance)
+    return found(
+        CONFIG, memory_of(bank, Braking(used * FULL if kind == HELD else FULL, told=told), 3), NOTHING, NOTHING
+    ).regime
+
+
+def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well() -> None:
+    assert limits(SMOOTH, 0.5) is Regime.ADHESION_LIMITED
+    assert limits(SMOOTH, 0.97) is Regime.COASTING
+    assert limits(SMOOTH, 0.97, told=4.0) is Regime.ADHESION_LIMITED, "the slide protection says it"
+
+
+def test_a_brake_is_said_to_limit_only_where_it_gives_what_is_demanded() -> None:
+    assert limits(HELD, 1.0) is Regime.BRAKE_LIMITED
+    assert limits(HELD, 0.5) is Regime.COASTING
 
 
 @pytest.mark.parametrize("seed", range(12))

@@ -46,6 +46,7 @@ class Feeder:
         self.matched: list[Matched] = []
         self.ended: list[Matched] = []
         self.outcomes: list[Outcome] = []
+        self.details: list[str] = []
 
     def push(self, *samples: Sample) -> list[Matched]:
         """Push samples; return what they release."""
@@ -65,6 +66,7 @@ class Feeder:
         self.ended += pushed.ended
         self.matched += pushed.matched
         self.outcomes += [event.outcome for event in pushed.events]
+        self.details += [event.detail for event in pushed.events]
 
 
 def position(t_s: float) -> PositionSample:
@@ -195,6 +197,7 @@ def test_late_and_double_anchors_are_told() -> None:
     feeder = running()
     feeder.push(position(0.95), position(1.0), position(1.1), position(1.1))
     assert feeder.outcomes == [Outcome.LATE, Outcome.DUPLICATE, Outcome.DUPLICATE]
+    assert feeder.details[0].endswith("0.05 s behind the newest")
 
 
 def test_a_second_pressure_with_the_same_stamp_is_told() -> None:
