@@ -13,7 +13,8 @@ The writers are alike: stamp, the sensor's numbers in the unit of the message, t
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from functools import partial
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -23,6 +24,8 @@ from . import parts
 from .codec import Codec, Fields, New
 from .parts import stamp_ns, stamps_ns, writer
 from .refused import MAX_FORCE_N, MAX_WHEEL_RADPS, MOST_AXLES, Reason, Rejected, plausible, within
+
+Pressure = TypeVar("Pressure", samples.PressureSample, samples.DemandSample)
 
 
 def read_brake_pressure(message: Any, line: Line) -> samples.PressureSample:
@@ -42,10 +45,11 @@ def _gauge_pa(message: Any, line: Line) -> float:
     return max(absolute - line.ambient_pressure_pa, 0.0)
 
 
-def _gauge_together(message: Any, line: Line) -> samples.PressureSample:
+def _gauge_together(kind: type[Pressure], message: Any, line: Line) -> Pressure:
     """Read many of either at once."""
     absolute = within(message.fluid_pressure, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA)
-    return samples.PressureSample(stamps_ns(message.header), np.maximum(absolute - line.ambient_pressure_pa, 0.0))
+    gauge: Any = np.maximum(absolute - line.ambient_pressure_pa, 0.0)
+    return kind(stamps_ns(message.header), gauge)
 
 
 def read_speed(message: Any, _line: Line) -> samples.SpeedSample:
@@ -115,8 +119,8 @@ def _force(new: New, force_n: Sequence[float], _variance: float) -> Fields:
     return {"wrench": new("geometry_msgs/msg/Wrench", **wrench)}
 
 
-BRAKE_PRESSURE = Codec(read_brake_pressure, writer(_pressure), _gauge_together)
-BRAKE_DEMAND = Codec(read_brake_demand, writer(_pressure), _gauge_together)
+BRAKE_PRESSURE = Codec(read_brake_pressure, writer(_pressure), partial(_gauge_together, samples.PressureSample))
+BRAKE_DEMAND = Codec(read_brake_demand, writer(_pressure), partial(_gauge_together, samples.DemandSample))
 SPEED = Codec(read_speed, writer(lambda new, speed, variance: {"twist": parts.twist(new, speed[0], variance)}))
 IMU = Codec(read_imu, writer(_imu))
 WHEEL_SPEED = Codec(read_wheel_speed, writer(_wheels))
