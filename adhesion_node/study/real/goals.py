@@ -67,16 +67,17 @@ def goals(case: Case) -> tuple[Goal, ...]:
 
 
 def soonest(case: Case) -> float | None:
-    """When the sensors of a case could find a patch at best, s; None: too late to matter."""
+    """When the sensors of a case could find a patch at best, s; None: too late to matter, or not told."""
     return soonest_s(case.fitted, PATCH_USED, FOUND_SHARE)
 
 
 def _found(case: Case) -> tuple[Goal, ...]:
-    bound_s = soonest(case) if case.rail == "patches" else None
-    if bound_s is None:
+    if case.rail != "patches":
         return ()
-    at_once = case.fitted in AIDED or "wheels" in case.fitted
-    return (Goal("found_s", most=FOUND_S if at_once else OF_SOONEST * bound_s),)
+    if case.fitted in AIDED or "wheels" in case.fitted:
+        return (Goal("found_s", most=FOUND_S),)
+    bound_s = soonest(case)
+    return () if bound_s is None else (Goal("found_s", most=OF_SOONEST * bound_s),)
 
 
 def missed(case: Case, row: Mapping[str, Any]) -> dict[str, float]:

@@ -23,6 +23,7 @@ from sim_node.real.sensors.fitted import FITTED, Mounted
 from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
+from sim_node.real.sensors.wheels import Wheels
 
 from ...core.physics.train import GRAVITY, Array
 
@@ -34,8 +35,13 @@ LONGEST_S, STEP_S = 20.0, 0.1
 
 @lru_cache
 def soonest_s(fitted: str, used: float, share: float) -> float | None:
-    """Time, s, after which the standard deviation of the adhesion `used` may be a `share` of it; None: above 20 s."""
+    """Time, s, after which the standard deviation of the adhesion `used` may be a `share` of it.
+
+    None: above 20 s; or not told, as wheels tell of the speed, too, and none of this is known of them.
+    """
     mounted = FITTED[fitted].sensors.values()
+    if any(isinstance(one.sensor, Wheels) for one in mounted):
+        return None
 
     def told(after_s: float) -> bool:
         parts = [part for one in mounted if (part := _information(one, after_s)) is not None]

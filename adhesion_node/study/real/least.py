@@ -35,6 +35,7 @@ from sim_node.real.sensors.fitted import FITTED, Mounted
 from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
+from sim_node.real.sensors.wheels import Wheels
 
 from ...core.physics.train import GRAVITY, Array
 from ...run.results.score import CONVERGED_AFTER_MPS
@@ -95,10 +96,13 @@ class Least(NamedTuple):
 
 
 def least(case: Case) -> Least:
-    """The bounds of a case: where adhesion limits, and a sensor's errors are known."""
+    """The bounds of a case: where adhesion limits, sensors' errors are known, and no wheels tell of the speed, too."""
     if case.fitted not in FITTED or case.rail == "patches":
         return Least()
-    mounted = [one for one in FITTED[case.fitted].sensors.values() if isinstance(one.sensor, HONEST)]
+    fitted = FITTED[case.fitted].sensors.values()
+    if any(isinstance(one.sensor, Wheels) for one in fitted):
+        return Least()
+    mounted = [one for one in fitted if isinstance(one.sensor, HONEST)]
     courses = [course for course in _courses(case.scenario, case.built_after_s) if course.asked]
     if not mounted or not courses:
         return Least()
