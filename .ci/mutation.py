@@ -51,7 +51,8 @@ TESTS = {
     False: [
         *("--doctest-modules", str(CORE), "test/core"),
         *("--ignore-glob=*/test_trains.py", "--ignore-glob=*/test_faults_simulated.py"),  # of the simulator, and slow
-        *(f"test/run/test_{name}.py" for name in ("pipeline", "seen", "frames", "results", "score")),
+        *("test/run/test_pipeline.py", "test/run/test_frames.py"),
+        *(f"test/run/results/test_{name}.py" for name in ("seen", "results", "score")),
     ],
     True: [
         *("test/core/bank", "test/core/methods"),
@@ -113,8 +114,8 @@ def main() -> int:
         os.chdir(kept / "0")
         chosen = sample(options.part or PARTS, options.mutants, random.Random(options.seed))
         with fork.Pool(options.workers, lambda: os.chdir(clones.get())) as pool:
-            if not (kept / "True.json").exists():
-                pool.starmap(record, [(kept, False), (kept, True)], chunksize=1)
+            missing = [(kept, uncompiled) for uncompiled in TESTS if not (kept / f"{uncompiled}.json").exists()]
+            pool.starmap(record, missing, chunksize=1)
             for mutation, difference, status in pool.imap_unordered(tried, [(kept, mutation) for mutation in chosen]):
                 total[part_of(mutation)] += 1
                 if not status:
@@ -159,8 +160,10 @@ def record(kept: Path, uncompiled: bool) -> None:
         status = tests_run(TESTS[uncompiled], uncompiled, recorder)
         recorder.coverage.stop()
         recorder.coverage.save()
+        if status in (pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.INTERRUPTED):
+            return 1
         kept.joinpath(f"{uncompiled}.json").write_text(json.dumps(recorder.taken_s), encoding="utf-8")
-        return int(status in (pytest.ExitCode.USAGE_ERROR, pytest.ExitCode.INTERRUPTED))
+        return 0
 
     if forked(run, None):
         raise RuntimeError(f"the tests {' '.join(TESTS[uncompiled])} cannot be collected: run them by pytest")
