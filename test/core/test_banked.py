@@ -86,6 +86,12 @@ def test_a_step_of_the_positions_moves_neither_mu_nor_speed(size_m: float, at_s:
         assert abs(e.position_m - size_m - without.position_m) < 1.0
 
 
+def test_the_next_step_may_come_a_spacing_behind_where_the_last_was_plain() -> None:
+    """Three positions make it so: those of 6.0, 6.1 and 6.2 s."""
+    measurements = stepped(ride(STOP, seed=3), 6.0, 5.0)
+    assert drive(BANK, measurements)[0].stepping.stepped_m == measurements[62].position_m
+
+
 def test_the_evidence_is_that_of_what_came_since_the_last_estimate() -> None:
     """Of white noise of 0.5 m about a train that is well followed: ln p of each position is -1/2 ln(2 pi e 0.25)."""
     _, estimates = drive(BANK, ride([(40.0, 0.0)], seed=1))

@@ -21,6 +21,7 @@ from oracles import drive, ride
 from windowed import windowed
 
 from adhesion_node.core import Config, Estimate, Measurement, Outcome, Regime, State, finish, init, step
+from adhesion_node.core.intake.samples import ImuSample, SpeedSample
 
 FULL = 410e3
 QUICK = Config(method="particle_em", window=20, step=5, particles=8, iterations=8)
@@ -93,6 +94,8 @@ def test_an_old_state_is_still_usable() -> None:
         {"brake_pressure_pa": math.nan},
         {"speed_mps": math.inf},
         {"speed_mps": 1e3},
+        {"speeds": (SpeedSample(1, 20.0, math.inf),)},
+        {"imu": (ImuSample(1, 0.1, math.inf),)},
     ],
 )
 def test_invalid_is_counted_and_changes_nothing(changes: dict[str, Any]) -> None:

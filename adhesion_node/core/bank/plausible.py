@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 
 S = 1_000_000_000
 
-SPAN_NS, LEAST = 3 * S, 8
-"""Time of the positions that are kept, and how many must be looked at together."""
-
 LOOKS = ((3.0, 4.0), (1.5, 5.0))
-"""Times, s, over which they are looked at, and the standard deviations beyond which a deceleration is impossible."""
+"""Times, s, over which positions are looked at, and the standard deviations beyond which no train brakes so."""
+
+SPAN_NS, LEAST = round(max(LOOKS)[0] * S), 8
+"""Time of the positions that are kept, and how many must be looked at together."""
 
 RECEIVER = 1
 """Index into `NOISES` of what satellites may always do."""

@@ -144,6 +144,10 @@ def test_a_single_low_spot_counts_and_a_brake_that_builds_up_does_not() -> None:
     assert told(with_spot(0.03, limited=False)).lower == told(seen(0.10)).lower
 
 
+def test_where_the_brake_alone_limited_everywhere_the_rail_gives_as_much_at_least() -> None:
+    assert told(seen(0.10, limited=False)) == told(seen(0.10))
+
+
 def test_a_fast_train_gets_less_of_what_slow_ones_saw() -> None:
     law = SpeedLaw(0.04, 13.7, 120.0)
     fast, same = (seen(0.10).informed(NOTHING, HERE._replace(speed_mps=v), law, TRUST) for v in (80.0, 40.0))

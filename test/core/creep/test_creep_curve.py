@@ -69,6 +69,13 @@ def test_the_derivatives_of_the_peak_are_those_of_finite_differences() -> None:
         assert ours[:, column] == pytest.approx((upper - lower) / 2e-4, rel=1e-6, abs=1e-12)
 
 
+def test_the_derivatives_of_many_peaks_are_those_of_each() -> None:
+    thetas = np.array([[DRY, 2.0 * DRY, 3.0 * DRY], [4.0 * DRY, 5.0 * DRY, 6.0 * DRY]])
+    assert peak_jacobian(20.0, thetas).tolist() == [
+        [peak_jacobian(20.0, theta).tolist() for theta in row] for row in thetas
+    ]
+
+
 def test_what_noise_adds_to_the_products_is_what_many_draws_show() -> None:
     rng = np.random.default_rng(0)
     creep_std, mu_std, draws = 0.002, 0.01, 2_000_000
