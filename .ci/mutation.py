@@ -15,11 +15,13 @@ fails. Settings' declarations are left out: tests hold them equal to defaults.ya
 
 import argparse
 import json
+import math
 import multiprocessing
 import os
 import random
 import re
 import resource
+import signal
 import subprocess
 import sys
 import tempfile
@@ -63,7 +65,7 @@ TESTS = {
 """Who must notice, by whether it is a kernel's mutant: those run uncompiled, as nothing else tells what is reached."""
 
 BUDGET_S = 10.0
-"""Seconds of the processor for the tests of one mutant, by what they take without it; the last may go beyond."""
+"""Seconds of the processor for the tests of one mutant, by what they take without it; one that takes more is none."""
 
 LIMIT_S = 6.0 * BUDGET_S
 """A mutant that takes longer never ends."""
@@ -85,11 +87,13 @@ class Recorder:
         """Begin a test."""
         self.coverage.switch_context(nodeid)
         self.began = time.process_time()
+        signal.setitimer(signal.ITIMER_PROF, BUDGET_S)
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """End a part of a test: set-up, call or tear-down."""
-        if not report.passed:  # it wants a node's fixtures, say
-            self.taken_s[report.nodeid] = float("inf")
+        signal.setitimer(signal.ITIMER_PROF, 0.0 if report.when == "teardown" else BUDGET_S)
+        if not report.passed:  # it wants a node's fixtures, say, or took too long
+            self.taken_s[report.nodeid] = math.inf
         elif report.when == "teardown":
             self.taken_s.setdefault(report.nodeid, time.process_time() - self.began)
 
@@ -155,7 +159,11 @@ def record(kept: Path, uncompiled: bool) -> None:
     """Write which line of the core each test reaches, and what it takes."""
     recorder = Recorder(kept / f"{uncompiled}.coverage")
 
+    def too_long(*_: object) -> None:
+        raise TimeoutError
+
     def run() -> int:
+        signal.signal(signal.SIGPROF, too_long)
         recorder.coverage.start()
         status = tests_run(TESTS[uncompiled], uncompiled, recorder)
         recorder.coverage.stop()
@@ -194,7 +202,7 @@ def tests_of(kept: Path, mutation: MutationSpec, uncompiled: bool) -> list[str]:
         able = {test for tests in by_line.values() for test in tests}
     chosen, budget_s = [], BUDGET_S
     for test in sorted(able & taken_s.keys(), key=lambda test: (taken_s[test], test)):
-        if budget_s > 0.0 and taken_s[test] < LIMIT_S:
+        if budget_s > 0.0 and taken_s[test] < math.inf:
             chosen.append(test)
             budget_s -= taken_s[test]
     return chosen
