@@ -209,8 +209,9 @@ def test_a_curve_without_length_is_continued_upwards() -> None:
 def test_the_service_curve_slows_no_better_than_the_emergency_brake() -> None:
     emergency = constant(50.0, 0.8)
     assert etcs.service_curve(emergency, 2.0).distance_m[-1] == pytest.approx(emergency.distance_m[-1])
-    assert etcs.service_curve(emergency, 0.4).distance_m[-1] == pytest.approx(50.0**2 / 0.8)
-    assert etcs.service_curve(emergency, 0.4).time_s[-1] == pytest.approx(50.0 / 0.4)
+    service = etcs.service_curve(emergency, 0.4)
+    assert service.time_s == pytest.approx((50.0 - service.speed_mps) / 0.4)
+    assert service.distance_m == pytest.approx((50.0**2 - service.speed_mps**2) / 0.8)  # of 0 where it begins
 
 
 @pytest.mark.parametrize(
