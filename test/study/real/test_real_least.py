@@ -107,7 +107,7 @@ def test_the_mean_over_days_is_what_they_have_in_common() -> None:
 
 
 def test_a_case_has_bounds_where_adhesion_limits_and_sensors_are_honest() -> None:
-    positions, speeds, dry = (least(chosen(name)[0]) for name in ("leaves gnss", "leaves_severe", "dry gnss"))
+    positions, speeds, dry = (least(chosen(name)[0]) for name in ("wet gnss", "wet gnss_doppler", "dry gnss"))
     assert positions.error_percent is not None
     assert positions.excess_percent is not None
     assert speeds.error_percent is not None
@@ -115,4 +115,4 @@ def test_a_case_has_bounds_where_adhesion_limits_and_sensors_are_honest() -> Non
     assert speeds.error_percent < 0.7 * positions.error_percent
     assert speeds.excess_percent < 0.4 * positions.excess_percent
     assert (dry.error_percent, dry.excess_percent) == (None, None)
-    assert least(chosen("leaves gnss_wheels")[0]) == (None, None)  # the fastest rim bounds the speed
+    assert least(chosen("wet gnss_wheels")[0]) == (None, None)  # the fastest rim bounds the speed
