@@ -18,6 +18,7 @@ import pytest
 
 from adhesion_node.core import Config
 from adhesion_node.core.physics.adhesion import SNOW, WET
+from adhesion_node.core.setting import Setting
 
 
 def test_nominal_has_the_papers_noise() -> None:
@@ -65,6 +66,12 @@ def test_every_setting_describes_itself_and_refuses_what_is_beyond_its_range() -
 def test_refuses_by_name_value_and_remedy(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Config(**changes)
+
+
+def test_what_is_allowed_is_said_by_the_ends_that_there_are() -> None:
+    said = [Setting("x", 1.0, "", "m", *ends).allowed() for ends in ((), (2.0,), (-math.inf, 3.0), (2.0, 3.0))]
+    assert said[:2] == ["a finite value m", "a finite value of at least 2 m"]
+    assert said[2:] == ["a finite value of at most 3 m", "a value from 2 to 3 m"]
 
 
 def test_brake_follows_the_measured_pressure() -> None:

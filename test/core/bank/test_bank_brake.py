@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from banks import FULL_PA, S
 
-from adhesion_node.core.bank.brake import EMPTY_NS, BrakeSeen
+from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import PressureSample
 
@@ -99,6 +99,24 @@ def test_behind_a_dump_small_swings_tell_that_the_protection_is_at_work(every_ms
             assert not brake.rising
 
 
+@pytest.mark.parametrize("size", [-0.1, 0.1])
+def test_behind_a_dump_a_single_dip_or_hump_tells_it_too(size: float) -> None:
+    """At 7 to 7.8 s, when the pressure has been steady for 3 s: the protection is at work for 4 s more."""
+
+    def pressure(time: float) -> float:
+        bent = size * math.sin(math.pi * (time - 7.0) / 0.8) if 7.0 < time < 7.8 else 0.0
+        return applying(time) if time < 4.0 else FULL_PA * (0.6 + bent)
+
+    for sample in (samples := sampled(pressure, 14.0)):
+        assert sample.pressure_pa <= FULL_PA
+    for sample, brake in zip(samples, seen(MEAN, samples), strict=True):
+        time = (sample.t_ns - S) / S
+        if 5.0 < time < 11.0:
+            assert brake.demanded_pa == pytest.approx(FULL_PA), time
+        elif time > 12.5:
+            assert brake.demanded_pa == sample.pressure_pa, time
+
+
 def test_a_valve_that_holds_a_cylinder_low_for_two_seconds_is_no_release() -> None:
     samples = sampled(lambda time: cycling(10.0, 150e3)(min(time, 5.0)), 6.3)
     assert samples[-1].pressure_pa == 150e3
@@ -122,7 +140,7 @@ def test_behind_a_dump_a_steady_or_falling_pressure_is_the_drivers_again(config:
 @pytest.mark.parametrize("slid", [False, True])
 @pytest.mark.parametrize("seconds", [0.3, 1.5, 4.0])
 def test_a_release_is_seen(kind: Config, slid: bool, seconds: float) -> None:
-    """However fast it is released, at most `EMPTY_NS` after the cylinder is empty, also behind a slide."""
+    """However fast it is released, at most 1.5 s after the cylinder is empty, also behind a slide."""
     braked = cycling(2.0, 40e3) if slid else applying
     start = braked(8.0)
 
@@ -131,9 +149,9 @@ def test_a_release_is_seen(kind: Config, slid: bool, seconds: float) -> None:
 
     samples = sampled(pressure, 16.0)
     for sample, brake in zip(samples, seen(kind, samples), strict=True):
-        if sample.t_ns - S > round((8.0 + seconds) * 1000) * MS + EMPTY_NS + 100 * MS:
+        if sample.t_ns - S > round((8.0 + seconds) * 1000) * MS + 1600 * MS:
             assert brake.demanded_pa == 0.0, (sample.t_ns - S) / S
-            assert brake.dumped_ns is None or sample.t_ns - brake.dumped_ns > EMPTY_NS
+            assert brake.dumped_ns is None or sample.t_ns - brake.dumped_ns > 1500 * MS
 
 
 def test_a_slow_release_is_followed_at_once() -> None:

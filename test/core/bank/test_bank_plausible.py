@@ -14,10 +14,11 @@ import math
 
 import numpy as np
 import pytest
-from banks import CONFIG, FULL, FULL_PA, S
+from banks import CONFIG, FULL, FULL_PA, S, bank_of
 from oracles import specific_resistance
 
 from adhesion_node.core import Measurement, Outcome, State, init, step
+from adhesion_node.core.bank import plausible
 from adhesion_node.core.estimate import Estimate
 from adhesion_node.core.physics.train import Array
 
@@ -110,6 +111,36 @@ def test_a_receiver_whose_error_wanders_is_believed(mu: float, seeds: range) -> 
         assert state.counts[Outcome.RESET] == 0
         assert not estimates[-1].withheld
         assert abs(estimates[-1].speed_mps - speeds[-1]) < 5.0 * estimates[-1].speed_std_mps
+
+
+@pytest.mark.parametrize(
+    ("mps2", "braked_s", "impossible"),
+    [(2.0, 8.0, True), (2.0, 4.0, False), (0.5, 8.0, False), (-0.9, 8.0, False), (-4.0, 8.0, True), (-4.0, 4.0, True)],
+)
+def test_no_train_brakes_harder_than_its_brake_nor_gains_speed_for_long_under_it(
+    mps2: float, braked_s: float, impossible: bool
+) -> None:
+    """3 s of positions of 0.1 m; at their beginning it has been braked for 5 s, or for 1 s."""
+    times = np.arange(-30, 1) * H
+    recent = [(round((60.0 + t) * S), 40.0 * t + 0.5 * mps2 * t * t) for t in times.tolist()]
+    course = plausible.Course(tuple(recent), braked_ns=round((60.0 - braked_s) * S))
+    assert course.is_impossible(CONFIG, bank_of([1]), 0.1) == impossible
+    assert not course._replace(braked_ns=None).is_impossible(CONFIG, bank_of([1]), 0.1)
+    assert not course._replace(recent=course.recent[-7:]).is_impossible(CONFIG, bank_of([1]), 0.1)
+
+
+@pytest.mark.parametrize("std_m", [0.3, 2.0, 5.0])
+@pytest.mark.parametrize("span_s", [3.0, 1.5])
+def test_the_error_of_a_parabola_is_that_of_white_and_wandering_positions(std_m: float, span_s: float) -> None:
+    """Against 2000 drawn: as white as is declared, and wandering by as much, 1 m at least, for 30 s."""
+    rng, count = np.random.default_rng(3), round(span_s / H) + 1
+    steps, kept = max(std_m, 1.0) * rng.standard_normal((2000, count)), math.exp(-H / 30.0)
+    slow = steps.copy()
+    for index in range(1, count):
+        slow[:, index] = kept * slow[:, index - 1] + math.sqrt(1.0 - kept**2) * steps[:, index]
+    errors = slow + std_m * rng.standard_normal(slow.shape)
+    drawn = 2.0 * np.polyfit(np.arange(count) * H, errors.T, 2)[0].std()
+    assert plausible._error(bank_of([1]), std_m, span_s, count) == pytest.approx(drawn, rel=0.25)
 
 
 @pytest.mark.parametrize("tails", [math.inf, 2.0])

@@ -156,11 +156,14 @@ def test_a_faster_rim_corrects_and_weighs() -> None:
 
 @pytest.mark.parametrize("told", [4.0, -4.0])
 @pytest.mark.parametrize("mu", [0.03, 0.05, 0.09])
-def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu: float) -> None:
-    """Against sums over a grid of adhesion and brake factor: the likelihood is e^(told t) where axles would slide."""
-    bank = (
-        bank_of([2, 1], spread=0.0).with_fresh(MU, mu, 0.2 * mu).with_fresh(ROUGH, 0.0, 0.0).with_fresh(BRAKE, 1.0, 0.1)
-    )
+@pytest.mark.parametrize("rough", [False, True])
+def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu: float, rough: bool) -> None:
+    """Against sums over a grid of adhesion and brake factor: the likelihood is e^(told t) where axles would slide.
+
+    What is not known of the adhesion is that of the rail, or how rough it is just here.
+    """
+    bank = bank_of([2, 1], spread=0.0).with_fresh(MU, mu, 0.2 * mu * (not rough))
+    bank = bank.with_fresh(ROUGH, 0.0, 0.2 * rough).with_fresh(BRAKE, 1.0, 0.1)
     after = wheels_seen(CONFIG, bank, Braking(0.06, told=told), 0.5)
     assert after.log_weight[1] == bank.log_weight[1]  # what limits there is the brake, whatever the rail gives
     assert after.mean[1] == pytest.approx(bank.mean[1])
@@ -172,11 +175,12 @@ def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu:
     likely = density * np.where(slides, np.exp(0.5 * told), 1.0)
     assert after.log_weight[0] - bank.log_weight[0] == pytest.approx(np.log(likely.sum() / density.sum()), abs=2e-3)
     mean = float((likely * rail).sum() / likely.sum())
-    assert after.mean[0, MU] == pytest.approx(mean, abs=2e-3 * mu)
+    component, unit = (ROUGH, mu) if rough else (MU, 1.0)
+    assert after.mean[0, MU] + mu * after.mean[0, ROUGH] == pytest.approx(mean, abs=2e-3 * mu)
     std = np.sqrt(float((likely * (rail - mean) ** 2).sum() / likely.sum()))
-    assert np.sqrt(after.covariance[0, MU, MU]) == pytest.approx(std, rel=5e-3)
+    assert unit * np.sqrt(after.covariance[0, component, component]) == pytest.approx(std, rel=5e-3)
     both = float((likely * (rail - mean) * factor).sum() / likely.sum())
-    assert after.covariance[0, MU, BRAKE] == pytest.approx(both, abs=5e-3 * std * 0.1)
+    assert unit * after.covariance[0, component, BRAKE] == pytest.approx(both, abs=5e-3 * std * 0.1)
 
 
 @pytest.mark.parametrize(("off", "loses"), [(-1.0, 0.0), (1.0, 0.5), (2.0, 2.0)])

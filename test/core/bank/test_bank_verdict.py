@@ -171,14 +171,13 @@ def test_what_limits_is_said_by_the_wheels_and_where_some_slide_by_nothing(slidi
     assert found(CONFIG, memory, NOTHING, NOTHING).regime is regime
 
 
-def limits(kind: int, used: float, told: float = 0.0) -> Regime:
+def limits(kind: int, used: float, told: float = 0.0, config: Config = CONFIG) -> Regime:
     """Without wheels, of a train that slows down for this reason by this part of its full brake."""
     bank = bank_of([kind], spread=0.0).with_fresh(ROUGH, 0.0, 0.0)
     bank.mean[:, MU], bank.mean[:, BRAKE] = used * FULL, 1.0
     bank = bank._replace(covariance=1e-8 * bank.covariance)
-    return found(
-        CONFIG, memory_of(bank, Braking(used * FULL if kind == HELD else FULL, told=told), 3), NOTHING, NOTHING
-    ).regime
+    memory = memory_of(bank, Braking(used * FULL if kind == HELD else FULL, told=told), 3)
+    return found(config, memory, NOTHING, NOTHING).regime
 
 
 def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well() -> None:
@@ -189,6 +188,7 @@ def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well()
 
 def test_a_brake_is_said_to_limit_only_where_it_gives_what_is_demanded() -> None:
     assert limits(HELD, 1.0) is Regime.BRAKE_LIMITED
+    assert limits(HELD, 1.0, config=replace(CONFIG, pressure_kind="mean")) is Regime.BRAKE_LIMITED
     assert limits(HELD, 0.5) is Regime.COASTING
 
 

@@ -197,9 +197,12 @@ def predictions(config: Config, measurements: list[Measurement]) -> list[Predict
 
 
 def test_the_safe_curve_is_shorter_at_the_onset_and_the_same_once_the_rail_is_known() -> None:
-    """80 m/s on a wet rail; behind the fifth second a full brake."""
-    measurements = [one._replace(t_ns=one.t_ns + 100 * DAY_NS) for one in braking(wet(), 12.0, seed=3).measurements]
-    places = np.arange(0.0, 6000.0, 100.0).tolist()
+    """80 m/s on a wet rail, from 9 km on; behind the fifth second a full brake."""
+    measurements = [
+        one._replace(t_ns=one.t_ns + 100 * DAY_NS, position_m=one.position_m + 9000.0)
+        for one in braking(wet(), 12.0, seed=3).measurements
+    ]
+    places = np.arange(9000.0, 15000.0, 100.0).tolist()
     pieces = tuple(Piece(at, 100.0, 100 * DAY_NS - 10**12, 20, 0.077, 0.004, 0.07, 75.0) for at in places)
     without, remembered = (
         predictions(config, measurements) for config in (Config(), replace(Config(), rail_map=RailMap(pieces)))

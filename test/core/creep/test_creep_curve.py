@@ -51,6 +51,11 @@ def test_the_peak_is_the_largest_value_of_the_curve(mu_max: float, lambda_m: flo
     assert creeps[values.argmax()] == pytest.approx(lambda_m, abs=1e-5)
 
 
+def test_a_curve_that_hardly_bends_has_a_high_and_far_peak_and_one_that_does_not_bend_none() -> None:
+    assert np.array(peak(20.0, np.array([0.3, 0.01]))) == pytest.approx([40.0, 10.0])
+    assert min(peak(20.0, np.zeros(2))) > 1e9
+
+
 def test_the_initial_slope_is_the_known_one() -> None:
     assert adhesion(np.array(1e-9), 20.0, DRY) / 1e-9 == pytest.approx(20.0, rel=1e-6)
 

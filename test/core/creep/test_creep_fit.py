@@ -126,6 +126,29 @@ def test_the_covariance_is_infinite_while_one_direction_is_seen() -> None:
     assert np.array_equal(spread, np.diag([np.inf, np.inf]))
 
 
+@pytest.mark.parametrize("count", [3, 4, 6])
+def test_the_covariance_of_few_samples_by_loops(count: int) -> None:
+    """H^-1 G H^-1 n/(n - 2), G the sum of r^2 U U^T; of three samples nothing is told."""
+    creeps, adhesions = noisy(1, 5, in_mu=True, count=count)
+    rows = regression(creeps, adhesions, 20.0)
+    sums = accumulate(rows)
+    theta = solve_exact(sums.hessian, sums.target, DRY)
+    if count == 3:
+        assert np.isposinf(np.diagonal(covariance(sums, theta)[0])).all()
+        return
+    spread = sum(np.outer(u, u) * (z - u @ theta[0]) ** 2 for z, *u in rows[:, 0] for u in [np.array(u)])
+    inverse = np.linalg.inv(sums.hessian[0])
+    assert covariance(sums, theta)[0] == pytest.approx(inverse @ spread @ inverse * count / (count - 2), rel=1e-6)
+
+
+def test_however_small_the_creeps_a_regular_system_is_solved() -> None:
+    """Up to 0.001 its determinant is 1e-27."""
+    creeps = np.linspace(0.0002, 0.001, 9)
+    sums = accumulate(regression(creeps, adhesion(creeps, 20.0, DRY), 20.0))
+    assert solve_exact(sums.hessian, sums.target, 0.2 * DRY) == pytest.approx(DRY, rel=1e-4)
+    assert np.isfinite(covariance(sums, DRY)).all()
+
+
 def test_forgetting_follows_the_error_between_its_bounds() -> None:
     errors = np.array([0.0, 0.05, -0.05, 0.2, 1.0])
     assert creep_fit.forgetting_factor(errors, 0.1, 1.0, 0.971) == pytest.approx([1.0, 0.995, 0.995, 0.98, 0.971])

@@ -206,6 +206,19 @@ def test_a_second_pressure_with_the_same_stamp_is_told() -> None:
     assert feeder.outcomes == [Outcome.REPEATED, Outcome.REPEATED]
 
 
+def test_a_sample_that_comes_when_all_of_its_time_is_used_is_told() -> None:
+    """A speed of before the last one that was given out, or older than may be; a pressure's last value holds anyhow."""
+    feeder = running(5.0)
+    for k in range(1, 6):
+        feeder.push(pressure(5 + k / 10, 0.0), speed(5 + k / 10, 30.0), position(5 + k / 10))
+    assert feeder.outcomes == []
+    feeder.push(speed(5.45, 30.0), speed(4.0, 30.0), pressure(5.45, 0.0), ImuSample(round(5.45 * S), 0.0))
+    assert feeder.outcomes == [Outcome.OVERTAKEN, Outcome.OVERTAKEN]
+    assert feeder.details == ["SpeedSample of 5.45 s", "SpeedSample of 4 s"]
+    feeder.push(ImuSample(round(4.0 * S), 0.0))
+    assert feeder.outcomes[2:] == [Outcome.OVERTAKEN]
+
+
 def test_random_streams_lose_and_double_nothing() -> None:
     rng = np.random.default_rng(12)
     for _ in range(50):

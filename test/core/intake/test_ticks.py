@@ -119,6 +119,15 @@ def test_between_positions_of_1_hz_there_is_a_tick_and_no_position_is_lost(late_
     assert (len(came.ticks_s) >= 29, came.positions, came.outcomes) == (True, 30, [])
 
 
+def test_a_tick_waits_no_longer_than_for_the_position_behind_it_and_the_others() -> None:
+    """However late some have been at first: where all have come as far there is nothing to wait for."""
+    came = run([Sensor("position", 1), Sensor("pressure", 10, held_until_s=4.0)], 30.0)
+    waits = [came_s - each.anchor.t_ns / S for came_s, each in zip(came.came_s, came.matched, strict=False)]
+    late = [wait for wait, each in zip(waits, came.matched, strict=False) if each.anchor.t_ns > 110 * S]
+    assert len(late) > 36
+    assert max(late) <= 0.81
+
+
 @pytest.mark.parametrize("rate_hz", [1.0, 2.0, 10.0])
 @pytest.mark.parametrize("late_s", [0.3, 0.5, 0.9, 1.5])
 def test_positions_that_come_later_than_is_waited_are_not_lost_to_ticks(rate_hz: float, late_s: float) -> None:

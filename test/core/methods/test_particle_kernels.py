@@ -114,3 +114,12 @@ def test_a_generator_gives_the_same_numbers_to_every_pass_of_its_own() -> None:
     for mu in (0.05, 0.06):
         np.testing.assert_array_equal(one(mu).statistics, two(mu).statistics)
     assert not np.array_equal(one(0.06).statistics, one(0.06).statistics)
+
+
+@pytest.mark.parametrize("turned", [-1.2, -0.3, 0.0, 0.5, 1.5])
+def test_particles_are_ordered_along_the_direction_in_which_they_lie_farthest_apart(turned: float) -> None:
+    drawn = np.random.default_rng(2).standard_normal((5000, 2)) * [3.0, 1.0]
+    cosine, sine = smoothing._direction(
+        *(drawn @ [[math.cos(turned), math.sin(turned)], [-math.sin(turned), math.cos(turned)]]).T
+    )
+    assert abs(cosine * math.cos(turned) + sine * math.sin(turned)) == pytest.approx(1.0, abs=1e-3)
