@@ -15,7 +15,7 @@ from pathlib import Path
 import adhesion_node
 from adhesion_node.core import Outcome
 from adhesion_node.core.bank.kinds import KINDS
-from adhesion_node.core.bank.learnt import KIND, QUANTITIES, RADIUS
+from adhesion_node.core.bank.learnt import KIND, QUANTITIES, WHEEL
 from adhesion_node.core.setting import Setting, by_group
 from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.messages.refused import Reason
@@ -92,7 +92,7 @@ def _learnt() -> Iterator[tuple[str, ...]]:
         yield f"`{quantity.name}`, `{quantity.name}_std`", quantity.unit, quantity.meaning
     kinds = ", ".join(kind.name for kind in KINDS)
     yield f"`{KIND}NAME`", "", f"that this limits the motion: {kinds} (of the rail's roughness but the first two)"
-    yield f"`{RADIUS}AXLE`", "", "true over expected radius of the wheels of an axle"
+    yield f"`{WHEEL}AXLE`", "", "true over expected radius of the wheels of an axle"
 
 
 def _house() -> Iterator[tuple[str, str]]:

@@ -12,31 +12,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
-from ..physics.train import Array
+from ..physics.train import GRAVITY, Array
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kernels import weighing
 from .kinds import FREE, FREE_STD, HELD, NOISES, PASSING, SLIDES
-from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, SCALE, SIZE, SPEED, Bank
+from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCALE, SIZE, SPEED, Bank
 from .motion import Braking, Foreseen, foreseen, moved, open_variance, resistance, slow_variance, use, white_variance
 from .plausible import Course
+from .rims import as_fast, not_slower, rim_speed, rolling
 from .seeing import (
     CLIPPED,
     Observation,
     acceleration_seen,
     corrected,
-    not_slower,
     position_seen,
     speed_seen,
     wheels_seen,
 )
-from .wheels import WheelsSeen, told
+from .wheels import LEARNING_MPS, UNLEARNT, WheelsSeen, told
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -67,8 +68,11 @@ SETTLING_S = 6.0
 SLID = 0.9
 """Probability from which axles slid."""
 
-WHEEL_SHARE = 0.008
-"""Error of the fastest rim's speed, relative."""
+UNISON_S = 3.0
+"""For so long, and the brake's build-up, behind the opening all axles may begin to slide as one."""
+
+TRUSTED_NS = 950_000_000
+"""How often the fastest rim is taken for the train's speed, as its errors last."""
 
 FORGOTTEN = 0.02
 """Least probability of how positions err while no brake is applied: sensors change, and unknown traction looks like an
@@ -181,6 +185,7 @@ def met(config: Config, measurement: Measurement) -> Memory:
         BIAS: BIAS_STD**2,
         PITCH: PITCH_STD**2,
         SCALE: config.speed_scale_std**2,
+        RADIUS: UNLEARNT**2,
     }
     for component, variance in variances.items():
         bank.covariance[:, component, component] = variance
@@ -289,16 +294,30 @@ def _is_pressed(config: Config, memory: Memory) -> bool:
 def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
     if not measurement.wheels:
         return memory
-    mean, covariance = memory.bank.moments()
-    std, wheels = math.sqrt(covariance[SPEED, SPEED]), memory.wheels
-    bank, pressed = memory.bank, _is_pressed(config, memory)
+    pressed, wheels, newest = _is_pressed(config, memory), memory.wheels, measurement.wheels[-1]
+    rim, std = rim_speed(memory.bank)
     for sample in measurement.wheels:
-        wheels = wheels.after(config, sample, float(mean[SPEED]), std, pressed)
-    rim = wheels.fastest(config, measurement.wheels[-1])
-    if rim is not None and memory.braked and rim > config.slowest_mps:
-        error = math.hypot(WHEEL_SHARE, wheels.error) * rim
-        bank = not_slower(bank, rim, error).normalised()
-    return memory._replace(wheels=wheels, bank=bank)
+        wheels = wheels.after(config, sample, rim, std, pressed)
+    rims, memory = wheels.rims(config, newest), memory._replace(wheels=wheels)
+    if rims and memory.braked:
+        return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns)
+    if rims and not pressed and rim > LEARNING_MPS:
+        return memory._replace(bank=rolling(memory.bank, median(rims)).normalised())
+    return memory
+
+
+def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -> Memory:
+    """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
+    bank, resisting = memory.bank, resistance(config, memory.bank)
+    slowing = GRAVITY * float(bank.weight @ (use(config, bank, memory.braking, resisting).value + resisting))
+    rim_mps -= slowing * (memory.t_ns - t_ns) / S
+    if rim_mps <= config.slowest_mps:
+        return memory
+    bank, wheels = not_slower(bank, rim_mps), memory.wheels
+    settled = memory.t_ns / S > memory.told_s - SETTLING_S + UNISON_S
+    if settled and memory.t_ns - wheels.trusted_ns >= TRUSTED_NS:
+        bank, wheels = as_fast(bank, rim_mps), wheels._replace(trusted_ns=memory.t_ns)
+    return memory._replace(wheels=wheels, bank=bank.normalised())
 
 
 def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:

@@ -23,13 +23,14 @@ from .kernels import uniting, weighing
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, PITCH, SCALE = range(10)
+POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, PITCH, SCALE, RADIUS = range(11)
 """Components of the state: position s, m; speed v, m/s; adhesion mu of the rail at that speed, or in free motion the
 net deceleration over g; roughness of the rail here, relative; true over expected brake force; grade that the profile
 leaves open, with the error of the resistance; slow error of the positions, m; bias of the accelerometer over g; its
-pitch per deceleration over g; scale error of the speeds."""
+pitch per deceleration over g; scale error of the speeds;
+by how much the rims are too fast, relative, as the wheels' radii are not known."""
 
-SIZE = 10
+SIZE = 11
 
 
 class Bank(NamedTuple):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 from ..physics.train import GRAVITY
 from .following import Memory
 from .kinds import KINDS
-from .layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, SCALE
+from .layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, RADIUS, SCALE
 
 
 class Quantity(NamedTuple):
@@ -35,11 +35,12 @@ QUANTITIES = (
     Quantity("grade_residual", GRADE, "", "grade that the profile leaves open, with the error of the resistance"),
     Quantity("position_error", OFFSET, "m", "slow error of the positions"),
     Quantity("speed_scale_error", SCALE, "", "scale error of the measured speeds"),
+    Quantity("rim_speed_error", RADIUS, "", "by how much the rims are too fast, as the wheels' radii are not known"),
     Quantity("acceleration_bias", BIAS, "m/s^2", "bias of the accelerometer", GRAVITY),
     Quantity("acceleration_pitch", PITCH, "", "what the accelerometer feels too much, over the deceleration"),
 )
 
-KIND, RADIUS = "probability.", "wheel_radius."
+KIND, WHEEL = "probability.", "wheel_radius."
 """Beginnings of the names of the kinds' probabilities, and of the axles' true over expected radii."""
 
 
@@ -52,4 +53,4 @@ def learnt(memory: Memory) -> dict[str, float]:
         found[f"{name}_std"] = factor * math.sqrt(max(float(covariance[component, component]), 0.0))
     weight = memory.bank.weight
     found |= {f"{KIND}{kind.name}": float(weight[memory.bank.kind == k].sum()) for k, kind in enumerate(KINDS)}
-    return found | {f"{RADIUS}{axle}": radius for axle, radius in enumerate(memory.wheels.radius)}
+    return found | {f"{WHEEL}{axle}": own / (1.0 + mean[RADIUS]) for axle, own in enumerate(memory.wheels.radius)}

@@ -28,9 +28,6 @@ if TYPE_CHECKING:
 CLIPPED = 3.5
 """Deviation in standard deviations from which an observation pulls no harder (Huber), as tails are heavier."""
 
-UNSEEN = 1e12
-"""Variance of what is not seen."""
-
 STEADY_ERROR, BRAKING_ERROR = 0.002, 0.1
 """What an accelerometer feels beside the mean brake: over g, and over the adhesion used, as axles slide in turns."""
 
@@ -62,11 +59,11 @@ def position_seen(bank: Bank, position_m: float, declared_m: float) -> Observati
     return Observation(position_m - foreseen, slope, white_variance(bank, declared_m))
 
 
-def speed_seen(bank: Bank, speed_mps: float, variance: float) -> Observation:
-    """A speed, whose scale may be wrong."""
+def speed_seen(bank: Bank, speed_mps: float, variance: float, scale: int = SCALE) -> Observation:
+    """A speed, whose scale may be wrong; the error of that is the component `scale`."""
     slope = np.zeros(bank.mean.shape)
-    slope[:, SPEED] = 1.0 + bank.mean[:, SCALE]
-    slope[:, SCALE] = bank.mean[:, SPEED]
+    slope[:, SPEED] = 1.0 + bank.mean[:, scale]
+    slope[:, scale] = bank.mean[:, SPEED]
     return Observation(speed_mps - slope[:, SPEED] * bank.mean[:, SPEED], slope, variance)
 
 
@@ -88,15 +85,6 @@ def corrected(bank: Bank, seen: Observation) -> Bank:
     """Take an observation in; the weights are not normalised."""
     before = bank.mean, bank.covariance, bank.log_weight
     return bank.believing(*weighing.corrected(*before, seen.innovation, seen.slope, seen.variances, CLIPPED))
-
-
-def not_slower(bank: Bank, rim_mps: float, std_mps: float) -> Bank:
-    """Take in that under the brake no rim is faster than the train: only what contradicts it is corrected."""
-    seen = speed_seen(bank, rim_mps, std_mps**2)
-    slower = seen.innovation > 0.0
-    after = corrected(bank, seen._replace(variance=np.where(slower, std_mps**2, UNSEEN)))
-    squared = np.minimum(seen.innovation / std_mps, CLIPPED) ** 2
-    return after._replace(log_weight=bank.log_weight - np.where(slower, 0.5 * squared, 0.0))
 
 
 def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) -> Bank:

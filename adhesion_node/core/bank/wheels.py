@@ -6,11 +6,12 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""What the wheels tell: which axles slide, each against its own radius, which is learnt while no brake is applied."""
+"""What the wheels tell of the axles: which of them slide, each by its own radius beside the others."""
 
 from __future__ import annotations
 
 import math
+from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..intake.samples import WheelSample
@@ -33,28 +34,30 @@ UNEQUAL = 0.01
 """By how much wheels of unknown wear may differ, beside creep."""
 
 UNLEARNT = 0.03
-"""Error of the radius of a wheel of which nothing was learnt: wear."""
+"""Error of all radii together of which nothing was learnt: wear."""
 
-LEARNING_MPS, LEARNING_SHARE = 5.0, 0.04
-"""Radii are learnt from this speed on, where it is known to this share."""
+LEARNING_MPS = 5.0
+"""Radii are learnt from this speed on."""
 
 
 class WheelsSeen(NamedTuple):
     """What is known of the axles."""
 
     radius: tuple[float, ...] = ()
-    """True over expected radius of each."""
+    """True over expected radius of each, over the same of all."""
     learnt: int = 0
     """Samples from which they were learnt."""
-    error: float = UNLEARNT
-    """Of all radii together, relative, as the train's speed was not known better."""
+    noise: float = 0.0
+    """Variance of a rim's speed beside the others, relative."""
     slid_ns: tuple[int | None, ...] = ()
     """When each was last seen to slide."""
     rolled_ns: tuple[int | None, ...] = ()
     """When each was last seen to roll."""
+    trusted_ns: int = 0
+    """When the fastest rim was last taken for the train's speed."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
-        """Take in the speeds of all axles while the train's is known so.
+        """Take in the speeds of all axles while that of one which rolls is known so.
 
         An axle slides where it is slower than the train, or than the fastest axle: a train is not slower than that. It
         rolls where neither can be.
@@ -65,10 +68,10 @@ class WheelsSeen(NamedTuple):
         if speed_mps < LEARNING_MPS:
             return wheels
         if not braked:
-            return wheels._learning(rims, speed_mps, std_mps)
+            return wheels._learning(rims)
         rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
         fastest = max((rim for rim in rims if not math.isnan(rim)), default=0.0)
-        unsure = 3.0 * std_mps / speed_mps + (0.0 if wheels.learnt else UNLEARNT)
+        unsure = 3.0 * std_mps / speed_mps
         by_train, by_fastest = ([1.0 - rim / most for rim in rims] for most in (speed_mps, max(fastest, 1e-6)))
         slid, rolled = list(wheels.slid_ns), list(wheels.rolled_ns)
         for axle, (creep, behind) in enumerate(zip(by_train, by_fastest, strict=True)):  # never true of NaN
@@ -78,23 +81,29 @@ class WheelsSeen(NamedTuple):
                 rolled[axle] = sample.t_ns
         return wheels._replace(slid_ns=tuple(slid), rolled_ns=tuple(rolled))
 
-    def _learning(self, rims: list[float], speed_mps: float, std_mps: float) -> WheelsSeen:
-        if std_mps > LEARNING_SHARE * speed_mps:
+    def _learning(self, rims: list[float]) -> WheelsSeen:
+        turning = [rim for rim in rims if rim > 0.0]  # never true of NaN
+        if not turning:
             return self
-        part = max(LEARNT, 1.0 / (self.learnt + 1))
+        part, middle = max(LEARNT, 1.0 / (self.learnt + 1)), median(turning)
         radius = tuple(
-            before + part * (speed_mps / rim - before) if rim > 0.0 else before  # never true of NaN
+            before + part * (middle / rim - before) if rim > 0.0 else before
             for before, rim in zip(self.radius, rims, strict=True)
         )
-        error = self.error + part * (std_mps / speed_mps - self.error)
-        return self._replace(radius=radius, learnt=self.learnt + 1, error=error)
+        off = [(own * rim / middle - 1.0) ** 2 for own, rim in zip(self.radius, rims, strict=True) if rim > 0.0]
+        noise = self.noise + max(LEARNT, 1.0 / self.learnt) * (sum(off) / len(off) - self.noise) if self.learnt else 0.0
+        return self._replace(radius=radius, learnt=self.learnt + 1, noise=noise)
 
-    def fastest(self, config: Config, sample: WheelSample) -> float | None:
-        """Speed of the fastest rim, m/s; None while nothing was learnt of the radii."""
+    def rims(self, config: Config, sample: WheelSample) -> list[float]:
+        """Speeds of the rims that are heard, of the middle radius all, m/s; none while the radii are not learnt."""
         if self.learnt < LEAST_LEARNT or len(self.radius) != len(sample.speeds_radps):
-            return None
-        rims = (radius * each for radius, each in zip(self.radius, sample.speeds_radps, strict=True))
-        return max((rim for rim in rims if not math.isnan(rim)), default=0.0) * config.train.wheel_radius_m
+            return []
+        own = (radius * each for radius, each in zip(self.radius, sample.speeds_radps, strict=True))
+        return [each * config.train.wheel_radius_m for each in own if not math.isnan(each)]
+
+    def fastest(self, rims: list[float]) -> float:
+        """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
+        return max(rims) * (1.0 - 0.5 * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
 
     def share(self, now_ns: int) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""

@@ -21,6 +21,7 @@ from adhesion_node.core.bank.layout import (
     OFFSET,
     PITCH,
     POSITION,
+    RADIUS,
     ROUGH,
     SCALE,
     SIZE,
@@ -47,9 +48,9 @@ FULL = 500_183 / (536e3 * 9.8)
 """B/(M g) of the full brake (model.md)."""
 
 MEAN = {POSITION: 500.0, SPEED: 40.0, MU: 0.05, ROUGH: 0.02, BRAKE: 1.03, GRADE: 0.002}
-MEAN |= {OFFSET: 1.5, BIAS: 0.001, PITCH: 0.08, SCALE: 0.004}
+MEAN |= {OFFSET: 1.5, BIAS: 0.001, PITCH: 0.08, SCALE: 0.004, RADIUS: -0.01}
 STD = {POSITION: 2.0, SPEED: 0.4, MU: 0.01, ROUGH: 0.05, BRAKE: 0.05, GRADE: 0.003}
-STD |= {OFFSET: 1.0, BIAS: 0.003, PITCH: 0.05, SCALE: 0.005}
+STD |= {OFFSET: 1.0, BIAS: 0.003, PITCH: 0.05, SCALE: 0.005, RADIUS: 0.006}
 
 
 def bank_of(

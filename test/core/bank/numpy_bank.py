@@ -25,7 +25,7 @@ from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.train import GRAVITY, Array
 
-EACH = np.arange(10)
+EACH = np.arange(11)
 
 
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> motion.Use:

@@ -21,7 +21,7 @@ from scipy.stats import norm
 from adhesion_node.core import Measurement, finish, init, step
 from adhesion_node.core.bank.branching import LEAST, MOST, branched, closed, opened, pruned, unlikely_kept
 from adhesion_node.core.bank.kinds import HELD, KINDS, SLIDES
-from adhesion_node.core.bank.layout import MU, ROUGH, Bank, joined
+from adhesion_node.core.bank.layout import MU, ROUGH, SIZE, Bank, joined
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.physics.train import Array
@@ -143,7 +143,7 @@ def test_uniting_keeps_the_moments_of_the_mixture() -> None:
     one = bank_of([2], seed=9)
     near = [
         one._replace(
-            mean=one.mean + 0.05 * np.sqrt(np.diagonal(one.covariance, axis1=1, axis2=2)) * rng.standard_normal(10),
+            mean=one.mean + 0.05 * np.sqrt(np.diagonal(one.covariance, axis1=1, axis2=2)) * rng.standard_normal(SIZE),
             covariance=one.covariance * scale,
             log_weight=np.array([math.log(weight)]),
         )
@@ -159,7 +159,7 @@ def test_uniting_keeps_the_moments_of_the_mixture() -> None:
 
 def test_what_differs_is_not_united() -> None:
     one = bank_of([2], seed=9)
-    elsewhere = one._replace(mean=one.mean + np.where(np.arange(10) == MU, 0.05, 0.0))
+    elsewhere = one._replace(mean=one.mean + np.where(np.arange(SIZE) == MU, 0.05, 0.0))
     for other in (
         one._replace(kind=np.array([3])),
         one._replace(law=np.array([1])),

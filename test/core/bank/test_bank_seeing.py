@@ -24,7 +24,6 @@ from adhesion_node.core.bank.seeing import (
     Observation,
     acceleration_seen,
     corrected,
-    not_slower,
     position_seen,
     speed_seen,
     wheels_seen,
@@ -136,24 +135,6 @@ def test_evidence_and_pull_are_continuous_at_the_limit() -> None:
     assert below.covariance == pytest.approx(above.covariance, abs=1e-7)
 
 
-def test_a_slower_rim_says_nothing() -> None:
-    after = not_slower(BANK, 30.0, 0.3)
-    assert after.mean == pytest.approx(BANK.mean, abs=1e-6)
-    assert after.covariance == pytest.approx(BANK.covariance, rel=1e-6, abs=1e-9)
-    assert np.array_equal(after.log_weight, BANK.log_weight)
-
-
-def test_a_faster_rim_corrects_and_weighs() -> None:
-    after, before = not_slower(BANK, 41.5, 0.3), BANK
-    assert np.all(after.mean[:, SPEED] > before.mean[:, SPEED])
-    assert np.all(after.covariance[:, SPEED, SPEED] < before.covariance[:, SPEED, SPEED])
-    assert np.all(after.log_weight < before.log_weight)
-    slowest, fastest = np.argmin(before.mean[:, SPEED]), np.argmax(before.mean[:, SPEED])
-    lost = before.log_weight - after.log_weight
-    assert lost[slowest] >= lost[fastest]
-    assert np.all(not_slower(BANK, 1000.0, 0.3).mean[:, SPEED] < 50.0)  # clipped
-
-
 @pytest.mark.parametrize("told", [4.0, -4.0])
 @pytest.mark.parametrize("mu", [0.03, 0.05, 0.09])
 @pytest.mark.parametrize("rough", [False, True])
@@ -181,11 +162,3 @@ def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu:
     assert unit * np.sqrt(after.covariance[0, component, component]) == pytest.approx(std, rel=5e-3)
     both = float((likely * (rail - mean) * factor).sum() / likely.sum())
     assert unit * after.covariance[0, component, BRAKE] == pytest.approx(both, abs=5e-3 * std * 0.1)
-
-
-@pytest.mark.parametrize(("off", "loses"), [(-1.0, 0.0), (1.0, 0.5), (2.0, 2.0)])
-def test_what_is_slower_than_a_rim_loses_by_the_square_of_its_deviation(off: float, loses: float) -> None:
-    rim = off * 0.5 - speed_seen(BANK, 0.0, 0.25).innovation  # by what each foresees of it
-    for index, speed in enumerate(rim):
-        lost = BANK.log_weight - not_slower(BANK, speed, 0.5).log_weight
-        assert lost[index] == pytest.approx(loses)

@@ -58,18 +58,25 @@ NOW = 100 * S + 900 * MS
 
 def test_radii_are_learnt_while_coasting() -> None:
     wheels = coasted(WORN)
-    assert wheels.radius == pytest.approx(WORN, rel=1e-3)
+    assert wheels.radius == pytest.approx(WORN / np.median(WORN), rel=1e-3)
     assert wheels.learnt == 300
-    assert wheels.error < 0.003
-    rolling = sample(40 * S, 35.0, np.zeros(4), WORN)
-    assert wheels.fastest(CONFIG, rolling) == pytest.approx(35.0, rel=2e-3)
+    assert 1e-3 < math.sqrt(wheels.noise) < 3e-3
+    rims = wheels.rims(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN))
+    assert rims == pytest.approx([35.0 / np.median(WORN)] * 4, rel=2e-3)
+    assert wheels.fastest(rims) == pytest.approx(35.0 / np.median(WORN), rel=4e-3)
 
 
-def test_nothing_is_learnt_slowly_or_while_the_speed_is_not_known() -> None:
-    assert coasted(WORN, speed=4.0).radius == (1.0,) * 4
-    assert coasted(WORN, std=2.0).radius == (1.0,) * 4
-    wheels = coasted(WORN, std=2.0)
-    assert wheels.fastest(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN)) is None
+def test_nothing_is_learnt_slowly() -> None:
+    wheels = coasted(WORN, speed=4.0)
+    assert wheels.radius == (1.0,) * 4
+    assert wheels.rims(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN)) == []
+
+
+def test_of_many_that_roll_the_fastest_is_fast_by_chance() -> None:
+    rng, wheels = np.random.default_rng(7), coasted(np.ones(16))
+    told = [wheels.rims(CONFIG, sample(S, 40.0, np.zeros(16), np.ones(16), rng)) for _ in range(200)]
+    assert np.mean([max(rims) for rims in told]) > 1.003 * 40.0
+    assert np.mean([wheels.fastest(rims) for rims in told]) == pytest.approx(40.0, rel=2e-3)
 
 
 @pytest.mark.parametrize("radius", [EVEN, WORN])
@@ -102,7 +109,7 @@ def test_a_train_held_slower_than_it_is_claims_no_rolling(creep: float) -> None:
         stamp = 100 * S + index * 100 * MS
         wheels = wheels.after(CONFIG, sample(stamp, 40.0, slips, EVEN), 40.0 * (1.0 - creep), 0.1, True)
     assert wheels.share(NOW) == 0.75
-    assert wheels.fastest(CONFIG, sample(NOW, 40.0, slips, EVEN)) == pytest.approx(39.92, rel=2e-3)
+    assert wheels.fastest(wheels.rims(CONFIG, sample(NOW, 40.0, slips, EVEN))) == pytest.approx(39.92, rel=3e-3)
 
 
 def test_an_unsure_speed_claims_neither() -> None:
@@ -127,13 +134,13 @@ def test_dropouts_while_learning_spoil_nothing() -> None:
         rates = list(sample(S + index * 100 * MS, 40.0, np.zeros(4), WORN, rng).speeds_radps)
         rates[index % 4] = math.nan if index % 2 else 0.0
         wheels = wheels.after(CONFIG, WheelSample(S + index * 100 * MS, tuple(rates)), 40.0, 0.1, False)
-    assert wheels.radius == pytest.approx(WORN, rel=3e-3)
+    assert wheels.radius == pytest.approx(WORN / np.median(WORN), rel=3e-3)
 
 
 def test_another_number_of_axles_is_another_train() -> None:
     wheels = coasted(WORN)
     two = sample(50 * S, 40.0, np.zeros(2), EVEN[:2])
-    assert wheels.fastest(CONFIG, two) is None
+    assert wheels.rims(CONFIG, two) == []
     after = wheels.after(CONFIG, two, 40.0, 0.1, True)
     assert len(after.radius) == len(after.slid_ns) == len(after.rolled_ns) == 2
     assert after.radius == (1.0, 1.0)
@@ -179,7 +186,7 @@ def test_radii_are_learnt_whatever_a_released_cylinder_seems_to_hold(idle_pa: fl
         memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
     assert memory is not None
     assert memory.wheels.learnt > 50
-    assert memory.wheels.radius == pytest.approx(WORN, rel=3e-3)
+    assert memory.wheels.radius == pytest.approx(WORN / np.median(WORN), rel=3e-3)
     assert memory.wheels.share(memory.t_ns) is None
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 GRAVITY = 9.8
-SPEED, MU, ROUGH, GRADE, SIZE = 1, 2, 3, 5, 10
+SPEED, MU, ROUGH, GRADE, SIZE = 1, 2, 3, 5, 11
 
 
 class Ahead(NamedTuple):

@@ -27,7 +27,7 @@ ModelNumbers = tuple[float, Array, Array, Array, Array, Array, Array, Array, Arr
 StepNumbers = tuple[float, float, float, bool, float, float]
 
 GRAVITY = 9.8
-POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10
+POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 11
 
 
 class Model(NamedTuple):

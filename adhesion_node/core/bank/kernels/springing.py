@@ -26,7 +26,7 @@ Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 
-MU, ROUGH, BRAKE, SIZE = 2, 3, 4, 10
+MU, ROUGH, BRAKE, SIZE = 2, 3, 4, 11
 HELD = 1
 LAW, ROLLS, BORDER, LASTS, SLIDES = 1, 2, 3, 4, 5
 """What is new of a hypothesis; from `SLIDES` on, by which part of `less`. A row of `rows` is its parent, law, kind, and

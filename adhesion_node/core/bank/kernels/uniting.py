@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 
-SPEED, MU, SIZE = 1, 2, 10
+SPEED, MU, SIZE = 1, 2, 11
 
 EQUAL = 1e-9
 """Logarithms of weights that differ by less are equal: rounding shall not choose between twins of another law."""

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
-POSITION, OFFSET, SIZE = 0, 6, 10
+POSITION, OFFSET, SIZE = 0, 6, 11
 
 
 @kernel
