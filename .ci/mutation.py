@@ -10,8 +10,11 @@
 
 Usage: mutation.py [--part PART] [--mutants N] [--seed N] [--workers N] [--kept FOLDER], with the extra `mutation`.
 Cosmic Ray makes the mutants, in clones. Each is shown to the tests that reach its line, the quickest first, until one
-fails. Settings' declarations are left out: tests hold them equal to defaults.yaml and to doc/parameters.md.
+fails, and last to the check of the pages, whose tables state the bank's constants; what that alone notices is counted
+apart. Settings' declarations are left out: tests hold them equal to defaults.yaml and to doc/parameters.md.
 """
+
+from __future__ import annotations
 
 import argparse
 import json
@@ -27,19 +30,18 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from difflib import unified_diff
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import coverage
 import hypothesis
 import numba
 import pytest
-from cosmic_ray.commands.init import _all_work_items
-from cosmic_ray.mutating import use_mutation
-from cosmic_ray.plugins import get_operator
-from cosmic_ray.work_item import MutationSpec
 from scipy import special
+
+if TYPE_CHECKING:
+    from cosmic_ray.work_item import MutationSpec
 
 ROOT = Path(__file__).resolve().parent.parent
 CORE = Path("adhesion_node/core")
@@ -74,10 +76,16 @@ LOADED = (numba, special)
 """Loaded once: each mutant's tests run in a fork."""
 
 
+ALIVE, BY_PAGES = 0, -1
+"""What became of a mutant that no test noticed, and of one that the check of the pages alone did; others are killed."""
+
+
 class Recorder:
     """Plugin of pytest: which lines each passed test reaches, and the seconds of the processor that it takes."""
 
     def __init__(self, data: Path) -> None:
+        import coverage
+
         self.coverage = coverage.Coverage(str(data), source=[str(CORE)], config_file=False)
         self.coverage.set_option("run:relative_files", True)
         self.taken_s: dict[str, float] = {}
@@ -107,8 +115,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="side by side (default %(default)s)")
     parser.add_argument("--kept", type=Path, help="folder of clones and of what tests reach: for more runs of a commit")
     options = parser.parse_args()
-    survived: Counter[str] = Counter()
-    total: Counter[str] = Counter()
+    survived, by_pages, total = Counter[str](), Counter[str](), Counter[str]()
     fork = multiprocessing.get_context("fork")
     with tempfile.TemporaryDirectory() as folder:
         kept = (options.kept or Path(folder)).resolve()
@@ -122,13 +129,14 @@ def main() -> int:
             pool.starmap(record, missing, chunksize=1)
             for mutation, difference, status in pool.imap_unordered(tried, [(kept, mutation) for mutation in chosen]):
                 total[part_of(mutation)] += 1
-                if not status:
+                by_pages[part_of(mutation)] += status == BY_PAGES
+                if status == ALIVE:
                     survived[part_of(mutation)] += 1
                     print(difference, flush=True)
     for part, of in sorted(total.items()):
-        print(f"{part}: {of - survived[part]} of {of} killed")
+        print(f"{part}: {of - survived[part]} of {of} killed, {by_pages[part]} of them by the pages alone")
     killed = total.total() - survived.total()
-    print(f"{killed / total.total():.0%} of {total.total()} mutants killed")
+    print(f"{killed / total.total():.1%} of {total.total()} killed, {by_pages.total()} of them by the pages alone")
     return 0 if killed >= 0.9 * total.total() else 1
 
 
@@ -147,8 +155,10 @@ def part_of(mutation: MutationSpec) -> str:
     return below[0] if len(below) > 1 else "estimator"
 
 
-def sample(parts: list[str], count: int, rng: random.Random) -> list[MutationSpec]:
+def sample(parts: Collection[str], count: int, rng: random.Random) -> list[MutationSpec]:
     """Return mutants of some parts, drawn from all of them alike."""
+    from cosmic_ray.commands.init import _all_work_items
+
     modules = [path for path in sorted(CORE.rglob("*.py")) if path.name != "config.py"]
     every = [item.mutations[0] for item in _all_work_items(modules, {})]
     useful = [one for one in every if part_of(one) in parts and not MEANINGLESS.match(one.operator_name)]
@@ -178,20 +188,30 @@ def record(kept: Path, uncompiled: bool) -> None:
 
 
 def tried(task: tuple[Path, MutationSpec]) -> tuple[MutationSpec, str, int]:
-    """Return a mutant, its difference, and the status of its tests: 0 where none noticed it."""
+    """Return a mutant, its difference, and what became of it."""
+    from cosmic_ray.mutating import use_mutation
+    from cosmic_ray.plugins import get_operator
+
     kept, mutation = task
     uncompiled = "kernels" in mutation.module_path.parts
     tests = tests_of(kept, mutation, uncompiled)
     with use_mutation(mutation.module_path, get_operator(mutation.operator_name)(), mutation.occurrence) as codes:
-        difference = "\n".join(
-            unified_diff(*(code.splitlines() for code in codes), str(mutation.module_path), n=1, lineterm="")
-        )
-        status = forked(lambda: tests_run(["-x", "--doctest-modules", *tests], uncompiled), LIMIT_S) if tests else 0
+        before, after = (code.splitlines() for code in codes)
+        difference = "\n".join(unified_diff(before, after, str(mutation.module_path), n=1, lineterm=""))
+        status = forked(lambda: tests_run(["-x", "--doctest-modules", *tests], uncompiled), LIMIT_S) if tests else ALIVE
+        if status == ALIVE:
+            check = [sys.executable, "-B", "doc/generate.py", "--check"]
+            pages = subprocess.run(
+                check, env=os.environ | {"PYTHONPATH": os.getcwd()}, capture_output=True, check=False
+            )
+            status = BY_PAGES if pages.returncode else ALIVE
     return mutation, difference, status
 
 
 def tests_of(kept: Path, mutation: MutationSpec, uncompiled: bool) -> list[str]:
     """Return the tests that reach a mutant's line; of one that is run as it is imported those that reach its file."""
+    import coverage
+
     data = coverage.CoverageData(str(kept / f"{uncompiled}.coverage"))
     data.read()
     by_line = data.contexts_by_lineno(str(mutation.module_path))
@@ -210,8 +230,8 @@ def tests_of(kept: Path, mutation: MutationSpec, uncompiled: bool) -> list[str]:
 
 def tests_run(arguments: list[str], uncompiled: bool, *plugins: object) -> int:
     """Run tests in this process, without the set-up that all share: none of them needs ROS. Return pytest's status."""
-    numba.config.DISABLE_JIT = uncompiled
     os.environ |= {"OPENBLAS_NUM_THREADS": "1", "NUMBA_DISABLE_JIT": str(int(uncompiled))}
+    numba.config.reload_config()
     sys.dont_write_bytecode = not plugins
     sys.path[:0] = [os.getcwd(), os.path.join(os.getcwd(), "test")]
     quick = [hypothesis.Phase.explicit, hypothesis.Phase.generate]
