@@ -61,7 +61,9 @@ TESTS = {
     True: [
         *("test/core/bank", "test/core/methods"),
         *(f"--ignore-glob=*/test_{name}.py" for name in ("detection", "condition", "changes", "noise")),
-        *("-k", "not (compiled or wanders or whole_bank or ten_minutes or never_lowers or converge or weak_brake)"),
+        "-k",
+        "not (compiled or wanders or whole_bank or ten_minutes or weak_brake or never_lowers or converge"
+        " or monte_carlo or exact_statistics or resamplings or brute_force)",
     ],
 }
 """Who must notice, by whether it is a kernel's mutant: those run uncompiled, as nothing else tells what is reached."""

@@ -148,6 +148,60 @@ def test_a_border_counts_for_the_way_ahead_once_it_is_probable(probability: floa
     assert counts or aheads[1].mu == pytest.approx(aheads[0].mu)
 
 
+@pytest.mark.parametrize(
+    ("seconds", "probability", "counts"), [(1.9, 0.08, False), (2.1, 0.08, True), (0.0, 0.12, True)]
+)
+def test_a_worse_rail_counts_once_it_has_lasted_or_is_probable(
+    seconds: float, probability: float, counts: bool
+) -> None:
+    steady = ahead_bank(0.05, 50.0, [2])._replace(born_s=np.array([-60.0]))
+    worse = ahead_bank(0.01, 50.0, [2])._replace(born_s=np.array([10.0 - seconds]))
+    both = joined([steady, worse])._replace(log_weight=np.log([1.0 - probability, probability]))
+    aheads = [found(CONFIG, memory_of(bank, Braking(FULL), 3), NOTHING, NOTHING).ahead for bank in (steady, both)]
+    assert (max(aheads[1].mu) < 0.5 * min(aheads[0].mu)) == counts
+    assert counts or aheads[1].mu == pytest.approx(aheads[0].mu)
+
+
+@pytest.mark.parametrize(("share", "stays"), [(0.79, True), (0.81, False)])
+def test_under_a_part_of_the_brake_that_the_rail_bears_what_was_known_of_it_holds(share: float, stays: bool) -> None:
+    """That was more than is used, as the brake is weaker than believed."""
+    bank = bank_of([HELD], spread=0.0)
+    bank.mean[:, BRAKE] = 0.5
+    bank = bank._replace(covariance=1e-8 * bank.covariance)
+    known = Rail(0.09, 0.01, 0.08)
+    findings = found(CONFIG, memory_of(bank, Braking(share * FULL), 3)._replace(known=known), known, NOTHING)
+    assert (min(findings.ahead.mu) >= 0.08) == stays
+    assert findings.rail.lower <= findings.rail.mu < 0.05
+    assert (findings.known.lower == 0.08) == stays
+    assert (findings.known.mu, findings.known.std) == (0.09, max(findings.rail.std, 0.01))
+
+
+def test_while_much_is_open_no_more_is_counted_on_than_was_known() -> None:
+    """Of the rail as it was known when the braking began, and as that has aged since, the worse."""
+    bank = ahead_bank(0.03, 50.0, [2]).with_fresh(MU, 0.03, 0.03)
+    opened = memory_of(bank, Braking(FULL), 3)._replace(known=Rail(0.06, 0.02, 0.04))
+    for aged, least in ((0.035, 0.035), (0.05, 0.04)):
+        findings = found(CONFIG, opened, Rail(0.06, 0.02, aged), NOTHING)
+        assert findings.regime is Regime.COASTING
+        assert min(findings.ahead.mu) == pytest.approx(least)
+        assert findings.rail.lower == pytest.approx(min(least, findings.rail.mu))
+
+
+def test_a_train_of_whose_brake_nothing_is_known_brakes_from_a_fiftieth_of_g_on() -> None:
+    """Then the rail gives so much; else it is believed as before."""
+    for used, brakes in ((0.018, False), (0.024, True)):
+        bank = bank_of([0], spread=0.0)
+        bank.mean[:, MU] = used
+        memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(0.0), 0)
+        findings = found(CONFIG, memory._replace(brake=BrakeSeen()), NOTHING, NOTHING)
+        assert findings.regime is Regime.COASTING
+        assert findings.rail.mu == pytest.approx(used if brakes else NOTHING.mu)
+        assert findings.rail.lower == pytest.approx(
+            max(NOTHING.lower, 0.9 * used) if brakes else NOTHING.lower, rel=0.2
+        )
+        assert findings.ahead == constant(NOTHING.lower)
+
+
 def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:
     ahead = Ahead((0.0, 10.0, 20.0), (0.06, 0.05, 0.03))
     assert ahead(np.array([0.0, 5.0, 15.0, 20.0, 90.0])) == pytest.approx([0.06, 0.055, 0.04, 0.03, 0.03])
