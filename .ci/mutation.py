@@ -131,6 +131,7 @@ def main() -> int:
             pool.starmap(record, missing, chunksize=1)
             for mutation, difference, status in pool.imap_unordered(tried, [(kept, mutation) for mutation in chosen]):
                 total[part_of(mutation)] += 1
+                print(f"\r{total.total()} of {len(chosen)} tried", end="", file=sys.stderr, flush=True)
                 by_pages[part_of(mutation)] += status == BY_PAGES
                 if status == ALIVE:
                     survived[part_of(mutation)] += 1
