@@ -26,8 +26,10 @@ from .intake.plausibility import STRONGEST_MPS2
 from .intake.samples import Measurement
 from .methods.protocol import AnyMethod, Context, MethodWindow, Verdict
 from .physics.adhesion import SpeedLaw
+from .quick import quick
 
 
+@quick
 class Estimate(NamedTuple):
     """What is known at `t_ns`, the time of the newest measurement."""
 

@@ -24,6 +24,7 @@ from .intake.pairing import Gate, Inbox
 from .intake.plausibility import Pace, Repeated
 from .intake.samples import Measurement
 from .methods.protocol import AnyMethod, MethodWindow
+from .quick import quick
 
 
 class Sure(NamedTuple):
@@ -50,6 +51,7 @@ class Sure(NamedTuple):
         )
 
 
+@quick
 class State(NamedTuple):
     """Everything the estimator remembers. Immutable: `step` returns a new one."""
 

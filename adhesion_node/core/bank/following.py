@@ -20,6 +20,7 @@ import numpy as np
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
 from ..physics.train import GRAVITY, Array
+from ..quick import quick
 from .brake import BrakeSeen
 from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kernels import weighing
@@ -82,6 +83,7 @@ PITCH_MEAN, PITCH_STD, BIAS_STD = 0.08, 0.08, 0.005
 """Of an accelerometer: 0.3 to 1 degree under a full brake, 0.05 m/s^2."""
 
 
+@quick
 class Memory(NamedTuple):
     """What the bank remembers."""
 

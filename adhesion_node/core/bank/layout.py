@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..physics.train import Array
+from ..quick import quick
 from .kernels import uniting, weighing
 
 Indices = NDArray[np.intp]
@@ -33,6 +34,7 @@ by how much the rims are too fast, relative, as the wheels' radii are not known.
 SIZE = 11
 
 
+@quick
 class Bank(NamedTuple):
     """Beliefs under H hypotheses. The arrays are not changed in place once a bank is made."""
 

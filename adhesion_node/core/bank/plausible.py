@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..physics.train import GRAVITY
+from ..quick import quick
 from . import kinds
 from .kernels import parabola
 from .layout import SPEED, Bank
@@ -48,6 +49,7 @@ GAIN_MPS2, BRAKED_NS = 0.1, 3 * S
 """A train that has been braked so long does not gain speed by more than this, and the grade's part."""
 
 
+@quick
 class Course(NamedTuple):
     """Positions of the last seconds, stamps in ns and m."""
 

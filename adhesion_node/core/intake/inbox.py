@@ -83,13 +83,11 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
         of_others = Outcome.REPEATED if refused is Outcome.DUPLICATE else refused
         return Pushed(inbox, events=(Event(of_others, _named(sample)),))
     overtaken = () if inbox.late[0] else _overtaken(gate, inbox, sample)
-    in_order, stream = not stream.has_reached(sample.t_ns), stream.added(sample)
-    first_ns = stream.samples[0].t_ns  # what comes out of order may belong to a time that is about to begin anew
-    if in_order and inbox.released_ns is not None:
-        first_ns = inbox.released_ns - kept_ns(gate)
-    stream = stream.since(first_ns)
-    now_ns = _newest(inbox.now_ns, sample)
-    inbox = inbox.with_stream(type(sample), stream.delayed(now_ns - sample.t_ns), now_ns)
+    first_ns, now_ns = None, _newest(inbox.now_ns, sample)
+    if inbox.released_ns is not None and not stream.has_reached(sample.t_ns):
+        first_ns = inbox.released_ns - kept_ns(gate)  # what is out of order may belong to a time about to begin anew
+    stream = stream.delayed(now_ns - sample.t_ns).added(sample, first_ns)
+    inbox = inbox.with_stream(type(sample), stream.after_first() if stream.excess else stream, now_ns)
     return _with(overtaken, Pushed(*release(gate, inbox, 0)))
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from ..quick import quick
 from ..setting import once
 from .stream import Stream
 
@@ -90,6 +91,7 @@ class Matched(NamedTuple):
     """A sample, None where one measured nothing; of a source whose samples come `each`, a tuple of them."""
 
 
+@quick
 class Inbox(NamedTuple):
     """What waits. Immutable: `push` returns a new one."""
 

@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, insort
+from bisect import bisect_left
 from typing import Any, NamedTuple
 
 from .outcome import Outcome
@@ -41,24 +41,23 @@ class Stream(NamedTuple):
 
     def refusal(self, t_ns: int) -> Outcome | None:
         """Why a sample of that stamp may not be added; None where it may."""
-        if self.newest_ns is None or t_ns > self.newest_ns:
-            too_often = self.newest_ns is not None and t_ns < self.allowed_ns - BURST_NS
-            return Outcome.TOO_OFTEN if too_often else None
-        index = bisect_left(self.samples, (t_ns,))
-        doubled = index < len(self.samples) and self.samples[index].t_ns == t_ns
-        return Outcome.DUPLICATE if doubled else None
-
-    def added(self, sample: Any) -> Stream:
-        """The stream with one more sample."""
-        t_ns = sample.t_ns
         if self.newest_ns is None:
-            return self._replace(samples=(sample,), newest_ns=t_ns, allowed_ns=t_ns + INTERVAL_NS)
-        if t_ns >= self.newest_ns:
-            allowed_ns = max(t_ns, self.allowed_ns) + INTERVAL_NS
-            return Stream((*self.samples, sample), t_ns, allowed_ns, self.spent_ns, self.lag_ns)
-        samples = list(self.samples)
-        insort(samples, sample)
-        return self._replace(samples=tuple(samples))
+            return None
+        if t_ns > self.newest_ns:
+            return Outcome.TOO_OFTEN if t_ns < self.allowed_ns - BURST_NS else None
+        return Outcome.DUPLICATE if self.has_between(t_ns, t_ns) else None
+
+    def added(self, sample: Any, first_ns: int | None = None) -> Stream:
+        """The stream with one more sample, and without what is older than a time."""
+        (samples, newest_ns, allowed_ns, spent_ns, lag_ns), t_ns = self, sample.t_ns
+        if newest_ns is None or t_ns >= newest_ns:
+            allowed_ns = (t_ns if newest_ns is None else max(t_ns, allowed_ns)) + INTERVAL_NS
+            samples, newest_ns = (*samples, sample), t_ns
+        else:
+            samples = tuple(sorted((*samples, sample)))
+        if first_ns is not None:
+            samples = samples[_index(samples, first_ns) :]
+        return Stream(samples, newest_ns, allowed_ns, spent_ns, lag_ns)
 
     def between(self, first_ns: int, last_ns: int) -> Stream:
         """What is stamped from the first to the last time, as the beginning of a stream."""
@@ -83,15 +82,10 @@ class Stream(NamedTuple):
         """Samples beyond the most that are kept."""
         return max(len(self.samples) - MOST, 0)
 
-    def since(self, first_ns: int) -> Stream:
-        """Without what is older than a time or beyond the most that are kept."""
-        first = max(bisect_left(self.samples, (first_ns,)), self.excess)
-        return Stream(self.samples[first:], *self[1:]) if first > 0 else self
-
     def has_between(self, first_ns: int, last_ns: int) -> bool:
         """Whether a kept sample is stamped from the first to the last time."""
-        index = bisect_left(self.samples, (first_ns,))
-        return index < len(self.samples) and self.samples[index].t_ns <= last_ns
+        index = _index(self.samples, first_ns)
+        return index < len(self.samples) and bool(self.samples[index].t_ns <= last_ns)
 
     def has_reached(self, t_ns: int) -> bool:
         """Whether a sample with this or a later stamp has come."""
@@ -99,17 +93,23 @@ class Stream(NamedTuple):
 
     def next_ns(self, t_ns: int) -> int | None:
         """The stamp of the first kept sample behind a time; None where there is none."""
-        index = bisect_left(self.samples, (t_ns + 1,))
+        index = _index(self.samples, t_ns + 1)
         return self.samples[index].t_ns if index < len(self.samples) else None
 
     def latest(self, t_ns: int) -> Any | None:
         """The newest sample that is not later than a time; None where there is none."""
-        index = bisect_left(self.samples, (t_ns + 1,)) - 1
+        index = _index(self.samples, t_ns + 1) - 1
         return None if index < 0 else self.samples[index]
 
     def unspent(self, first_ns: int, last_ns: int) -> tuple[Any, ...]:
         """The samples from the first to the last time that are not used up."""
         if self.spent_ns is not None:
             first_ns = max(first_ns, self.spent_ns + 1)
-        first, end = (bisect_left(self.samples, (t_ns,)) for t_ns in (first_ns, last_ns + 1))
-        return self.samples[first:end]
+        return self.samples[_index(self.samples, first_ns) : _index(self.samples, last_ns + 1)]
+
+
+def _index(samples: tuple[Any, ...], t_ns: int) -> int:
+    """Where the samples from a time on begin; mostly that is one of the ends."""
+    if not samples or t_ns <= samples[0].t_ns:
+        return 0
+    return len(samples) if t_ns > samples[-1].t_ns else bisect_left(samples, (t_ns,))

@@ -93,6 +93,16 @@ def _order(log_weight: Array) -> Labels:
 
 
 @kernel
+def _alike(rule: Pruning, mean: Array, std: Array, of_mean: Array, of_std: Array) -> bool:
+    """Whether two hypotheses say the same of adhesion and speed."""
+    alike = True
+    for part, i in enumerate((MU, SPEED)):
+        near = abs(mean[i] - of_mean[i]) < rule.near * of_std[part] + 1e-9
+        alike = alike and near and 1.0 / rule.factor < std[part] / of_std[part] < rule.factor
+    return alike
+
+
+@kernel
 def pruned(bank: Columns, numbers: tuple[float, int, float, float]) -> Columns:
     """The hypotheses that are left by the numbers of a `Pruning`, their weights normalised."""
     rule, (mean, covariance, log_weight, noise, law, kind, born_s, changed_s) = Pruning(*numbers), bank
@@ -102,36 +112,39 @@ def pruned(bank: Columns, numbers: tuple[float, int, float, float]) -> Columns:
     for h in range(count):
         weight[h] = math.exp(log_weight[h]) if log_weight[h] > rule.least else 0.0
         std[h, 0], std[h, 1] = math.sqrt(covariance[h, MU, MU]), math.sqrt(covariance[h, SPEED, SPEED])
-    left, group = 0, np.empty(count, dtype=np.intp)
-    kept, means, sums = np.empty(count, dtype=np.intp), np.empty((count, SIZE)), np.empty(count)
-    covariances = np.empty((count, SIZE, SIZE))
+    # members of the groups, one group behind the other; where each ends, its likeliest member, its weight
+    left, size, member = 0, 0, np.empty(count, dtype=np.intp)
+    ends, kept, sums = np.zeros(count + 1, dtype=np.intp), np.empty(count, dtype=np.intp), np.zeros(count)
     gone = weight == 0.0
     for first in range(count):
         one = order[first]
         if gone[one]:
             continue
-        size = 0
         for index in range(first, count):
             h = order[index]
-            if gone[h] or label[h] != label[one]:
+            if label[h] != label[one] or gone[h]:
                 continue
-            alike = True
-            for part, i in enumerate((MU, SPEED)):
-                ratio = std[h, part] / std[one, part]
-                near = abs(mean[h, i] - mean[one, i]) < rule.near * std[one, part] + 1e-9
-                alike = alike and near and 1.0 / rule.factor < ratio < rule.factor
-            if alike or h == one:
-                group[size], gone[h] = h, True
+            if h == one or _alike(rule, mean[h], std[h], mean[one], std[one]):
+                member[size], gone[h] = h, True
+                sums[left] += weight[h]
                 size += 1
-        kept[left], means[left], covariances[left], sums[left] = one, mean[one], covariance[one], weight[one]
-        if size > 1:
-            sums[left] = _united(weight, mean, covariance, group[:size], means[left], covariances[left])
+        kept[left], ends[left + 1] = one, size
         left += 1
+    chosen = np.arange(left)
     if left > rule.most:
         chosen = np.sort(_order(np.log(sums[:left]))[: rule.most])
-        kept, means, covariances, sums, left = kept[chosen], means[chosen], covariances[chosen], sums[chosen], rule.most
-    kept, weights = kept[:left], np.log(sums[:left] / sums[:left].sum())
+    means, covariances = np.empty((chosen.size, SIZE)), np.empty((chosen.size, SIZE, SIZE))
+    for row, group in enumerate(chosen):
+        one = kept[group]
+        if ends[group + 1] - ends[group] > 1:
+            _united(weight, mean, covariance, member[ends[group] : ends[group + 1]], means[row], covariances[row])
+            continue
+        for i in range(SIZE):
+            means[row, i] = mean[one, i]
+            for j in range(SIZE):
+                covariances[row, i, j] = covariance[one, i, j]
+    kept, sums = kept[chosen], sums[chosen]
     return (
-        *(means[:left].copy(), covariances[:left].copy(), weights),
+        *(means, covariances, np.log(sums / sums.sum())),
         *(noise[kept], law[kept], kind[kept], born_s[kept], changed_s[kept]),
     )
