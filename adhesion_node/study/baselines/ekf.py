@@ -12,15 +12,17 @@
 
 While no brake is applied the speed is a random walk and nothing is learnt of the adhesion. Under the brake mu is
 held between 0 and what the brake can use: beyond that the motion does not depend on it, and a filter that started
-there would never move.
+there would never move. N filters run side by side, each through a ride of its own, of K measurements at most.
 """
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from ...core.belief.gaussian import Gaussian, coast
 from ...core.belief.regime import Regime
 from ...core.belief.tracker import meet
 from ...core.config import Config
@@ -49,98 +51,127 @@ NAIVE = Tuning(mu_std=0.1, mu_noise=7.5e-3)
 12-13 %: it shows that a tuning can explain them, not that the paper used it."""
 
 
-@dataclass(frozen=True, slots=True)
-class EkfState:
-    """Immutable: `ekf_step` returns a new one. The default stands before the first measurement."""
+class Ride(NamedTuple):
+    """What was measured: those measurements that are valid and newer than all before; arrays of one length."""
 
-    newest: Measurement | None = None
-    mean: Array = field(default_factory=lambda: np.zeros(3))
-    """Of position, m, speed, m/s, and mu."""
-    covariance: Array = field(default_factory=lambda: np.eye(3))
-    since_estimate: int = 0
-
-
-def ekf_step(
-    config: Config, tuning: Tuning, state: EkfState, measurement: Measurement
-) -> tuple[EkfState, Estimate | None]:
-    """Take one measurement; every `config.step` accepted ones return an estimate.
-
-    Of the configuration it takes train, track, noise, `start_mu` and `step`. Measurements that are invalid or not
-    newer than the newest are dropped.
-    """
-    newest = state.newest
-    if not measurement.is_valid() or (newest is not None and measurement.t_ns <= newest.t_ns):
-        return state, None
-    if newest is None:
-        mean, covariance = _joined(config, tuning, meet(measurement, config.unknown_speed_mps))
-    else:
-        dt_s, brake = (measurement.t_ns - newest.t_ns) * 1e-9, config.brake(newest.brake_pressure_pa)
-        mean, covariance = _predict(config, tuning, state, dt_s, brake)
-        mean, covariance = _observe(mean, covariance, measurement)
-    if config.brake(measurement.brake_pressure_pa) > 0.0:
-        mean[2] = min(max(mean[2], 0.0), _limit(config, mean, measurement))
-    due = state.since_estimate + 1 >= config.step
-    state = EkfState(measurement, mean, covariance, 0 if due else state.since_estimate + 1)
-    return state, _estimate(config, state, measurement) if due else None
+    t_ns: NDArray[np.int64]
+    position_m: Array
+    variance_m2: Array
+    brake: Array
+    """B/(M g) from then on."""
 
 
-def jacobian(config: Config, mean: Array, dt_s: float, brake: float) -> Array:
-    """Derivative of the braked step with respect to (s, v, mu), shape (3, 3); at the kink that of the adhesion."""
-    brake_limits = bool(config.motion.brake_limit(mean[0], mean[1], brake) < mean[2])
-    result = np.eye(3)
-    result[:2, :2] = config.motion.jacobian(float(mean[1]), dt_s, brake_limits)
-    if not brake_limits:
-        result[:2, 2] = -GRAVITY * dt_s * np.array([0.5 * dt_s, 1.0])
+class Filtered(NamedTuple):
+    """The filters after each measurement; one whose ride has ended repeats its last measurement."""
+
+    mean: Array
+    """Of position, m, speed, m/s, and mu, (K, N, 3)."""
+    covariance: Array
+    """(K, N, 3, 3)."""
+
+
+def ride_of(config: Config, measurements: Sequence[Measurement]) -> Ride:
+    """Take what a filter uses of measurements, at least one of which is valid."""
+    used = list[Measurement]()
+    for one in measurements:
+        if one.is_valid() and (not used or one.t_ns > used[-1].t_ns):
+            used.append(one)
+    t_ns, positions, variances = (np.array(column) for column in zip(*(one[:3] for one in used), strict=True))
+    return Ride(t_ns, positions, variances, np.array([config.brake(one.brake_pressure_pa) for one in used]))
+
+
+def ekf(config: Config, tuning: Tuning, starts: Sequence[float], rides: Sequence[Ride]) -> list[list[Estimate]]:
+    """Estimates of each ride from its start of mu, one every `config.step` measurements."""
+    filtered = filter_rides(config, tuning, starts, rides)
+    return [_estimates(config, ride, *(part[:, n] for part in filtered)) for n, ride in enumerate(rides)]
+
+
+def filter_rides(config: Config, tuning: Tuning, starts: Sequence[float], rides: Sequence[Ride]) -> Filtered:
+    """Filter each ride from its start of mu; of the configuration it takes train, track and noise."""
+    longest, start = max(ride.t_ns.size for ride in rides), np.array(starts)
+    t_ns, positions, variances, brakes = (
+        np.stack([np.pad(column, (0, longest - column.size), "edge") for column in columns], axis=1)
+        for columns in zip(*rides, strict=True)
+    )
+    found = Filtered(np.empty((longest, start.size, 3)), np.zeros((longest, start.size, 3, 3)))
+    for n, first in enumerate(zip(positions[0], variances[0], strict=True)):
+        met = meet(Measurement(0, *first), config.unknown_speed_mps)
+        found.mean[0, n], found.covariance[0, n, :2, :2] = (*met.mean, start[n]), met.covariance
+    found.covariance[0, :, 2, 2] = tuning.mu_std**2
+    _bound(config, found.mean[0], brakes[0])
+    for k, dt_s in enumerate(np.diff(t_ns, axis=0) * 1e-9):
+        mean, covariance = _predict(config, tuning, start, (found.mean[k], found.covariance[k]), dt_s, brakes[k])
+        gain = covariance[:, :, 0] / (covariance[:, 0, 0] + variances[k + 1])[:, None]
+        found.mean[k + 1] = mean + gain * (positions[k + 1] - mean[:, 0])[:, None]
+        kept = np.zeros_like(covariance) + np.eye(3)
+        kept[:, :, 0] -= gain
+        noise = variances[k + 1, :, None, None] * gain[:, :, None] * gain[:, None, :]
+        # Joseph's form, as `gaussian.observe` has it
+        found.covariance[k + 1] = kept @ covariance @ kept.swapaxes(1, 2) + noise
+        _bound(config, found.mean[k + 1], brakes[k + 1])
+    return found
+
+
+def jacobian(config: Config, mean: Array, dt_s: Array, brake: Array) -> Array:
+    """Derivative of the braked step with respect to (s, v, mu), shape (N, 3, 3); at the kink that of the adhesion."""
+    brake_limits = config.motion.brake_limit(mean[:, 0], mean[:, 1], brake) < mean[:, 2]
+    result = np.zeros((len(mean), 3, 3)) + np.eye(3)
+    result[:, :2, :2] = config.motion.jacobian(mean[:, 1], dt_s, brake_limits)
+    pushed = np.where(brake_limits, 0.0, -GRAVITY * dt_s)
+    result[:, 0, 2], result[:, 1, 2] = 0.5 * dt_s * pushed, pushed
     return result
 
 
-def _joined(config: Config, tuning: Tuning, belief: Gaussian) -> tuple[Array, Array]:
-    """A belief in (s, v) with the adhesion as at the start of a braking."""
-    covariance = np.zeros((3, 3))
-    covariance[:2, :2], covariance[2, 2] = belief.covariance, tuning.mu_std**2
-    return np.append(belief.mean, config.start_mu), covariance
+def _predict(
+    config: Config, tuning: Tuning, start: Array, now: tuple[Array, Array], dt_s: Array, brake: Array
+) -> tuple[Array, Array]:
+    """Means and covariances after steps of `dt_s`, (N,): braked, or else coasting, which leaves mu at its start."""
+    (mean, covariance), braked = now, brake > 0.0
+    position, speed = config.motion.advance(mean[:, 0], mean[:, 1], dt_s, brake, mean[:, 2])
+    coasted = mean[:, 0] + dt_s * mean[:, 1], mean[:, 1], start
+    moved = np.where(braked, (position, speed, mean[:, 2]), coasted).T
+    slope, noise = np.zeros((2, *covariance.shape))
+    slope[:, (0, 1), (0, 1)], slope[:, 0, 1] = 1.0, dt_s
+    slope = np.where(braked[:, None, None], jacobian(config, mean, dt_s, brake), slope)
+    by_place, by_speed = config.motion.noise(dt_s)
+    walk = config.coasting_noise_mps**2 / 0.1
+    noise[:, 0, 0] = np.where(braked, by_place, walk * dt_s**3 / 3.0)
+    noise[:, 0, 1] = noise[:, 1, 0] = np.where(braked, 0.0, walk * dt_s**2 / 2.0)
+    noise[:, 1, 1] = np.where(braked, by_speed, walk * dt_s)
+    noise[:, 2, 2] = np.where(braked, tuning.mu_noise**2 * dt_s / 0.1, tuning.mu_std**2)
+    return moved, slope @ covariance @ slope.swapaxes(1, 2) + noise
 
 
-def _predict(config: Config, tuning: Tuning, state: EkfState, dt_s: float, brake: float) -> tuple[Array, Array]:
-    if brake == 0.0:
-        belief = Gaussian(state.mean[:2], state.covariance[:2, :2])
-        return _joined(config, tuning, coast(belief, dt_s, config.coasting_noise_mps**2 / 0.1))
-    slope = jacobian(config, state.mean, dt_s, brake)
-    position, speed = config.motion.advance(state.mean[0], state.mean[1], dt_s, brake, float(state.mean[2]))
-    noise = np.diag([*config.motion.noise(dt_s), tuning.mu_noise**2 * dt_s / 0.1])
-    return np.array([position, speed, state.mean[2]]), slope @ state.covariance @ slope.T + noise
+def _bound(config: Config, mean: Array, brake: Array) -> None:
+    """Hold mu of the braked ones between 0 and the most that the brake can use."""
+    mean[:, 2] = np.where(brake > 0.0, np.clip(mean[:, 2], 0.0, _limit(config, mean, brake)), mean[:, 2])
 
 
-def _observe(mean: Array, covariance: Array, measurement: Measurement) -> tuple[Array, Array]:
-    """Condition on the measured position; in Joseph form, as `gaussian.observe` does it for two states."""
-    gain = covariance[:, 0] / (covariance[0, 0] + measurement.variance_m2)
-    kept = np.eye(3)
-    kept[:, 0] -= gain
-    covariance = kept @ covariance @ kept.T + measurement.variance_m2 * np.outer(gain, gain)
-    return mean + gain * (measurement.position_m - mean[0]), covariance
+def _limit(config: Config, mean: Array, brake: Array) -> Array:
+    return np.maximum(config.motion.brake_limit(mean[:, 0], mean[:, 1], brake), 0.0)
 
 
-def _limit(config: Config, mean: Array, measurement: Measurement) -> float:
-    brake = config.brake(measurement.brake_pressure_pa)
-    return max(float(config.motion.brake_limit(mean[0], mean[1], brake)), 0.0)
-
-
-def _estimate(config: Config, state: EkfState, measurement: Measurement) -> Estimate:
-    position, speed, mu = (float(value) for value in state.mean)
-    stds = np.sqrt(np.diag(state.covariance))
-    if config.brake(measurement.brake_pressure_pa) == 0.0:
-        regime = Regime.COASTING
-    else:
-        limited = mu + float(stds[2]) >= _limit(config, state.mean, measurement)
-        regime = Regime.BRAKE_LIMITED if limited else Regime.ADHESION_LIMITED
-    return Estimate(
-        t_ns=measurement.t_ns,
-        mu=mu,
-        mu_std=float(stds[2]),
-        mu_lower=max(mu - float(ndtri(config.confidence)) * float(stds[2]), 0.0),
-        regime=regime,
-        position_m=position,
-        speed_mps=max(speed, 0.0),
-        position_std_m=float(stds[0]),
-        speed_std_mps=float(stds[1]),
-    )
+def _estimates(config: Config, ride: Ride, mean: Array, covariance: Array) -> list[Estimate]:
+    """Every `config.step`th of one ride; mean (K, 3), covariance (K, 3, 3)."""
+    due = slice(config.step - 1, ride.t_ns.size, config.step)
+    t_ns, brake, mean = ride.t_ns[due], ride.brake[due], mean[due]
+    stds = np.sqrt(np.diagonal(covariance[due], axis1=1, axis2=2))
+    limited = mean[:, 2] + stds[:, 2] >= _limit(config, mean, brake)
+    lower = np.maximum(mean[:, 2] - ndtri(config.confidence) * stds[:, 2], 0.0)
+    regimes = (Regime.BRAKE_LIMITED if each else Regime.ADHESION_LIMITED for each in limited)
+    return [
+        Estimate(
+            t_ns=at,
+            mu=mu,
+            mu_std=mu_std,
+            mu_lower=least,
+            regime=regime if braked else Regime.COASTING,
+            position_m=position,
+            speed_mps=max(speed, 0.0),
+            position_std_m=position_std,
+            speed_std_mps=speed_std,
+        )
+        for at, braked, (position, speed, mu), (position_std, speed_std, mu_std), least, regime in zip(
+            t_ns.tolist(), brake > 0.0, mean.tolist(), stds.tolist(), lower.tolist(), regimes, strict=True
+        )
+    ]

@@ -16,17 +16,13 @@ from oracles import Linear, ride
 
 from adhesion_node.core import Config, Estimate, Measurement, Regime
 from adhesion_node.core.physics.train import Train
-from adhesion_node.study.baselines.ekf import NAIVE, TUNED, EkfState, Tuning, ekf_step, jacobian
+from adhesion_node.study.baselines.ekf import NAIVE, TUNED, Tuning, ekf, filter_rides, jacobian, ride_of
 
 BRAKE = 0.0952
 
 
-def _run(config: Config, measurements: list[Measurement], tuning: Tuning = TUNED) -> tuple[EkfState, list[Estimate]]:
-    state, estimates = EkfState(), []
-    for measurement in measurements:
-        state, estimate = ekf_step(config, tuning, state, measurement)
-        estimates += [] if estimate is None else [estimate]
-    return state, estimates
+def _run(config: Config, measurements: list[Measurement], tuning: Tuning = TUNED) -> list[Estimate]:
+    return ekf(config, tuning, [config.start_mu], [ride_of(config, measurements)])[0]
 
 
 @pytest.mark.parametrize("mu", [0.07, 0.12])
@@ -37,7 +33,8 @@ def test_jacobian_is_the_derivative_of_the_step(mu: float) -> None:
         return np.array([*config.motion.advance(x[0], x[1], 0.1, BRAKE, x[2]), x[2]])
 
     columns = [(step(mean + d) - step(mean - d)) / (2 * small) for d in small * np.eye(3)]
-    np.testing.assert_allclose(jacobian(config, mean, 0.1, BRAKE), np.array(columns).T, atol=1e-7)
+    slope = jacobian(config, mean[None], np.array([0.1]), np.array([BRAKE]))[0]
+    np.testing.assert_allclose(slope, np.array(columns).T, atol=1e-7)
 
 
 def test_equals_the_textbook_filter_where_the_train_is_linear() -> None:
@@ -45,10 +42,8 @@ def test_equals_the_textbook_filter_where_the_train_is_linear() -> None:
     train = Train(resistance_c0=0.8, resistance_c1=0.006, resistance_c2=0.0)
     config, tuning = Config(train=train, start_mu=0.06), Tuning(0.02, 1e-3)
     measurements = ride([(1.0, 0.0), (10.0, 410e3)], mu=0.07, seed=3)
-    state, _ = _run(config, measurements, tuning)
-
-    start, _ = _run(config, measurements[:11], tuning)  # the last of the cruising
-    mean, covariance = start.mean, start.covariance
+    filtered = filter_rides(config, tuning, [config.start_mu], [ride_of(config, measurements)])
+    mean, covariance = filtered.mean[10, 0], filtered.covariance[10, 0]  # the last of the cruising
     a = np.eye(3)
     a[:2, :2] = model.matrix(0.1)
     a[:2, 2] = model.push(0.1, 1.0) - model.push(0.1, 0.0)
@@ -60,14 +55,14 @@ def test_equals_the_textbook_filter_where_the_train_is_linear() -> None:
         mean = mean + gain * (measurement.position_m - mean[0])
         covariance = covariance - np.outer(gain, covariance[0])
         assert 0.0 < mean[2] < BRAKE  # else the core's kink is at work and the comparison void
-    np.testing.assert_allclose(state.mean, mean, rtol=1e-9)
-    np.testing.assert_allclose(state.covariance, covariance, rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(filtered.mean[-1, 0], mean, rtol=1e-9)
+    np.testing.assert_allclose(filtered.covariance[-1, 0], covariance, rtol=1e-6, atol=1e-12)
 
 
 @pytest.mark.parametrize("start_mu", [0.0, 0.05, 0.12])
 def test_finds_a_constant_adhesion_from_every_start(start_mu: float) -> None:
     measurements = ride([(20.0, 0.0), (40.0, 410e3)], mu=0.0726, speed_mps=83.0, seed=1)
-    _, estimates = _run(Config(start_mu=start_mu), measurements)
+    estimates = _run(Config(start_mu=start_mu), measurements)
     assert {e.regime for e in estimates if e.t_ns < 19e9} == {Regime.COASTING}
     late = [e for e in estimates if e.t_ns > 40e9]
     assert np.mean([abs(e.mu - 0.0726) for e in late]) < 0.003
@@ -78,7 +73,7 @@ def test_finds_a_constant_adhesion_from_every_start(start_mu: float) -> None:
 
 def test_the_brakes_limit_is_all_that_a_good_rail_shows() -> None:
     measurements = ride([(20.0, 0.0), (30.0, 410e3)], mu=0.15, speed_mps=83.0, seed=1)
-    _, estimates = _run(Config(), measurements)
+    estimates = _run(Config(), measurements)
     late = [e for e in estimates if e.t_ns > 35e9]
     assert all(e.mu <= BRAKE + 1e-4 for e in late)
     assert np.mean([e.regime is Regime.BRAKE_LIMITED for e in late]) > 0.8
@@ -88,17 +83,27 @@ def test_a_fast_walk_is_noisier() -> None:
     measurements = ride([(20.0, 0.0), (40.0, 410e3)], mu=0.0726, speed_mps=83.0, seed=2)
     errors = []
     for tuning in (TUNED, NAIVE):
-        _, estimates = _run(Config(), measurements, tuning)
+        estimates = _run(Config(), measurements, tuning)
         errors.append(np.mean([abs(e.mu - 0.0726) for e in estimates if e.t_ns > 30e9]))
     assert errors[1] > 3 * errors[0]
 
 
 def test_drops_what_is_invalid_or_not_newer() -> None:
-    measurements = ride([(3.0, 0.0)], seed=1)
-    last = measurements[-1]
-    state, _ = _run(Config(), measurements)
-    for bad in (last, replace_position(last, float("nan")), last._replace(t_ns=0)):
-        assert ekf_step(Config(), TUNED, state, bad) == (state, None)
+    config, measurements = Config(step=1), ride([(3.0, 0.0)], seed=1)
+    last = measurements[15]
+    bad = [last, replace_position(last, float("nan")), last._replace(t_ns=0)]
+    assert _run(config, [*measurements[:16], *bad, *measurements[16:]]) == _run(config, measurements)
+
+
+def test_rides_side_by_side_are_those_one_by_one() -> None:
+    """Of different lengths, starts and brakes."""
+    config = Config()
+    rides = [ride([(cruise, 0.0), (lasts, 410e3)], seed=1) for cruise, lasts in ((2.0, 9.0), (5.0, 3.0), (1.0, 15.0))]
+    starts = [0.0, 0.05, 0.12]
+    together = ekf(config, TUNED, starts, [ride_of(config, measurements) for measurements in rides])
+    for start, measurements, found in zip(starts, rides, together, strict=True):
+        assert found == _run(Config(start_mu=start), measurements)
+    assert len({len(found) for found in together}) == 3
 
 
 def replace_position(measurement: Measurement, position_m: float) -> Measurement:
@@ -107,7 +112,7 @@ def replace_position(measurement: Measurement, position_m: float) -> Measurement
 
 def test_an_estimate_every_l_measurements() -> None:
     config = Config(step=7)
-    _, estimates = _run(config, ride([(5.0, 0.0), (5.0, 410e3)], seed=1))
+    estimates = _run(config, ride([(5.0, 0.0), (5.0, 410e3)], seed=1))
     assert [e.t_ns for e in estimates] == [round(0.1e9 * (7 * i + 6)) for i in range(14)]
 
 
