@@ -150,6 +150,10 @@ class ExactEStep(NamedTuple):
             used.append(per_mu @ precision @ moved / weight[-1])
         return Expectation(np.array((used, weight, self.window.brake)), exact.log_likelihood, math.inf)
 
+    def observed(self, mu: float) -> float:
+        """Information on mu by dense algebra."""
+        return dense_information(self.model, self.prior, self.window, mu)
+
 
 def make_window(
     model: Linear,

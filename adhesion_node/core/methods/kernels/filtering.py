@@ -254,22 +254,23 @@ def tracked(given: Given, mu: float) -> tuple[Array, Array, Array, float]:
             variance = window[PLACE_VARIANCE + 2 * index, k]
             if np.isfinite(variance):
                 total, off = p[index, index] + variance, window[PLACE + 2 * index, k] - mean[index]
-                gain, felt = p[:, index] / total, sensitivity[index]
+                gain, felt = (p[0, index] / total, p[1, index] / total), sensitivity[index]
                 information += felt**2 / total
-                sensitivity -= gain * felt
-                mean += gain * off
+                for c in range(2):
+                    sensitivity[c] -= gain[c] * felt
+                    mean[c] += gain[c] * off
                 _joseph(p, gain, index, variance)
         means[k], covariances[k] = mean, p
     return means, covariances, sensitivity, information
 
 
 @kernel
-def _joseph(p: Array, gain: Array, index: int, variance: float) -> None:
+def _joseph(p: Array, gain: tuple[float, float], index: int, variance: float) -> None:
     """Covariance after a measurement: stays symmetric and positive however small its variance is."""
-    kept = np.eye(2)
-    kept[:, index] -= gain
+    by_s, by_v = 1.0 - index, float(index)
+    kept = (1.0 - gain[0] * by_s, -gain[0] * by_v), (-gain[1] * by_s, 1.0 - gain[1] * by_v)
     a, b, c = p[0, 0], p[0, 1], p[1, 1]
     for i in range(2):
         for j in range(2):
-            first, second = kept[i, 0] * a + kept[i, 1] * b, kept[i, 0] * b + kept[i, 1] * c
-            p[i, j] = first * kept[j, 0] + second * kept[j, 1] + variance * gain[i] * gain[j]
+            first, second = kept[i][0] * a + kept[i][1] * b, kept[i][0] * b + kept[i][1] * c
+            p[i, j] = first * kept[j][0] + second * kept[j][1] + variance * gain[i] * gain[j]

@@ -17,11 +17,13 @@ with u_t the smoothed adhesion used in step t, c_t its weight and limit_t what t
 is a parabola between two limits, so its maximum is found exactly where the paper iterates a gradient (33).
 """
 
+import math
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from ...belief.gaussian import Gaussian
+from ...belief.rail import kept_of_start
 from ...belief.window import Window
 from ...physics.motion import Motion
 from ...physics.train import Array
@@ -59,6 +61,10 @@ class EStep(Protocol):
 
     def __call__(self, mu: float) -> Expectation: ...
 
+    def observed(self, mu: float) -> float:
+        """Information on mu that the window's measurements hold, at that adhesion."""
+        ...
+
 
 class ParticleEStep:
     """The paper's E-step: bootstrap filter and marginal smoother with so many particles."""
@@ -75,12 +81,21 @@ class ParticleEStep:
         statistics = filtering.reduced(self.filter.given, float(mu), particles, self.marginal)
         return Expectation(statistics, log_likelihood, ess)
 
+    def observed(self, mu: float) -> float:
+        """That of the extended Kalman filter."""
+        return filtering.tracked(self.filter.given, float(mu))[3]
+
+
+PASSES = 0.5
+"""Of each iteration: averaged, 25 passes of 20 particles leave no more to chance than 50 iterations of them."""
+
 
 class Search(NamedTuple):
     """Where EM starts and when it stops."""
 
     start: float
     iterations: int
+    """At most; so far it goes in `PASSES` of them."""
     tolerance: float
     """``|mu_k+1 - mu_k|`` below which it has converged (34)."""
     lowest: float = 0.0
@@ -92,10 +107,11 @@ class Identified(NamedTuple):
 
     mu: float
     iterations: int
+    """Passes."""
     converged: bool
     """Whether ``|mu_k+1 - mu_k|`` fell below the tolerance (34)."""
-    weight: float
-    """Complete-data information on mu, the sum of c_t over the steps that adhesion limits."""
+    kept: float
+    """Share of the start that is still in mu."""
     limit: float
     """Largest adhesion that any step of the window could use."""
     log_likelihood: float
@@ -114,22 +130,38 @@ def maximise(expected: Expectation, lowest: float) -> float:
 
 
 def identify(e_step: EStep, search: Search) -> Identified:
-    """Alternate E and M steps until they move mu by no more than the tolerance (34)."""
-    mu, done, moved = search.start, 0, np.inf
+    """Pass by E and M step until mu moves by no more than the tolerance (34), or to where I iterations of EM move it.
+
+    An iteration keeps a share r of the error (`kept_of_start`), I of them q = r^I: together they move mu by
+    1 + r + ... + r^(I-1) = (1 - q)/(1 - r) times what the first one does. So of n passes number j moves mu by
+
+        (1 - q)/(1 - r) 2j / (n (n+1) q + j (j+1) (1 - q))
+
+    times its M-step (Robbins and Monro 1951). That leaves the same share q of the start, averages the noise of the
+    passes instead of keeping that of the last ones, and gives pass j the weight j, as the first ones are farthest off.
+    """
+    passes, mu, done = math.ceil(PASSES * search.iterations), search.start, 0
     while True:
         expected = e_step(mu)
-        previous, mu = mu, maximise(expected, search.lowest)
         done += 1
-        # At either end of its range mu stands still for the end's sake, not because EM has arrived.
         top = float(expected.limit.max())
+        mu = min(mu, top)  # what is beyond the brakes makes no difference
+        seen = min(e_step.observed(mu) / float(expected.weight @ (expected.limit >= mu)), 1.0)
+        left = kept_of_start(seen, 1.0, search.iterations)
+        leap = (1.0 - left) / seen if left < 1.0 else search.iterations
+        kept = passes * (passes + 1) * left
+        slowness = kept + done * (done + 1) * (1.0 - left)
+        aim = mu + leap * 2.0 * done / slowness * (maximise(expected, search.lowest) - mu)
+        previous, mu = mu, max(min(aim, top), search.lowest)
+        # At either end of its range mu stands still for the end's sake, not because EM has arrived.
         moved = abs(mu - previous) if search.lowest < mu < top else np.inf
-        if moved <= search.tolerance or done >= search.iterations:
+        if moved <= search.tolerance or done >= passes:
             break
     return Identified(
         mu=mu,
         iterations=done,
         converged=moved <= search.tolerance,
-        weight=float(np.sum(expected.weight, where=expected.limit >= mu)),
+        kept=kept / slowness,
         limit=top,
         log_likelihood=expected.log_likelihood,
         ess=expected.ess,

@@ -18,7 +18,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ...belief.gaussian import Gaussian
-from ...belief.rail import Identification, Rail, kept_of_start, learn, learn_bound
+from ...belief.rail import Identification, Rail, learn, learn_bound
 from ...belief.regime import Regime
 from ...belief.window import WindowSample, window_of
 from ..protocol import Context, Fit, Verdict, spent
@@ -74,9 +74,8 @@ def _verdict(
     holds nothing of the samples behind it, so the overlap is not counted twice.
     """
     std = 1.0 / math.sqrt(filtered.information) if filtered.information > 0.0 else math.inf
-    kept = kept_of_start(filtered.information, identified.weight, identified.iterations)
     start = min(_search(config, context).start, identified.limit)
-    regime, rail = judge(config, Identification(identified.mu, std, start, kept), identified.limit, context)
+    regime, rail = judge(config, Identification(identified.mu, std, start, identified.kept), identified.limit, context)
     spread = filtered.sensitivity * min(std, config.unknown_std)
     gone = spent(config, window.samples)
     following = ParticleWindow(filtered.belief(gone - 1), window.samples[gone:]) if gone else window
