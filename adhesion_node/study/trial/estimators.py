@@ -16,7 +16,8 @@ from typing import NamedTuple
 
 from sim_node.train.scenario import find
 
-from ...core import Config, Estimate, finish, init, step
+from ...core import Config, Estimate, finish, init
+from ...core.following import follow
 from ...core.methods import METHODS
 from ...core.prediction import Prediction
 from ...run.pipeline import Pipeline
@@ -131,11 +132,11 @@ def through(pipeline: Pipeline, sent: Iterable[Sent], over_s: float = 0.0) -> La
 
 
 def _by_core(estimator: Estimator, lane: Lane) -> LaneResult:
-    """Measurement by measurement through the core alone: no curves."""
+    """Measurement by measurement through the core alone: no gate, as they are paired already, and no curves."""
     config = estimator.config_in(lane)
     state, estimates = init(config, estimator.seed_in(lane)), list[Estimate]()
     for measurement in lane.run.measurements:
-        state, estimate = step(config, state, measurement)
+        state, estimate = follow(config, state, measurement)
         estimates += [] if estimate is None else [estimate]
     return _estimated([*estimates, *finish(config, state)[1]])
 
