@@ -72,7 +72,7 @@ SLID = 0.9
 UNISON_S = 3.0
 """For so long, and the brake's build-up, behind the opening all axles may begin to slide as one."""
 
-TRUSTED_NS = 950_000_000
+TRUSTED_NS = 450_000_000
 """How often the fastest rim is taken for the train's speed, as its errors last."""
 
 FORGOTTEN = 0.02
@@ -303,6 +303,7 @@ def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Me
     rims, memory = wheels.rims(config, newest), memory._replace(wheels=wheels)
     if rims and memory.braked:
         return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns)
+    memory = memory._replace(wheels=wheels._replace(recovered=False, lowest_mps=math.inf))
     if rims and not pressed and rim > LEARNING_MPS:
         return memory._replace(bank=rolling(memory.bank, median(rims)).normalised())
     return memory
@@ -315,9 +316,9 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
     rim_mps -= slowing * (memory.t_ns - t_ns) / S
     if rim_mps <= config.slowest_mps:
         return memory
-    bank, wheels = not_slower(bank, rim_mps), memory.wheels
+    bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps)
     settled = memory.t_ns / S > memory.told_s - SETTLING_S + UNISON_S
-    if settled and memory.t_ns - wheels.trusted_ns >= TRUSTED_NS:
+    if (settled or wheels.recovered) and memory.t_ns - wheels.trusted_ns >= TRUSTED_NS:
         bank, wheels = as_fast(bank, rim_mps), wheels._replace(trusted_ns=memory.t_ns)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 

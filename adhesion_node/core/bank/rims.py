@@ -13,7 +13,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy.special import ndtr
 
 from .layout import RADIUS, SPEED, Bank
 from .seeing import CLIPPED, corrected, speed_seen
@@ -24,11 +23,11 @@ ROLLING_SHARE, FASTEST_SHARE = 0.02, 0.008
 CREEP = 0.002
 """By how much the fastest rim is slower than the train while it rolls."""
 
-MODES = ((0.6, 0.005), (0.3, 0.02))
-"""That the fastest rim under the brake rolls, or slides a little: probability and error, relative, ..."""
+ROLLS = 0.006
+"""Error of the fastest rim's speed under the brake where it rolls, relative."""
 
-SLIDING, SLOWEST = 0.1, 0.08
-"""... that it slides with the others: probability, and by how much at most."""
+SLIDES = 0.2
+"""Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new."""
 
 UNSEEN = 1e12
 """Variance of what is not seen."""
@@ -58,28 +57,22 @@ def not_slower(bank: Bank, rim_mps: float) -> Bank:
 
 
 def as_fast(bank: Bank, rim_mps: float) -> Bank:
-    """Take in that the fastest rim is mostly as fast as the train, or a little or much slower.
+    """Take in that the fastest rim under the brake is as fast as the train, or slides.
 
-    Each Gaussian becomes the one with the moments of the mixture (probabilistic data association, Bar-Shalom and Tse
-    1975). The weights are not normalised.
+    Each Gaussian becomes the one with the moments of both (probabilistic data association, Bar-Shalom and Tse 1975).
+    The weights are not normalised.
     """
-    seen = speed_seen(bank, rim_mps * (1.0 + CREEP), 0.0, RADIUS)
+    error = ROLLS * rim_mps
+    seen = speed_seen(bank, rim_mps * (1.0 + CREEP), error**2, RADIUS)
     gain = np.einsum("hij,hj->hi", bank.covariance, seen.slope)
-    own = np.einsum("hi,hi->h", gain, seen.slope)
-    prior, error = (np.array(column)[:, None] for column in zip(*MODES, strict=True))
-    inverse = 1.0 / (own + (error * rim_mps) ** 2)
-    off = seen.innovation * np.sqrt(inverse)
-    slower = ndtr(-off[0])
-    prior = prior * np.vstack((np.ones_like(slower), 2.0 * slower))
-    parts = prior * np.exp(-0.5 * off**2) * np.sqrt(inverse / (2.0 * math.pi))
-    total = parts.sum(axis=0) + SLIDING / (SLOWEST * rim_mps) * slower + 1e-9
-    parts /= total
-    part = (parts * inverse).sum(axis=0)
-    spread = seen.innovation**2 * ((parts * inverse**2).sum(axis=0) - part**2)
-    most = CLIPPED / np.sqrt(inverse[0])
-    pull = part * np.clip(seen.innovation, -most, most)
+    std = np.sqrt(np.einsum("hi,hi->h", gain, seen.slope) + error**2)
+    off, gain = seen.innovation / std, gain / std[:, None]
+    rolls = np.exp(-0.5 * off**2) / (math.sqrt(2.0 * math.pi) * std)
+    total = rolls + SLIDES / error
+    part = rolls / total
+    narrower = part * (1.0 - (1.0 - part) * off**2)
     return bank._replace(
-        mean=bank.mean + gain * pull[:, None],
-        covariance=bank.covariance - (part - spread)[:, None, None] * gain[:, :, None] * gain[:, None, :],
+        mean=bank.mean + gain * (part * off)[:, None],
+        covariance=bank.covariance - narrower[:, None, None] * gain[:, :, None] * gain[:, None, :],
         log_weight=bank.log_weight + np.log(total),
     )

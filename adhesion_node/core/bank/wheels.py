@@ -40,6 +40,10 @@ LEARNING_MPS = 5.0
 """Radii are learnt from this speed on."""
 
 
+RISEN = 1.02
+"""Times its lowest speed from which the fastest rim has risen, more than by noise."""
+
+
 class WheelsSeen(NamedTuple):
     """What is known of the axles."""
 
@@ -55,6 +59,10 @@ class WheelsSeen(NamedTuple):
     """When each was last seen to roll."""
     trusted_ns: int = 0
     """When the fastest rim was last taken for the train's speed."""
+    lowest_mps: float = math.inf
+    """Speed of the fastest rim at its lowest since the brake was applied."""
+    recovered: bool = False
+    """Whether it has risen since: a train under the brake does not, so it slid and rolls again."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
         """Take in the speeds of all axles while that of one which rolls is known so.
@@ -104,6 +112,11 @@ class WheelsSeen(NamedTuple):
     def fastest(self, rims: list[float]) -> float:
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
         return max(rims) * (1.0 - 0.5 * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
+
+    def beside(self, fastest_mps: float) -> WheelsSeen:
+        """Note how fast the fastest rim is under the brake."""
+        lowest = min(self.lowest_mps, fastest_mps)
+        return self._replace(lowest_mps=lowest, recovered=self.recovered or fastest_mps > RISEN * lowest)
 
     def share(self, now_ns: int) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""

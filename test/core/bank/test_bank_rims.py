@@ -15,7 +15,6 @@ import math
 import numpy as np
 import pytest
 from banks import S, bank_of
-from scipy.special import ndtr
 from scipy.stats import norm
 
 from adhesion_node.core.bank.following import Memory, followed, met
@@ -24,9 +23,8 @@ from adhesion_node.core.bank.learnt import learnt
 from adhesion_node.core.bank.rims import (
     CREEP,
     FASTEST_SHARE,
-    MODES,
-    SLIDING,
-    SLOWEST,
+    ROLLS,
+    SLIDES,
     as_fast,
     not_slower,
     rim_speed,
@@ -35,6 +33,7 @@ from adhesion_node.core.bank.rims import (
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import Measurement, WheelSample
+from adhesion_node.core.physics.train import Array
 
 CONFIG = Config(method="bank")
 BANK = bank_of([1, 2, 3, 1])
@@ -76,12 +75,8 @@ def test_the_fastest_rim_is_the_trains_speed_or_slides(off: float) -> None:
     bank = ALONE.with_fresh(RADIUS, 0.0, 0.0).with_fresh(SPEED, 40.0, 0.4)
     rim = (40.0 + off) / (1.0 + CREEP)
     after = as_fast(bank, rim)
-    speed = np.linspace(34.0, 46.0, 24001)
-    errors = [rim * share for _, share in MODES]
-    slower = float(ndtr(-off / math.hypot(0.4, errors[0])))
-    likely = np.full(speed.size, SLIDING / (SLOWEST * rim) * slower)
-    for (prior, _), error, part in zip(MODES, errors, (1.0, 2.0 * slower), strict=True):
-        likely += prior * part * norm.pdf(40.0 + off, speed, error)
+    speed, error = np.linspace(34.0, 46.0, 24001), ROLLS * rim
+    likely = norm.pdf(40.0 + off, speed, error) + SLIDES / error
     density = norm.pdf(speed, 40.0, 0.4) * likely
     total = density.sum()
     mean = float((density * speed).sum() / total)
@@ -91,13 +86,12 @@ def test_the_fastest_rim_is_the_trains_speed_or_slides(off: float) -> None:
     assert after.log_weight - bank.log_weight == pytest.approx(math.log(total * (speed[1] - speed[0])), abs=1e-4)
 
 
-def test_a_rim_far_below_the_train_moves_nothing_and_one_far_above_is_clipped() -> None:
-    slid = as_fast(BANK, 33.0)
-    assert slid.mean == pytest.approx(BANK.mean, abs=0.02)
-    assert slid.covariance == pytest.approx(BANK.covariance, rel=0.05, abs=0.01)
-    fast = as_fast(BANK, 1000.0)
-    assert np.all(np.isfinite(fast.mean))
-    assert fast.is_sound()
+@pytest.mark.parametrize("rim", [33.0, 1000.0])
+def test_a_rim_that_no_hypothesis_foresees_moves_nothing(rim: float) -> None:
+    after = as_fast(BANK, rim)
+    assert after.mean == pytest.approx(BANK.mean, abs=1e-2)
+    assert after.covariance == pytest.approx(BANK.covariance, rel=0.05, abs=1e-2)
+    assert np.ptp(after.log_weight - BANK.log_weight) < 1e-2
 
 
 def test_unbraked_a_rim_tells_of_radius_and_speed_alike() -> None:
@@ -111,8 +105,8 @@ def test_unbraked_a_rim_tells_of_radius_and_speed_alike() -> None:
     assert np.all(after.mean[:, RADIUS] > 0.0)
 
 
-def travelled(seconds: float, creep: np.ndarray | float = 0.0, slowing: float = 0.0) -> tuple[Memory, float]:
-    """Half of the way at 30 m/s unbraked, half under the full brake; positions err slowly by 2 m, seeds of 3."""
+def travelled(seconds: float, creep: Array | float = 0.0, slowing: float = 0.0) -> tuple[Memory, float]:
+    """Half of the time at 30 m/s unbraked, half under the full brake; positions err slowly by 2 m."""
     rng, memory, offset, place, speed = np.random.default_rng(3), None, 0.0, 0.0, 30.0
     for index in range(round(10.0 * seconds)):
         t_ns, braked = S + index * S // 10, index >= 5.0 * seconds
@@ -139,8 +133,8 @@ def test_worn_wheels_tell_the_speed_of_a_train_whose_positions_wander() -> None:
     assert memory.bank.mean_of(SPEED) == pytest.approx(speed, rel=0.01)
 
 
-@pytest.mark.parametrize("creep", [np.array([0.001, 0.1, 0.2, 0.15]), np.full(4, 0.12)])
-def test_axles_that_slide_do_not_slow_the_train(creep: np.ndarray) -> None:
-    """30 s, the second half under the brake at 0.6 m/s^2: one axle rolls, or all slide as one by an eighth."""
+@pytest.mark.parametrize("creep", [np.array([0.001, 0.1, 0.2, 0.15]), np.full(4, 0.08), np.full(4, 0.12)])
+def test_axles_that_slide_do_not_slow_the_train(creep: Array) -> None:
+    """30 s, the second half under the brake at 0.6 m/s^2: one axle rolls, or all slide as one to the end."""
     memory, speed = travelled(30.0, creep, 0.6)
     assert memory.bank.mean_of(SPEED) == pytest.approx(speed, rel=0.02)
