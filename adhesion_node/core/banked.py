@@ -50,8 +50,8 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     before = memory.bank
 
     def rail() -> Rail:
-        mean, _ = before.moments()
-        return _here(config, state, measurement.t_ns, Gaussian(mean[:2], np.zeros((2, 2))))
+        mean, _ = before.moments(2)
+        return _here(config, state, measurement.t_ns, Gaussian(mean, np.zeros((2, 2))))
 
     off = bank.off(config, memory, measurement)
     stepping = state.stepping.after(config, memory, measurement, off)
@@ -107,25 +107,23 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     newest, memory, knowledge = state.newest, state.memory, state.knowledge
     assert newest is not None  # an estimate follows an accepted measurement
     assert memory is not None
-    mean, covariance = memory.bank.moments()
-    belief = Gaussian(mean[:2], covariance[:2, :2])
-    nothing = unknown(config, float(mean[1]))
-    before = knowledge.aged(config, newest.t_ns, belief)
+    belief = Gaussian(*memory.bank.moments(2))
+    nothing = unknown(config, float(belief.mean[1]))
+    before = knowledge.aged(config, newest.t_ns, belief, nothing)
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
         before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
-    verdict = _verdict(memory, findings)._replace(changed=memory.changes > knowledge.changes)
-    knowledge = knowledge.after(newest.t_ns, verdict._replace(rail=findings.known))
-    estimate = estimate_of(newest.t_ns, verdict, knowledge.changes)._replace(
-        ahead=findings.ahead, withheld=memory.misled
-    )
+    verdict = _verdict(memory, findings, memory.changes > knowledge.changes)
+    knowledge = knowledge.after(newest.t_ns, verdict, findings.known)
+    estimate = estimate_of(newest.t_ns, verdict, knowledge.changes, findings.ahead, memory.misled)
     memory = memory._replace(log_likelihood=0.0)
     return state._replace(memory=memory, knowledge=knowledge, since_estimate=0, seen=estimate), estimate
 
 
 def _here(config: Config, state: State, t_ns: int, belief: Gaussian) -> Rail:
     """The rail as this train knows it, aged, and as earlier trains saw it here."""
-    return _informed(config, state.knowledge.aged(config, t_ns, belief), t_ns, belief)
+    nothing = unknown(config, float(belief.mean[1]))
+    return _informed(config, state.knowledge.aged(config, t_ns, belief, nothing), t_ns, belief)
 
 
 def _informed(config: Config, rail: Rail, t_ns: int, belief: Gaussian) -> Rail:
@@ -135,14 +133,14 @@ def _informed(config: Config, rail: Rail, t_ns: int, belief: Gaussian) -> Rail:
     return config.rail_map.informed(rail, way, config.speed_law, config.map_trust)
 
 
-def _verdict(memory: bank.Memory, findings: Findings) -> Verdict:
+def _verdict(memory: bank.Memory, findings: Findings, changed: bool) -> Verdict:
     fit = Fit(
         window=memory.seen,
         iterations=int(memory.braked),
         log_likelihood=memory.log_likelihood,
         ess=float(1.0 / np.sum(memory.bank.weight**2)),
     )
-    return Verdict(findings.regime, findings.rail, findings.belief, None, fit=fit)
+    return Verdict(findings.regime, findings.rail, findings.belief, None, fit=fit, changed=changed)
 
 
 def last_banked(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:

@@ -75,22 +75,21 @@ class Knowledge(NamedTuple):
     astray_ns: int | None = None
     """Since when the speed of the windows has been away from the tracker's; None: it is not."""
 
-    def aged(self, config: Config, t_ns: int, belief: Gaussian) -> Rail:
-        """The rail as it was known, aged to `t_ns` and the belief of (s, v); ignorance before the first window."""
-        nothing = unknown(config, float(belief.mean[1]))
+    def aged(self, config: Config, t_ns: int, belief: Gaussian, nothing: Rail) -> Rail:
+        """The rail as it was known, aged to `t_ns` and the belief of (s, v); before the first window `nothing`."""
         if self.rail is None:
             return nothing
         elapsed = (t_ns - self.t_ns) * 1e-9 / config.memory_s
         travelled = abs(float(belief.mean[0]) - self.position_m) / config.memory_m
         return age(self.rail, nothing, elapsed + travelled)
 
-    def after(self, t_ns: int, verdict: Verdict) -> Knowledge:
-        """What is known after a verdict."""
+    def after(self, t_ns: int, verdict: Verdict, learnt: Rail | None = None) -> Knowledge:
+        """What is known after a verdict, of the rail what is `learnt`, if that is not what is told."""
         return Knowledge(
             windows=self.windows + (verdict.fit.window > 0),
             mu=self.mu if verdict.mu is None else verdict.mu,
             changes=self.changes + verdict.changed,
-            rail=verdict.rail,
+            rail=verdict.rail if learnt is None else learnt,
             t_ns=t_ns,
             position_m=float(verdict.belief.mean[0]),
         )
@@ -117,7 +116,8 @@ def judge(
     `restart_s` have lost the train, be it by steps of the positions that were none: what they taught is forgotten, and
     a new one begins at the tracker's belief. For a moment it is the tracker that is off, behind a true step.
     """
-    t_ns, rail = newest.t_ns, knowledge.aged(config, newest.t_ns, belief)
+    t_ns, nothing = newest.t_ns, unknown(config, float(belief.mean[1]))
+    rail = knowledge.aged(config, t_ns, belief, nothing)
     if window is None or len(window.samples) < 2:
         verdict = Verdict(Regime.COASTING, rail, belief, window)
         return verdict, knowledge.after(t_ns, verdict)
@@ -138,13 +138,15 @@ def judge(
         return verdict, known._replace(astray_ns=since)
     anew = Knowledge(windows=known.windows, changes=known.changes)
     opened = method.open(belief, window.samples[-1], window)
-    restarted = Verdict(Regime.COASTING, anew.aged(config, t_ns, belief), belief, opened)
+    restarted = Verdict(Regime.COASTING, nothing, belief, opened)
     return restarted, anew.after(t_ns, restarted)
 
 
-def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
+def estimate_of(
+    t_ns: int, verdict: Verdict, changes: int, ahead: Ahead | None = None, withheld: bool = False
+) -> Estimate:
     """Tell a verdict; `changes` of the rail were found so far."""
-    rail, belief = verdict.rail, verdict.belief
+    rail, belief, fit = verdict.rail, verdict.belief, verdict.fit
     position, speed = (float(value) for value in belief.mean)
     return Estimate(
         t_ns=t_ns,
@@ -157,7 +159,9 @@ def estimate_of(t_ns: int, verdict: Verdict, changes: int) -> Estimate:
         position_std_m=belief.position_std,
         speed_std_mps=belief.speed_std,
         changes=changes,
-        **verdict.fit._asdict(),
+        withheld=withheld,
+        ahead=ahead,
+        **fit._asdict(),
     )
 
 

@@ -40,12 +40,11 @@ class Sure(NamedTuple):
         memory = self.memory
         if memory is None or memory.fixes < 2:
             return self.seen
-        mean, covariance = memory.bank.moments()
-        belief = Gaussian(mean[:2], covariance[:2, :2])
+        belief = Gaussian(*memory.bank.moments(2))
         return self.seen._replace(
             t_ns=memory.t_ns,
-            position_m=float(mean[POSITION]),
-            speed_mps=float(mean[SPEED]),
+            position_m=float(belief.mean[POSITION]),
+            speed_mps=float(belief.mean[SPEED]),
             position_std_m=belief.position_std,
             speed_std_mps=belief.speed_std,
         )
@@ -100,7 +99,7 @@ class State(NamedTuple):
     def followed_mps(self) -> float:
         """Speed that the train is believed to have, m/s; NaN where nothing is."""
         if self.memory is not None:
-            return float(self.memory.bank.moments()[0][SPEED])
+            return float(self.memory.bank.moments(2)[0][SPEED])
         return math.nan if self.belief is None else float(self.belief.mean[1])
 
     @property

@@ -142,9 +142,8 @@ class Memory(NamedTuple):
 def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen | None) -> Memory:
     """Take a position in; the first one places the train, with what there is of slow error in it."""
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
-    course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked)
-    if predicted is not None:
-        course = course.deviating(measurement.t_ns, predicted.stds)
+    off = None if predicted is None else predicted.stds
+    course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked, off)
     known = predicted if predicted is not None and predicted.bank is bank else None
     if known is not None or memory.is_placed:
         if known is not None:
@@ -336,8 +335,8 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         return memory._replace(bank=opened(config, bank, known), since_s=0.0, seen=1, told_s=told_s, known=known)
     if memory.braked and not braked:
         return memory._replace(bank=closed(bank), seen=0)
-    if not memory.braked:
-        return memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
+    if not memory.braked:  # one hypothesis has nothing beside it that could be forgotten
+        return memory if bank.kind.size == 1 else memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):
             return misled(config, memory)
@@ -346,7 +345,7 @@ def _judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         bank = branched(config, bank, memory.braking, now_s, memory.since_s)
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
-    return _with_changes(config, memory._replace(bank=pruned(bank), seen=memory.seen + 1))
+    return _with_changes(config, memory, pruned(bank))
 
 
 def misled(config: Config, memory: Memory) -> Memory:
@@ -366,24 +365,24 @@ def _led_again(memory: Memory) -> Memory:
     return memory._replace(bank=bank, misled=False, course=Course())
 
 
-def _with_changes(config: Config, memory: Memory) -> Memory:
+def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
     """Tell a change of the rail once it is certain and passed, and the adhesion used another than before any doubt.
 
     That axles roll, where they slid before, is one, too. While the brake may still build up none is told.
     """
-    bank, now_s, held = memory.bank, memory.t_ns / S, HELD if memory.slid else PASSING
+    now_s, held, seen = memory.t_ns / S, HELD if memory.slid else PASSING, memory.seen + 1
     changed, passing, sliding = weighing.changing(
         bank.log_weight, bank.changed_s, bank.kind, SLIDES, memory.told_s + 1e-6, PASSING, held
     )
     settling = now_s < memory.told_s
     if not settling and (DOUBTED <= changed < CERTAIN or passing > PASSED):
-        return memory
+        return memory._replace(bank=bank, seen=seen)
     steady, slid = (bank, memory.braking), sliding > SLID
     if settling or changed < DOUBTED:
-        return memory._replace(steady=steady, slid=slid)
+        return memory._replace(bank=bank, seen=seen, steady=steady, slid=slid)
     before = 0.0 if memory.steady is None else _used(config, *memory.steady)
     changes = memory.changes + (abs(_used(config, *steady) - before) > CHANGED * before)
-    return memory._replace(told_s=now_s, changes=changes, steady=steady, slid=slid)
+    return memory._replace(bank=bank, seen=seen, told_s=now_s, changes=changes, steady=steady, slid=slid)
 
 
 def _used(config: Config, bank: Bank, braking: Braking) -> float:

@@ -77,9 +77,9 @@ class Bank(NamedTuple):
         """A copy of the chosen hypotheses, with the weights that they have."""
         return Bank._make(column[chosen] for column in self)
 
-    def moments(self) -> tuple[Array, Array]:
-        """Mean and covariance over all hypotheses, shapes (SIZE,) and (SIZE, SIZE)."""
-        return uniting.moments(self.log_weight, self.mean, self.covariance)
+    def moments(self, size: int = SIZE) -> tuple[Array, Array]:
+        """Mean and covariance of the first components over all hypotheses, shapes (size,) and (size, size)."""
+        return uniting.moments(self.log_weight, self.mean, self.covariance, size)
 
     def mean_of(self, component: int) -> float:
         """Mean of one component over all hypotheses."""

@@ -64,19 +64,18 @@ class Course(NamedTuple):
     samples: float = 0.0
     """... and how many they are."""
 
-    def deviating(self, t_ns: int, off: float) -> Course:
-        """With the next deviation, in standard deviations by the hypothesis nearest."""
-        off, fading = min(max(off, -FAR), FAR), math.exp(-abs(t_ns - self.off_ns) / (ALIKE_S * S))
-        alike, samples = fading * self.alike + off * self.off, fading * self.samples + 1.0
-        return self._replace(off_ns=t_ns, off=off, alike=alike, samples=samples)
-
-    def after(self, t_ns: int, position_m: float, braked: bool) -> Course:
-        """With the next position."""
+    def after(self, t_ns: int, position_m: float, braked: bool, off: float | None) -> Course:
+        """With the next position, and how far off it is in standard deviations by the hypothesis nearest, if known."""
         first, end = bisect_left(self.recent, (t_ns - SPAN_NS,)), bisect_left(self.recent, (t_ns,))
-        recent = (*self.recent[first:end], (t_ns, position_m))
-        if not braked:
-            return Course(recent)
-        return self._replace(recent=recent, braked_ns=t_ns if self.braked_ns is None else self.braked_ns)
+        before = self if braked else Course()
+        recent, braked_ns = (*self.recent[first:end], (t_ns, position_m)), before.braked_ns
+        if braked_ns is None and braked:
+            braked_ns = t_ns
+        if off is None:
+            return before._replace(recent=recent, braked_ns=braked_ns)
+        off, fading = min(max(off, -FAR), FAR), math.exp(-abs(t_ns - before.off_ns) / (ALIKE_S * S))
+        alike, samples = fading * before.alike + off * before.off, fading * before.samples + 1.0
+        return Course(recent, braked_ns, t_ns, off, alike, samples)
 
     @property
     def runs_off(self) -> bool:

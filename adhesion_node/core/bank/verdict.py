@@ -105,8 +105,8 @@ class Findings(NamedTuple):
 def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findings:
     """Judge the bank; `before` is the rail as it was known, aged to now, `nothing` what is known of any rail."""
     bank = memory.bank
-    mean, covariance = bank.moments()
-    belief = Gaussian(mean[:2], covariance[:2, :2] + SPEED_ERROR)
+    mean, covariance = bank.moments(2)
+    belief = Gaussian(mean, covariance + SPEED_ERROR)
     if memory.misled:
         return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower), nothing)
     if not memory.braked and memory.brake.known:

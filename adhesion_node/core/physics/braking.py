@@ -56,15 +56,16 @@ def curve(
     lost = max(speed_mps - target_mps, 0.0)
     every = target_mps + lost * _EVERY
     found = _deceleration(train, every, mu, grade)
-    weakest = float(found.min())
+    weakest = float(np.minimum.reduce(found))  # what found.min() calls
     if not weakest > 0.0:
         raise ValueError(f"braking curve: deceleration {weakest:.4g} m/s^2 at grade {grade:g}: the train does not slow")
     inner, slowing = every[POINTS:].reshape(-1, _NODES.size), found[POINTS:].reshape(-1, _NODES.size)
+    weights = _HALF * lost * _WEIGHTS
     return BrakingCurve(
-        distance_m=_cumulate(inner / slowing @ (_HALF * lost * _WEIGHTS)),
+        distance_m=_cumulate(inner / slowing @ weights),
         speed_mps=every[:POINTS],
         deceleration_mps2=found[:POINTS],
-        time_s=_cumulate(1.0 / slowing @ (_HALF * lost * _WEIGHTS)),
+        time_s=_cumulate(1.0 / slowing @ weights),
     )
 
 

@@ -42,29 +42,29 @@ class Pruning(NamedTuple):
 
 @kernel
 def _united(weight: Array, mean: Array, covariance: Array, group: Labels, centre: Array, spread: Array) -> float:
-    """Write mean and covariance of a mixture of some hypotheses; return their weight."""
-    whole = 0.0
+    """Write mean and covariance of a mixture of some hypotheses, of their first components; return their weight."""
+    whole, size = 0.0, centre.size
     for h in group:
         whole += weight[h]
     centre[:] = 0.0
     spread[:] = 0.0
     for h in group:
         share = weight[h] / whole
-        for i in range(SIZE):
+        for i in range(size):
             centre[i] += share * mean[h, i]
     for h in group:
         share = weight[h] / whole
-        for i in range(SIZE):
+        for i in range(size):
             off = mean[h, i] - centre[i]
-            for j in range(SIZE):
+            for j in range(size):
                 spread[i, j] += share * (covariance[h, i, j] + off * (mean[h, j] - centre[j]))
     return whole
 
 
 @kernel
-def moments(log_weight: Array, mean: Array, covariance: Array) -> tuple[Array, Array]:
-    """Mean and covariance of the mixture."""
-    centre, spread = np.empty(SIZE), np.empty((SIZE, SIZE))
+def moments(log_weight: Array, mean: Array, covariance: Array, size: int) -> tuple[Array, Array]:
+    """Mean and covariance of the first components of the mixture."""
+    centre, spread = np.empty(size), np.empty((size, size))
     weight = np.exp(log_weight - log_weight.max())
     _united(weight, mean, covariance, np.arange(weight.size), centre, spread)
     return centre, spread
