@@ -83,12 +83,12 @@ class McapRecording:
             for number, file in enumerate(self._files)
             for block in file.blocks
         )
+        topics = [{at: info for at, info in file.topics.items() if wanted(info.name)} for file in self._files]
         pending: list[tuple[int, int, int, int, Record]] = []
         for (_, number, offset, block), following in zip_longest(blocks, blocks[1:]):
-            file = self._files[number]
-            for index, (channel, log_ns, cdr) in enumerate(file.messages(block)):
-                info = file.topics[channel]
-                if wanted(info.name):
+            of_channel = topics[number].get
+            for index, (channel, log_ns, cdr) in enumerate(self._files[number].messages(block)):
+                if (info := of_channel(channel)) is not None:
                     pending.append((log_ns, number, offset, index, Record(info.name, info.type, cdr, log_ns)))
             pending.sort()
             ready = bisect_left(pending, following[:1]) if following else len(pending)

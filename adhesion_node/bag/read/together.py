@@ -76,12 +76,12 @@ def read_together(
     """
     every = iter(records)
     while some := list(islice(every, MOST_TOGETHER)):
+        kinds = [(record.topic, len(record.cdr)) for record in some]
         alike = defaultdict[tuple[str, int], list[bytes]](list)
-        for record in some:
-            alike[record.topic, len(record.cdr)].append(record.cdr)
-        read = {each: iter(_read(topics.get(each[0]), cdrs, line)) for each, cdrs in alike.items()}
-        for record in some:
-            yield record, next(read[record.topic, len(record.cdr)])
+        for kind, record in zip(kinds, some, strict=True):
+            alike[kind].append(record.cdr)
+        read = {kind: iter(_read(topics.get(kind[0]), cdrs, line)) for kind, cdrs in alike.items()}
+        yield from zip(some, map(next, map(read.__getitem__, kinds)), strict=True)
 
 
 def _read(topic: Topic | None, cdrs: Sequence[bytes], line: Line) -> Iterable[Any | None]:
