@@ -42,6 +42,9 @@ it."""
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""
 
+RADIUS_DRIFT = 3e-4
+"""Of what the rims are too fast by, within 1 s: they creep a little as traction changes."""
+
 
 HALF_AT_MPS = 30.0
 """Where a law that depends on the speed half as much meets the other: slide protection levels out what it uses."""
@@ -163,7 +166,7 @@ def model_of(config: Config) -> moving.Model:
         noises=np.column_stack((kinds.WHITE, kinds.SLOW, kinds.LASTS)),
         lengths=np.array([kinds.ROUGHNESS_M, kinds.GRADE_M]),
         free=np.array([kinds.FREE_STD, kinds.FREE_S]),
-        rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2]),
+        rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2, RADIUS_DRIFT**2]),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),
         building_up=BUILDING_UP,

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, kinds, motion, verdict
 from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
-from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SPEED, Bank, joined
+from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, RADIUS, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance
 from adhesion_node.core.bank.seeing import CLIPPED, ROLLED, Observation
 from adhesion_node.core.belief.rail import Rail
@@ -91,6 +91,7 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)
     noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
     noise[:, BIAS] = motion.BIAS_DRIFT**2 * dt_s
+    noise[:, RADIUS] = motion.RADIUS_DRIFT**2 * dt_s
     return lasting, noise
 
 

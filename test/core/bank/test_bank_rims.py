@@ -105,15 +105,22 @@ def test_unbraked_a_rim_tells_of_radius_and_speed_alike() -> None:
     assert np.all(after.mean[:, RADIUS] > 0.0)
 
 
-def travelled(seconds: float, creep: Array | float = 0.0, slowing: float = 0.0) -> tuple[Memory, float]:
-    """Half of the time at 30 m/s unbraked, half under the full brake; positions err slowly by 2 m."""
+def travelled(
+    seconds: float, creep: Array | float = 0.0, slowing: float = 0.0, from_s: float | None = None, driven: float = 0.0
+) -> tuple[Memory, float]:
+    """At 30 m/s unbraked, the second half under the full brake, or from `from_s` on; positions err slowly by 2 m.
+
+    Of `driven` wheels the rims are faster by so much, by turns for 40 s.
+    """
+    from_s = seconds / 2.0 if from_s is None else from_s
     rng, memory, offset, place, speed = np.random.default_rng(3), None, 0.0, 0.0, 30.0
     for index in range(round(10.0 * seconds)):
-        t_ns, braked = S + index * S // 10, index >= 5.0 * seconds
+        t_ns, braked = S + index * S // 10, 0.1 * index >= from_s
         offset += -offset / 300.0 + 2.0 * math.sqrt(2.0 / 300.0) * rng.standard_normal()
         slower = speed - 0.1 * slowing * braked
         place, speed = place + 0.05 * (speed + slower), slower
-        rates = speed * (1.0 - creep * braked) / (0.46 * WORN) * (1.0 + 0.003 * rng.standard_normal(4))
+        drive = driven * (index // 400 % 2)
+        rates = speed * (1.0 - creep * braked + drive) / (0.46 * WORN) * (1.0 + 0.003 * rng.standard_normal(4))
         wheels = (WheelSample(t_ns, tuple(rates.tolist())),)
         seen = place + offset + 0.1 * rng.standard_normal()
         measured = Measurement(t_ns, seen, 4.0, 410e3 * braked, wheels=wheels)
@@ -138,3 +145,12 @@ def test_axles_that_slide_do_not_slow_the_train(creep: Array) -> None:
     """30 s, the second half under the brake at 0.6 m/s^2: one axle rolls, or all slide as one to the end."""
     memory, speed = travelled(30.0, creep, 0.6)
     assert memory.bank.mean_of(SPEED) == pytest.approx(speed, rel=0.02)
+
+
+def test_after_a_long_way_the_speed_is_not_surer_than_wheels_that_drive() -> None:
+    """10 minutes in which traction makes every rim 0.3 % faster by turns."""
+    memory, speed = travelled(600.0, from_s=math.inf, driven=0.003)
+    mean, covariance = memory.bank.moments()
+    assert 0.001 * speed < math.sqrt(covariance[SPEED, SPEED]) < 0.01 * speed
+    assert abs(mean[SPEED] - speed) < 3.0 * math.sqrt(covariance[SPEED, SPEED])
+    assert learnt(memory)["rim_speed_error_std"] > 0.001

@@ -27,7 +27,7 @@ ModelNumbers = tuple[float, Array, Array, Array, Array, Array, Array, Array, Arr
 StepNumbers = tuple[float, float, float, bool, float, float]
 
 GRAVITY = 9.8
-POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 11
+POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, RADIUS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10, 11
 
 
 class Model(NamedTuple):
@@ -51,7 +51,7 @@ class Model(NamedTuple):
     free: Array
     """Deviation of what is used without brakes, and how long it lasts, s."""
     rates: Array
-    """Variances per second of position, brake and bias."""
+    """Variances per second of position, brake, bias and radius."""
     grade_error: float
     resistance_error: float
     building_up: float
@@ -132,7 +132,8 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
     lasting, added = np.ones(SIZE), np.zeros(SIZE)
     fall, by_fall, by_way = np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
     free = math.exp(-dt / model.free[1])
-    added[POSITION], added[BRAKE], added[BIAS] = dt * model.rates[0], dt * model.rates[1], dt * model.rates[2]
+    added[POSITION], added[BRAKE] = dt * model.rates[0], dt * model.rates[1]
+    added[BIAS], added[RADIUS] = dt * model.rates[2], dt * model.rates[3]
     for h in range(kind.size):
         x, p, k = mean[h], covariance[h], kind[h]
         v, n = x[SPEED], model.noises[noise[h]]
