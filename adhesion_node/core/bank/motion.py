@@ -70,6 +70,8 @@ class Use(NamedTuple):
     slope: Array
     slides: Mask
     """Whether the adhesion limits, shape (H,)."""
+    resisting: Array
+    """The resistance at which, N/N, shape (H,)."""
 
     def std(self, bank: Bank) -> Array:
         """Standard deviations, shape (H,)."""
@@ -90,7 +92,7 @@ def resistance(config: Config, bank: Bank) -> Array:
 
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
-    return Use(*moving.used(model_of(config)[:], bank[:], resisting, _step(0.0, braking, 0.0)))
+    return Use(*moving.used(model_of(config)[:], bank[:], resisting, _step(0.0, braking, 0.0)), resisting)
 
 
 def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:

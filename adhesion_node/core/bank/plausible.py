@@ -96,22 +96,27 @@ class Course(NamedTuple):
         newest_ns, newest_m = self.recent[-1]
         time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
         places = np.array([place_m - newest_m for _, place_m in self.recent])
+        white, slow = _errors(bank, declared_m)
         for span_s, sigma in LOOKS:
             first = int(time.searchsorted(-span_s))
             count = time.size - first
             if count < LEAST or time[first] > -0.8 * span_s:
                 continue
             slowing = -2.0 * parabola.curvature(time[first:], places[first:])
-            error = sigma * _error(bank, declared_m, span_s, count)
+            error = sigma * _error(white, slow, span_s, count)
             long = self.recent[first][0] - self.braked_ns >= BRAKED_NS
             if slowing > most + error or (long and slowing < -GAIN_MPS2 - GRAVITY * grade - error):
                 return True
         return False
 
 
-def _error(bank: Bank, declared_m: float, span_s: float, count: int) -> float:
-    """Standard deviation of the parabola's deceleration, m/s^2, by white errors and by the worst that wander."""
-    white = 720.0 * float(bank.weight @ white_variance(bank, declared_m)) / (count * span_s**4)
+def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:
+    """Mean variance of the white errors, m^2, and of the worst that wander over the time that they last, m^2/s."""
+    white = float(bank.weight @ white_variance(bank, declared_m))
     slow = [max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in kinds.NOISES]
-    wander = 17.0 * 2.0 * max(slow[noise] for noise in {RECEIVER, *bank.noise.tolist()}) / span_s**3
-    return math.sqrt(white + wander)
+    return white, max(slow[noise] for noise in {RECEIVER, *bank.noise.tolist()})
+
+
+def _error(white: float, slow: float, span_s: float, count: int) -> float:
+    """Standard deviation of the parabola's deceleration, m/s^2, by white errors and by the worst that wander."""
+    return math.sqrt(720.0 * white / (count * span_s**4) + 34.0 * slow / span_s**3)

@@ -22,9 +22,9 @@ from ..physics.train import Array
 from ..setting import once
 from . import kinds
 from .following import SPEED_ERROR_MPS, Memory, S
-from .kernels import mixture
+from .kernels import mixture, weighing
 from .layout import SPEED, Bank
-from .motion import Braking, model_of, resistance, use
+from .motion import Braking, Use, model_of, resistance, use
 from .seeing import ROLLED
 
 if TYPE_CHECKING:
@@ -122,7 +122,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
         return Findings(Regime.COASTING, free, belief, constant(before.lower), free)
     missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
-    ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known)
+    ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known, used)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, least)
@@ -164,24 +164,25 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
 def _borne_out(memory: Memory) -> Bank:
     """Without what has only just come to mind: that the rail may change this moment is always possible."""
     bank = memory.bank
-    passing = bank.kind == kinds.PASSING
-    counts = ~passing | (bank.weight @ passing > BORDER)
-    old = counts & (memory.t_ns / S - bank.born_s >= BORNE_OUT_S) | (bank.weight > BORNE_OUT)
-    return bank._replace(log_weight=np.where(old, bank.log_weight, -np.inf)).normalised() if old.any() else bank
+    age_s, limits = memory.t_ns / S - bank.born_s, (BORNE_OUT_S, BORNE_OUT, kinds.PASSING, BORDER)
+    return bank._replace(log_weight=weighing.borne_out(bank.log_weight, age_s, bank.kind, *limits))
 
 
-def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, known: Rail) -> Ahead:
+def counted_on(
+    config: Config, bank: Bank, missed: float, braking: Braking, known: Rail, used: Use | None = None
+) -> Ahead:
     """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill.
 
     What is known of roughness and grade here fades along the way, and the way takes the mean of them. Axles that roll
     under a weak brake leave the bound as it was `known` when the braking began: the whole brake may make them slide.
+    `used` is what each hypothesis uses now, if that is at hand.
     """
-    resisting = resistance(config, bank)
-    used, weight = use(config, bank, braking, resisting), bank.weight
+    used = use(config, bank, braking, resistance(config, bank)) if used is None else used
+    weight = bank.weight
     speeds = float(weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD
     borne = ROLLED[0] / ROLLED[1] if _is_partial(config, braking) else 1.0
     asked = mixture.Asked(float(missed), borne, float(known.lower))
-    low = mixture.counted_on(_ahead_of(config), bank, weight, used, resisting, speeds, asked)
+    low = mixture.counted_on(_ahead_of(config), bank, weight, used, speeds, asked)
     return Ahead(tuple(speeds.tolist()), tuple(low.tolist()))
 
 

@@ -42,7 +42,7 @@ def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> motio
     held = np.where(free, 0.0, (1.0 - sliding) / (1.0 + rotating))
     slope[:, BRAKE] = held * braking.applied
     slope[:, SPEED] = -held * rotating * config.train.resistance_slope(mean[:, SPEED])
-    return motion.Use(np.where(free, mean[:, MU], sliding * rail + (1.0 - sliding) * needed), slope, slides)
+    return motion.Use(np.where(free, mean[:, MU], sliding * rail + (1.0 - sliding) * needed), slope, slides, resisting)
 
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:

@@ -140,7 +140,7 @@ def test_the_error_of_a_parabola_is_that_of_white_and_wandering_positions(std_m:
         slow[:, index] = kept * slow[:, index - 1] + math.sqrt(1.0 - kept**2) * steps[:, index]
     errors = slow + std_m * rng.standard_normal(slow.shape)
     drawn = 2.0 * np.polyfit(np.arange(count) * H, errors.T, 2)[0].std()
-    assert plausible._error(bank_of([1]), std_m, span_s, count) == pytest.approx(drawn, rel=0.25)
+    assert plausible._error(*plausible._errors(bank_of([1]), std_m), span_s, count) == pytest.approx(drawn, rel=0.25)
 
 
 @pytest.mark.parametrize("tails", [math.inf, 2.0])

@@ -140,7 +140,6 @@ def counted_on(
     bank: Bank,
     weight: Array,
     used: Use,
-    resisting: Array,
     speeds: Array,
     asked: Asked,
 ) -> Array:
@@ -155,7 +154,7 @@ def counted_on(
         x, u, grade, k = mean[h], used.value[h], mean[h, GRADE], bank.kind[h]
         slope, slides = used.slope[h], used.slides[h]
         speed = max(x[SPEED], 1.0)
-        slowing = GRAVITY * max(u + resisting[h] + grade, 0.005)
+        slowing = GRAVITY * max(u + used.resisting[h] + grade, 0.005)
         way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
         rough_kept, rough_added = _mean_ahead(way_m, rule.lengths[0])
         grade_kept, grade_added = _mean_ahead(way_m, rule.lengths[1])

@@ -67,6 +67,25 @@ def changing(
 
 
 @kernel
+def borne_out(
+    log_weight: Array, age_s: Array, kind: Labels, after_s: float, likely: float, passing: int, border: float
+) -> Array:
+    """Weights of those alone that are as old as `after_s`, or `likely`; of all, where none is.
+
+    What says `passing` counts by its age only where all of it together is more probable than `border`.
+    """
+    passes = 0.0
+    for h in range(kind.size):
+        passes += math.exp(log_weight[h]) if kind[h] == passing else 0.0
+    kept = np.full(kind.size, -np.inf)
+    for h in range(kind.size):
+        old = age_s[h] >= after_s and (kind[h] != passing or passes > border)
+        if old or math.exp(log_weight[h]) > likely:
+            kept[h] = log_weight[h]
+    return normalised(kept, -np.inf) if kept.max() > -np.inf else log_weight
+
+
+@kernel
 def is_sound(mean: Array, covariance: Array, log_weight: Array) -> bool:
     """Whether every number is finite and no variance below 0."""
     for h in range(log_weight.size):
