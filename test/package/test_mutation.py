@@ -9,27 +9,22 @@
 
 from __future__ import annotations
 
-import importlib.util
+import ast
 import re
 from pathlib import Path
 
 import pytest
 from conftest import ROOT
 
+BODY = ast.parse((ROOT / ".ci" / "mutation.py").read_text(encoding="utf-8")).body
+"""Read, not imported: it needs an extra."""
 
-def arguments(uncompiled: bool) -> list[str]:
-    """What it gives to pytest."""
-    spec = importlib.util.spec_from_file_location("mutation", ROOT / ".ci" / "mutation.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return list(module.TESTS[uncompiled])
+(TESTS,) = (each.value for each in BODY if isinstance(each, ast.Assign) and ast.unparse(each.targets[0]) == "TESTS")
 
 
 @pytest.mark.parametrize("uncompiled", [False, True])
 def test_what_it_names_is_there(uncompiled: bool) -> None:
-    given = arguments(uncompiled)
+    given = eval(ast.unparse(TESTS))[uncompiled]
     paths = [ROOT / one for one in given if one.startswith(("test/", "adhesion_node/"))]
     assert paths
     assert [path for path in paths if not path.exists()] == []
