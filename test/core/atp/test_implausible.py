@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from test_supervision import CONFIG, CURVE, GOOD_STATE, NEEDED_M, NOW_NS, SECOND_NS, constant
 
-from adhesion_node.core.atp.plausibility import COURSE_S, MAX_EXCESS_MPS, Course
+from adhesion_node.core.atp.plausibility import COURSE_S, MAX_EXCESS_MPS, Course, _misplaced
 from adhesion_node.core.atp.received import StampedCurve, TrainState
 from adhesion_node.core.atp.supervision import Level, decide
 
@@ -75,6 +75,19 @@ def test_since_its_state_a_train_may_have_accelerated() -> None:
 )
 def test_a_state_that_is_too_unsure_or_ahead_of_time_is_unsafe_and_says_why(state: TrainState, message: str) -> None:
     assert message in judged(state)
+
+
+@pytest.mark.parametrize("seconds", [-1.5, 0.0, 1.5])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_a_curve_may_begin_as_far_off_as_a_train_can_change_its_speed_meanwhile(seconds: float, sign: float) -> None:
+    """By 3 m/s^2 for 1.5 s, 3.375 m; 10 m of margin, and 1 m/s and 2 m for three standard deviations."""
+    state = TrainState(NOW_NS, 1000.0, 40.0, position_std_m=2.0 / 3.0, speed_std_mps=1.0 / 3.0)
+    allowed = 12.0 + abs(seconds) + 1.5 * seconds**2
+    for off, message in ((allowed - 0.1, ""), (allowed + 0.1, "by which the train should be at")):
+        place = 1000.0 - 40.0 * seconds + sign * off
+        curve = CURVE._replace(t_ns=NOW_NS - round(seconds * SECOND_NS), position_m=place)
+        assert message in _misplaced(CONFIG, curve, state)
+        assert bool(message) == bool(_misplaced(CONFIG, curve, state))
 
 
 def test_a_stamp_may_be_a_tenth_of_a_second_ahead() -> None:

@@ -88,10 +88,11 @@ def test_many_accelerations_say_what_their_mean_says_with_a_part_of_the_variance
         CONFIG, met(CONFIG, Measurement(S, 0.0, 0.01, 0.0, 40.0)), Measurement(S + S // 10, 4.0, 0.01, 0.0, 40.0)
     )
     then = S + S // 5
-    one, four = (
+    unfelt, one, four = (
         on(CONFIG, start, Measurement(then, 8.0, 0.01, 0.0, imu=imu))
-        for imu in ((ImuSample(then, -0.2, 0.01),), tuple(ImuSample(then, felt, 0.04) for felt in (-0.1, -0.3) * 2))
+        for imu in ((), (ImuSample(then, -0.2, 0.01),), tuple(ImuSample(then, x, 0.04) for x in (-0.1, -0.3) * 2))
     )
+    assert one.bank.mean_of(MU) > unfelt.bank.mean_of(MU) + 1e-3
     assert one.bank.moments()[0] == pytest.approx(four.bank.moments()[0], rel=1e-9)
     assert one.log_likelihood == pytest.approx(four.log_likelihood, rel=1e-9)
 

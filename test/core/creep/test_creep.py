@@ -23,7 +23,7 @@ from adhesion_node.core.creep.config import FIXED, CreepConfig, Peak
 from adhesion_node.core.creep.curve import adhesion, parameters, peak
 from adhesion_node.core.creep.estimator import CreepEstimate, CreepState, advance, creep_step, init
 from adhesion_node.core.creep.recursion import advance as advance_recursion
-from adhesion_node.core.creep.recursion import begin, full_covariance
+from adhesion_node.core.creep.recursion import begin, full_covariance, is_changing
 from adhesion_node.core.creep.vehicle import CreepSample
 from adhesion_node.core.intake.outcome import Outcome
 from adhesion_node.core.physics.train import Array
@@ -133,6 +133,14 @@ def test_one_surface_is_not_taken_for_another() -> None:
     for seed in range(4):
         state, _ = feed(NOMINAL, init(NOMINAL), samples(DRY, 0.1, 1000, seed))
         assert state.counts[Outcome.CHANGED] == 0
+
+
+def test_noise_of_a_tenth_of_the_peak_is_no_other_surface() -> None:
+    rng, state, seen = np.random.default_rng(5), init(NOMINAL), list[bool]()
+    for each in samples(DRY, 0.1, 1000):
+        state, _ = creep_step(NOMINAL, state, each._replace(adhesion=each.adhesion + 0.035 * rng.standard_normal()))
+        seen.append(is_changing(NOMINAL, state.recursion))
+    assert not any(seen[200:])
 
 
 def test_the_spread_of_the_peak_is_that_of_many_draws() -> None:

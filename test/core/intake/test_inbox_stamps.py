@@ -49,6 +49,7 @@ def test_a_single_stray_stamp_is_set_aside_then_dropped() -> None:
     assert feeder.inbox.suspects == (position(31.0),)
     feeder.push(pressure(1.1, 1.0), position(1.1))
     assert feeder.outcomes == [Outcome.STRAY]
+    assert feeder.details == ["PositionSample of 31 s, +29.9 s from all others"]
     assert not feeder.inbox.suspects
 
 

@@ -123,3 +123,13 @@ def test_particles_are_ordered_along_the_direction_in_which_they_lie_farthest_ap
         *(drawn @ [[math.cos(turned), math.sin(turned)], [-math.sin(turned), math.cos(turned)]]).T
     )
     assert abs(cosine * math.cos(turned) + sine * math.sin(turned)) == pytest.approx(1.0, abs=1e-3)
+
+
+def test_a_particle_that_none_explains_well_goes_to_its_likeliest_ancestors() -> None:
+    """In shares of the weight times the Gaussian density, here of ancestors 30 standard deviations away."""
+    rng = np.random.default_rng(6)
+    places, logs, after = rng.standard_normal((2, 6)), np.log(rng.dirichlet(np.ones(6))), np.array([30.0, -2.0])
+    now = np.full(6, 0.01)
+    smoothing._alone(places, logs, after, 0.3, now)
+    densities = np.exp(logs - 0.5 * ((places - after[:, None]) ** 2).sum(axis=0))
+    assert now == pytest.approx(0.01 + 0.3 * densities / densities.sum(), rel=1e-9)
