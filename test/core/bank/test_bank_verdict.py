@@ -235,6 +235,11 @@ def limits(kind: int, used: float, told: float = 0.0, config: Config = CONFIG) -
 
 
 def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well() -> None:
+    config = replace(CONFIG, brake_std=0.1, mass_std=0.0, rotating_mass_std=0.0)
+    assert limits(SMOOTH, 0.79, config=config) is Regime.ADHESION_LIMITED
+    assert limits(SMOOTH, 0.81, config=config) is Regime.COASTING
+    assert limits(HELD, 0.91, config=config) is Regime.BRAKE_LIMITED
+    assert limits(HELD, 0.89, config=config) is Regime.COASTING
     assert limits(SMOOTH, 0.5) is Regime.ADHESION_LIMITED
     assert limits(SMOOTH, 0.97) is Regime.COASTING
     assert limits(SMOOTH, 0.97, told=4.0) is Regime.ADHESION_LIMITED, "the slide protection says it"

@@ -25,8 +25,12 @@ BRAKE, MU = 0.1, 0.07
 
 
 def used(creeps: list[float]) -> float:
-    """Of a train at 40 m/s whose median wheel creeps so; NaN where none was measured."""
-    samples = [WindowSample(k, BRAKE, 0.0, 1.0, 40.0, math.inf, 40.0 * (1.0 - creep)) for k, creep in enumerate(creeps)]
+    """Of a train at 40 m/s whose median wheel creeps so, NaN where none was measured; the brake has built up."""
+    brakes = np.linspace(0.5 * BRAKE, BRAKE, len(creeps)).tolist()
+    samples = [
+        WindowSample(k, brake, 0.0, 1.0, 40.0, math.inf, 40.0 * (1.0 - creep))
+        for k, (brake, creep) in enumerate(zip(brakes, creeps, strict=True))
+    ]
     return most_used(CONFIG, samples, np.full(len(creeps), 40.0), MU)
 
 
