@@ -114,7 +114,7 @@ class Config:
     window: int = _method(50, "Measurements in a window, S", low=3, high=10_000)
     step: int = _method(5, "Measurements between two windows, L; less than the window", low=1, high=10_000)
     particles: int = _method(20, "Particles, M, of particle_em", low=2, high=100_000)
-    iterations: int = _method(50, "EM iterations at most; particle_em passes half as often", low=1, high=10_000)
+    iterations: int = _method(50, "EM iterations at most; particle_em mostly passes half as often", low=1, high=10_000)
     tolerance: float = _method(1e-6, "EM stops when mu moves less than this, epsilon of (34)", low=0.0, high=1.0)
     start_mu: float = _method(0.05, "Adhesion from which the first window starts", low=0.0, high=1.0)
     confidence: float = _method(0.95, "One-sided confidence of the lower bound", low=0.5, high=0.9999)

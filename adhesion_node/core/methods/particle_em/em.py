@@ -87,7 +87,7 @@ class ParticleEStep:
 
 
 PASSES = 0.5
-"""Of each iteration: averaged, 25 passes of 20 particles leave no more to chance than 50 iterations of them."""
+"""For each iteration where EM arrives; averaged, they leave about as much to chance. Where it stays at its start: 1."""
 
 
 class Search(NamedTuple):
@@ -95,7 +95,7 @@ class Search(NamedTuple):
 
     start: float
     iterations: int
-    """At most; so far it goes in `PASSES` of them."""
+    """At most; as far as these, but in fewer passes."""
     tolerance: float
     """``|mu_k+1 - mu_k|`` below which it has converged (34)."""
     lowest: float = 0.0
@@ -140,7 +140,7 @@ def identify(e_step: EStep, search: Search) -> Identified:
     times its M-step (Robbins and Monro 1951). That leaves the same share q of the start, averages the noise of the
     passes instead of keeping that of the last ones, and gives pass j the weight j, as the first ones are farthest off.
     """
-    passes, mu, done = math.ceil(PASSES * search.iterations), search.start, 0
+    mu, done = search.start, 0
     while True:
         expected = e_step(mu)
         done += 1
@@ -149,6 +149,7 @@ def identify(e_step: EStep, search: Search) -> Identified:
         seen = min(e_step.observed(mu) / float(expected.weight @ (expected.limit >= mu)), 1.0)
         left = kept_of_start(seen, 1.0, search.iterations)
         leap = (1.0 - left) / seen if left < 1.0 else search.iterations
+        passes = math.ceil((PASSES + (1.0 - PASSES) * left) * search.iterations)
         kept = passes * (passes + 1) * left
         slowness = kept + done * (done + 1) * (1.0 - left)
         aim = mu + leap * 2.0 * done / slowness * (maximise(expected, search.lowest) - mu)
