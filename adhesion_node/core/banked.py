@@ -32,14 +32,14 @@ LOST_S = 5.0
 def follow_banked(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Follow the train with a good measurement; a belief whose numbers fail is given up, and met anew."""
     try:
-        with np.errstate(invalid="raise"):
-            return _followed(config, state, measurement)
+        return _followed(config, state, measurement)
     except (ArithmeticError, ValueError) as error:
         return _anew(
             state, Event(Outcome.RESET, f"belief lost ({error}), position x = {measurement.position_m:.12g}")
         ), None
 
 
+@np.errstate(invalid="raise")
 def _followed(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     memory = state.memory
     if memory is None:

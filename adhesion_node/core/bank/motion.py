@@ -92,7 +92,7 @@ def resistance(config: Config, bank: Bank) -> Array:
 
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
-    return Use(*moving.used(model_of(config)[:], bank[:], resisting, _step(0.0, braking, 0.0)), resisting)
+    return Use(*moving.used(model_of(config)[:], bank[:], resisting, (0.0, *braking, 0.0)), resisting)
 
 
 def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
@@ -104,7 +104,7 @@ def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:
     """The beliefs after `dt_s`; `declared_m` is the standard deviation that the positions declare."""
-    mean, covariance = moving.moved(model_of(config)[:], bank[:], _step(dt_s, braking, declared_m))
+    mean, covariance = moving.moved(model_of(config)[:], bank[:], (dt_s, *braking, declared_m))
     return bank.believing(mean, covariance, bank.log_weight)
 
 
@@ -139,16 +139,11 @@ def foreseen(
     position_std_m: float,
 ) -> Foreseen:
     """As `moved`, and how far a position is off, whose declared standard deviation is only a hint."""
-    step = _step(dt_s, braking, declared_m)
+    step = (dt_s, *braking, declared_m)
     mean, covariance, innovation, white, metres, std_m, nearest = moving.foreseen(
         model_of(config)[:], bank[:], step, position_m, position_std_m
     )
     return Foreseen(metres, std_m, nearest, bank.believing(mean, covariance, bank.log_weight), innovation, white)
-
-
-def _step(dt_s: float, braking: Braking, declared_m: float) -> moving.StepNumbers:
-    applied, share, told = float(braking.applied), float(braking.share), float(braking.told)
-    return float(dt_s), applied, share, bool(braking.rising), told, float(declared_m)
 
 
 @once

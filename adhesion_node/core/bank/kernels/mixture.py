@@ -171,10 +171,11 @@ def counted_on(
         if slides:
             variance += x[MU] ** 2 * (rule.rough[k] * rough_added + rule.drift[k] * time_s / 3.0)
         one, rest = math.sqrt(max(variance, 1e-12)), grade * grade_kept
+        law = _law(rule.laws, bank.law[h], speed)
         level = u - slope[ROUGH] * x[ROUGH] * (1.0 - rough_kept)
         for row in range(speeds.size):
             if slides:
-                rising = (_law(rule.laws, bank.law[h], speeds[row]) / _law(rule.laws, bank.law[h], speed)) ** rule.rise
+                rising = (_law(rule.laws, bank.law[h], speeds[row]) / law) ** rule.rise
                 foreseen, spread = level * rising + rest, one * rising
             elif asked.borne * u < asked.known:
                 foreseen, spread = asked.known, 1e-6

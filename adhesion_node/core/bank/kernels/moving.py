@@ -164,10 +164,10 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         pull = -dt * GRAVITY
         fall[MU], fall[ROUGH], fall[BRAKE], fall[GRADE] = pull * by_mu, pull * by_rough, pull * by_brake, pull
         fall[SPEED] = 1.0 + pull * by_speed
-        by_fall[:] = 0.0
-        for j in range(SPEED, GRADE + 1):
-            for i in range(SIZE):
-                by_fall[i] += p[j, i] * fall[j]
+        for i in range(SIZE):
+            by_fall[i] = p[SPEED, i] * fall[SPEED] + p[MU, i] * fall[MU] + p[ROUGH, i] * fall[ROUGH]
+            by_fall[i] += p[BRAKE, i] * fall[BRAKE]
+            by_fall[i] += p[GRADE, i] * fall[GRADE]
         fall_fall, way_fall, way_way = 0.0, 0.0, 0.0
         for i in range(SIZE):
             by_way[i] = p[POSITION, i] + 0.5 * dt * (p[SPEED, i] + by_fall[i])

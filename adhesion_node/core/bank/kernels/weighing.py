@@ -116,6 +116,31 @@ def variances(slope: Array, covariance: Array) -> Array:
 
 
 @kernel
+def _taken_in(
+    before: tuple[Array, Array, float],
+    innovation: float,
+    gain: Array,
+    spread: float,
+    clipped: float,
+    after: tuple[Array, Array],
+) -> float:
+    """Write mean and covariance of one hypothesis behind Kalman's correction, beyond `clipped` deviations Huber's.
+
+    `gain` is P h, `spread` the variance of the `innovation`. Returns the logarithm of its weight times the evidence.
+    """
+    (mean, covariance, log_weight), (means, covariances) = before, after
+    off = abs(innovation) / math.sqrt(spread)
+    lost = 0.5 * off**2 if off <= clipped else clipped * off - 0.5 * clipped**2
+    weaker = 1.0 / (spread * max(off / clipped, 1.0))
+    for i in range(SIZE):
+        pull = gain[i] * weaker
+        means[i] = mean[i] + pull * innovation
+        for j in range(SIZE):
+            covariances[i, j] = covariance[i, j] - pull * gain[j]
+    return log_weight - 0.5 * math.log(spread) - lost
+
+
+@kernel
 def corrected(
     mean: Array, covariance: Array, log_weight: Array, innovation: Array, slope: Array, variance: Array, clipped: float
 ) -> tuple[Array, Array, Array]:
@@ -132,15 +157,8 @@ def corrected(
         spread = variance[h]
         for i in range(SIZE):
             spread += gain[i] * slope[h, i]
-        off = abs(innovation[h]) / math.sqrt(spread)
-        lost = 0.5 * off**2 if off <= clipped else clipped * off - 0.5 * clipped**2
-        weights[h] = log_weight[h] - 0.5 * math.log(spread) - lost
-        weaker = 1.0 / (spread * max(off / clipped, 1.0))
-        for i in range(SIZE):
-            pull = gain[i] * weaker
-            means[h, i] = mean[h, i] + pull * innovation[h]
-            for j in range(SIZE):
-                covariances[h, i, j] = covariance[h, i, j] - pull * gain[j]
+        before, after = (mean[h], covariance[h], log_weight[h]), (means[h], covariances[h])
+        weights[h] = _taken_in(before, innovation[h], gain, spread, clipped, after)
     return means, covariances, weights
 
 
@@ -149,9 +167,14 @@ def placed(
     mean: Array, covariance: Array, log_weight: Array, innovation: Array, variance: Array, clipped: float
 ) -> tuple[Array, Array, Array, float]:
     """`corrected` by a position, of which place and slow error are seen, its weights normalised; ln of their sum."""
-    slope = np.zeros(mean.shape)
-    slope[:, POSITION] = 1.0
-    slope[:, OFFSET] = 1.0
-    means, covariances, weights = corrected(mean, covariance, log_weight, innovation, slope, variance, clipped)
+    means, covariances, weights = np.empty_like(mean), np.empty_like(covariance), np.empty_like(log_weight)
+    gain = np.empty(SIZE)
+    for h in range(log_weight.size):
+        p = covariance[h]
+        for i in range(SIZE):
+            gain[i] = p[POSITION, i] + p[OFFSET, i]
+        spread = variance[h] + gain[POSITION] + gain[OFFSET]
+        before, after = (mean[h], p, log_weight[h]), (means[h], covariances[h])
+        weights[h] = _taken_in(before, innovation[h], gain, spread, clipped, after)
     whole = total(weights)
     return means, covariances, weights - whole, whole
