@@ -134,6 +134,16 @@ def test_age_fewer_brakings_and_distrust_discount_it() -> None:
     assert none.lower == pytest.approx(NOTHING.lower)
 
 
+def test_what_is_told_is_as_unsure_as_what_was_seen_and_as_it_scatters() -> None:
+    """By a map that is believed without doubt: trains that saw 0.08 and 0.12, each to 0.005, in turns."""
+    sure = Trust(1.0, 1e6)
+    assert told(seen(0.10, count=10**6), trust=sure).std == pytest.approx(0.005, rel=0.02)
+    turns = [
+        piece._replace(mu=(0.08, 0.12)[k % 2], lower=0.07) for k, piece in enumerate(seen(0.10, count=10**6).pieces)
+    ]
+    assert told(RailMap(tuple(turns)), trust=sure).std == pytest.approx(math.hypot(0.005, 0.02), rel=0.02)
+
+
 def test_a_single_low_spot_counts_and_a_brake_that_builds_up_does_not() -> None:
     def with_spot(lower: float, limited: bool) -> RailMap:
         pieces = list(seen(0.10).pieces)

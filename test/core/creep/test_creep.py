@@ -24,7 +24,7 @@ from adhesion_node.core.creep.curve import adhesion, parameters, peak
 from adhesion_node.core.creep.estimator import CreepEstimate, CreepState, advance, creep_step, init
 from adhesion_node.core.creep.recursion import advance as advance_recursion
 from adhesion_node.core.creep.recursion import begin, full_covariance, is_changing
-from adhesion_node.core.creep.vehicle import CreepSample
+from adhesion_node.core.creep.vehicle import CreepSample, Vehicle
 from adhesion_node.core.intake.outcome import Outcome
 from adhesion_node.core.physics.train import Array
 
@@ -133,6 +133,16 @@ def test_one_surface_is_not_taken_for_another() -> None:
     for seed in range(4):
         state, _ = feed(NOMINAL, init(NOMINAL), samples(DRY, 0.1, 1000, seed))
         assert state.counts[Outcome.CHANGED] == 0
+
+
+@pytest.mark.parametrize(("wheel_std", "speed_std"), [(0.02, 0.0), (0.0, 0.05), (0.02, 0.05)])
+def test_the_variance_of_a_creep_is_that_of_many_draws(wheel_std: float, speed_std: float) -> None:
+    """Of four axles that creep by 5 % at 10 m/s."""
+    rng, vehicle = np.random.default_rng(8), Vehicle(wheel_std_radps=wheel_std, speed_std_mps=speed_std)
+    speeds = 10.0 + speed_std * rng.standard_normal(20_000)
+    wheels = 16.8 + wheel_std * rng.standard_normal((4, 20_000))
+    drawn = (0.625 * wheels / speeds - 1.0).mean(axis=0).var()
+    assert vehicle.creep_variance(0.05, 10.0, 4) == pytest.approx(drawn, rel=0.05)
 
 
 def test_noise_of_a_tenth_of_the_peak_is_no_other_surface() -> None:
