@@ -253,7 +253,10 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     slope = used.slope.copy()
     slope[:, ROUGH] *= rough_kept
     slope[:, GRADE] = grade_kept
+    told = max(float(bank.weight @ speed), 1.0)
+    slope[:, SPEED] -= 2.0 * slowing / GRAVITY / told  # a way goes with the speed's square
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
+    adhesion = adhesion - 2.0 * slowing / GRAVITY * (mean[:, SPEED] - told) / told
     roughness = (
         kinds.ROUGHNESS[bank.kind] ** 2 * rough_added
         + np.minimum(kinds.DRIFT[bank.kind], verdict.DRIFT_AHEAD) ** 2 * time_s / 3.0

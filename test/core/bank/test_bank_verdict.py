@@ -285,3 +285,22 @@ def test_the_bound_is_the_mixtures_and_below_its_median() -> None:
     assert (rail.mu, rail.lower) == pytest.approx((0.05, bound), rel=1e-6)
     assert rail.std == pytest.approx((high - low) / 3.92, rel=1e-6)
     assert low < rail.lower < rail.mu
+
+
+def test_a_train_that_may_be_faster_than_told_counts_on_less() -> None:
+    """Known for certain but for its speed, 30 +- 0.6 m/s: against ways drawn from that speed."""
+    config = replace(CONFIG, ahead_std=0.0, grade_std=0.0, profile_std=0.0, resistance_std=0.0)
+    one = bank_of([SMOOTH], [2], spread=0.0)
+    one = one._replace(covariance=np.zeros_like(one.covariance))
+    one = (
+        one.with_fresh(SPEED, 30.0, 0.6)
+        .with_fresh(MU, 0.05, 0.0)
+        .with_fresh(ROUGH, 0.0, 0.0)
+        .with_fresh(GRADE, 0.0, 0.0)
+    )
+    ahead = counted_on(config, one, 0.01, Braking(FULL), NOTHING)
+    resisting = float(resistance(config, one)[0])
+    speeds = 30.0 + 0.6 * np.random.default_rng(4).standard_normal(200_000)
+    needed = np.quantile((0.05 + resisting) * (30.0 / speeds) ** 2, 0.01) - resisting
+    assert ahead.mu[-1] == pytest.approx(float(needed), rel=0.02)
+    assert ahead.mu[-1] < 0.95 * 0.05

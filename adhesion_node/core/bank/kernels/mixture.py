@@ -143,24 +143,28 @@ def counted_on(
     speeds: Array,
     asked: Asked,
 ) -> Array:
-    """Quantile of adhesion and grade ahead at each of some `speeds`, shape as they.
+    """Quantile of adhesion and grade ahead at each of some `speeds`, shape as they; the last is the one that is told.
+
+    What is not known of that counts, too: a train that is faster than told needs more adhesion for the same way.
 
     Adhesion is above 0 and known in proportion: that of its logarithm, with the same mean and variance.
     """
     count, mean, covariance = weight.size, bank.mean, bank.covariance
     middle, std = np.empty((speeds.size, count)), np.empty((speeds.size, count))
-    by = np.empty(SIZE)
+    by, told = np.empty(SIZE), max(speeds[-1], 1.0)
     for h in range(count):
         x, u, grade, k = mean[h], used.value[h], mean[h, GRADE], bank.kind[h]
         slope, slides = used.slope[h], used.slides[h]
         speed = max(x[SPEED], 1.0)
         slowing = GRAVITY * max(u + used.resisting[h] + grade, 0.005)
         way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
+        per_mps = 2.0 * slowing / GRAVITY / told  # of the adhesion that a train so much faster needs for the same way
         rough_kept, rough_added = _mean_ahead(way_m, rule.lengths[0])
         grade_kept, grade_added = _mean_ahead(way_m, rule.lengths[1])
         by[:] = slope
         by[ROUGH] *= rough_kept
         by[GRADE] = grade_kept
+        by[SPEED] -= per_mps
         c = rule.resistance
         basic = c[0] + x[SPEED] * (c[1] + c[2] * x[SPEED])
         variance = (rule.grade_error**2 + (rule.resistance_error * basic) ** 2) * grade_added + (rule.error * u) ** 2
@@ -172,7 +176,7 @@ def counted_on(
             variance += x[MU] ** 2 * (rule.rough[k] * rough_added + rule.drift[k] * time_s / 3.0)
         one, rest = math.sqrt(max(variance, 1e-12)), grade * grade_kept
         law = _law(rule.laws, bank.law[h], speed)
-        level = u - slope[ROUGH] * x[ROUGH] * (1.0 - rough_kept)
+        level = u - slope[ROUGH] * x[ROUGH] * (1.0 - rough_kept) - per_mps * (x[SPEED] - told)
         for row in range(speeds.size):
             if slides:
                 rising = (_law(rule.laws, bank.law[h], speeds[row]) / law) ** rule.rise
