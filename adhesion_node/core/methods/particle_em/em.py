@@ -87,7 +87,8 @@ class ParticleEStep:
 
 
 PASSES = 0.5
-"""For each iteration where EM arrives; averaged, they leave about as much to chance. Where it stays at its start: 1."""
+"""For each iteration where EM arrives; where it stays at its start, 1. With the paper's settings, 20 particles and
+50 iterations, chance moves mu by 7e-4 then; by 5.5e-4 with an iteration each, where a window leaves 3e-3 open."""
 
 
 class Search(NamedTuple):
