@@ -27,6 +27,7 @@ from ..bag.types import encode, new, serialize
 from ..command.options import progress
 from ..core import Prediction
 from ..core.config import Config
+from ..core.estimator import warm_up
 from ..run.offline import Recorded, messages, predictions
 from ..run.pipeline import Pipeline
 from ..run.results.rows import row_of
@@ -50,6 +51,7 @@ def replay(hours: float, rate_hz: float, seed: int) -> dict[str, Any]:
                 pass
             reading_s = time.process_time() - started
             pipeline, filled = Pipeline(Config(), seed), list[float]()
+            warm_up(Config())  # machine code is loaded once, however long a recording is
             wall, started = time.perf_counter(), time.process_time()
             recorded = _watched(messages(reader, selection, NOMINAL), 2 * total, filled)
             for _ in predictions(pipeline, None, recorded, NOMINAL, array("d")):
