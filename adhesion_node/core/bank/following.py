@@ -302,7 +302,8 @@ def _with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Me
     rims, memory = wheels.rims(config, newest), memory._replace(wheels=wheels)
     if rims and memory.braked:
         return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns)
-    memory = memory._replace(wheels=wheels._replace(recovered=False, lowest_mps=math.inf))
+    trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
+    memory = memory._replace(wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf))
     if rims and not pressed and rim > LEARNING_MPS:
         return memory._replace(bank=rolling(memory.bank, median(rims)).normalised())
     return memory
@@ -315,10 +316,9 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
     rim_mps -= slowing * (memory.t_ns - t_ns) / S
     if rim_mps <= config.slowest_mps:
         return memory
-    bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps)
-    settled = memory.t_ns / S > memory.told_s - SETTLING_S + UNISON_S
-    if (settled or wheels.recovered) and memory.t_ns - wheels.trusted_ns >= TRUSTED_NS:
-        bank, wheels = as_fast(bank, rim_mps), wheels._replace(trusted_ns=memory.t_ns)
+    bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
+    if memory.t_ns >= wheels.trusted_ns:
+        bank, wheels = as_fast(bank, rim_mps), wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
 
@@ -368,7 +368,8 @@ def _led_again(memory: Memory) -> Memory:
 def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
     """Tell a change of the rail once it is certain and passed, and the adhesion used another than before any doubt.
 
-    That axles roll, where they slid before, is one, too. While the brake may still build up none is told.
+    That axles roll, where they slid before, is one, too. While the brake may still build up, or the border of the last
+    one lies under the train, none is told.
     """
     now_s, held, seen = memory.t_ns / S, HELD if memory.slid else PASSING, memory.seen + 1
     changed, passing, sliding = weighing.changing(
@@ -382,7 +383,8 @@ def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
         return memory._replace(bank=bank, seen=seen, steady=steady, slid=slid)
     before = 0.0 if memory.steady is None else _used(config, *memory.steady)
     changes = memory.changes + (abs(_used(config, *steady) - before) > CHANGED * before)
-    return memory._replace(bank=bank, seen=seen, told_s=now_s, changes=changes, steady=steady, slid=slid)
+    passed_s = now_s + config.train.length_m / max(bank.mean_of(SPEED), config.slowest_mps)
+    return memory._replace(bank=bank, seen=seen, told_s=passed_s, changes=changes, steady=steady, slid=slid)
 
 
 def _used(config: Config, bank: Bank, braking: Braking) -> float:

@@ -65,8 +65,8 @@ BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
-"""A change of the rail counts for the way ahead after so long, or once it is so probable; before its border is passed,
-if all that say so are so probable together."""
+"""A change of the rail counts for the way ahead after so long, once it is so probable, or once all that are so young
+prevail; before its border is passed, if all that say so are so probable together."""
 
 
 class Ahead(NamedTuple):

@@ -58,10 +58,10 @@ class WheelsSeen(NamedTuple):
     rolled_ns: tuple[int | None, ...] = ()
     """When each was last seen to roll."""
     trusted_ns: int = 0
-    """When the fastest rim was last taken for the train's speed."""
+    """From when on the fastest rim may be taken for the train's speed."""
     lowest_mps: float = math.inf
     """Speed of the fastest rim at its lowest since the brake was applied."""
-    recovered: bool = False
+    risen: bool = False
     """Whether it has risen since: a train under the brake does not, so it slid and rolls again."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
@@ -113,10 +113,14 @@ class WheelsSeen(NamedTuple):
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
         return max(rims) * (1.0 - 0.5 * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
 
-    def beside(self, fastest_mps: float) -> WheelsSeen:
-        """Note how fast the fastest rim is under the brake."""
+    def beside(self, fastest_mps: float, now_ns: int) -> WheelsSeen:
+        """Note how fast the fastest rim is under the brake; once it has risen it may be trusted."""
+        if self.risen:
+            return self
         lowest = min(self.lowest_mps, fastest_mps)
-        return self._replace(lowest_mps=lowest, recovered=self.recovered or fastest_mps > RISEN * lowest)
+        risen = fastest_mps > RISEN * lowest
+        trusted_ns = min(self.trusted_ns, now_ns) if risen else self.trusted_ns
+        return self._replace(trusted_ns=trusted_ns, lowest_mps=lowest, risen=risen)
 
     def share(self, now_ns: int) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""

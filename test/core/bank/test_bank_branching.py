@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from banks import CONFIG, FULL, FULL_PA, S, bank_of
 from oracles import specific_resistance
 from scipy.stats import norm
 
-from adhesion_node.core import Measurement, finish, init, step
+from adhesion_node.core import Config, Measurement, finish, init, step
 from adhesion_node.core.bank.branching import LEAST, MOST, branched, closed, opened, pruned, unlikely_kept
 from adhesion_node.core.bank.kinds import HELD, KINDS, SLIDES
 from adhesion_node.core.bank.layout import MU, ROUGH, SIZE, Bank, joined
@@ -198,13 +199,13 @@ def ride(seed: int, brakings: list[tuple[float, float, float]], seconds: float) 
     return result
 
 
-def changes_of(measurements: list[Measurement]) -> list[tuple[float, int]]:
+def changes_of(measurements: list[Measurement], config: Config = CONFIG) -> list[tuple[float, int]]:
     """Times and numbers of changes, of every estimate."""
-    state, told = init(CONFIG, 1), list[tuple[float, int]]()
+    state, told = init(config, 1), list[tuple[float, int]]()
     for each in measurements:
-        state, estimate = step(CONFIG, state, each)
+        state, estimate = step(config, state, each)
         told += [] if estimate is None else [((estimate.t_ns - S) / S, estimate.changes)]
-    return told + [((each.t_ns - S) / S, each.changes) for each in finish(CONFIG, state)[1]]
+    return told + [((each.t_ns - S) / S, each.changes) for each in finish(config, state)[1]]
 
 
 @pytest.mark.parametrize(("before", "after"), [(0.03, 0.07), (0.07, 0.03)])
@@ -214,6 +215,14 @@ def test_a_changed_rail_is_found_and_told_once(before: float, after: float, seed
     assert told[-1][1] == 1
     assert all(count == 0 for time, count in told if time < 30.0)
     assert all(count == 1 for time, count in told if time > 36.0)
+
+
+@pytest.mark.parametrize(("length_m", "counted"), [(1.0, 2), (900.0, 1)])
+def test_while_a_border_lies_under_the_train_it_tells_no_other(length_m: float, counted: int) -> None:
+    """Two falls within 7 s: one after the other under a short train, both under one that takes 15 s to pass."""
+    config = replace(CONFIG, train=replace(CONFIG.train, length_m=length_m))
+    told = changes_of(ride(0, [(10.0, 24.0, 0.08), (24.0, 31.0, 0.05), (31.0, 42.0, 0.025)], 42.0), config)
+    assert told[-1][1] == counted
 
 
 @pytest.mark.parametrize(("seed", "mu"), [(0, 0.03), (2, 0.07)])

@@ -23,6 +23,7 @@ from scipy.stats import norm
 from adhesion_node.core.bank.brake import BrakeSeen
 from adhesion_node.core.bank.following import Memory
 from adhesion_node.core.bank.kernels import mixture as mixtures
+from adhesion_node.core.bank.kernels import weighing
 from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, resistance, use
@@ -304,3 +305,12 @@ def test_a_train_that_may_be_faster_than_told_counts_on_less() -> None:
     needed = np.quantile((0.05 + resisting) * (30.0 / speeds) ** 2, 0.01) - resisting
     assert ahead.mu[-1] == pytest.approx(float(needed), rel=0.02)
     assert ahead.mu[-1] < 0.95 * 0.05
+
+
+@pytest.mark.parametrize(("young", "counts"), [(0.3, False), (0.7, True)])
+def test_young_hypotheses_count_once_they_prevail_together(young: float, counts: bool) -> None:
+    """Nine of each, none of them likely by itself: of the young ones none below a half, all of them above."""
+    weight = np.repeat([(1.0 - young) / 9.0, young / 9.0], 9)
+    age_s, kind = np.repeat([10.0, 0.5], 9), np.full(18, SMOOTH)
+    kept = np.exp(weighing.borne_out(np.log(weight), age_s, kind, 2.0, 0.1, PASSING, 0.2))
+    assert kept[9:].sum() == pytest.approx(young if counts else 0.0)

@@ -70,16 +70,17 @@ def changing(
 def borne_out(
     log_weight: Array, age_s: Array, kind: Labels, after_s: float, likely: float, passing: int, border: float
 ) -> Array:
-    """Weights of those alone that are as old as `after_s`, or `likely`; of all, where none is.
+    """Weights of those alone that are as old as `after_s`, or `likely`; of all, where none is or the young prevail.
 
     What says `passing` counts by its age only where all of it together is more probable than `border`.
     """
-    passes = 0.0
+    passes, young = 0.0, 0.0
     for h in range(kind.size):
         passes += math.exp(log_weight[h]) if kind[h] == passing else 0.0
+        young += math.exp(log_weight[h]) if age_s[h] < after_s else 0.0
     kept = np.full(kind.size, -np.inf)
     for h in range(kind.size):
-        old = age_s[h] >= after_s and (kind[h] != passing or passes > border)
+        old = (age_s[h] >= after_s or young > 0.5) and (kind[h] != passing or passes > border)
         if old or math.exp(log_weight[h]) > likely:
             kept[h] = log_weight[h]
     return normalised(kept, -np.inf) if kept.max() > -np.inf else log_weight
