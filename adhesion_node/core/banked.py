@@ -13,6 +13,8 @@ import math
 import numpy as np
 
 from .bank import following as bank
+from .bank.judging import misled
+from .bank.memory import Memory
 from .bank.steps import Stepping
 from .bank.verdict import Findings, found
 from .belief.gaussian import Gaussian
@@ -66,7 +68,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         if state.outliers + 1 >= config.max_outliers and behind:
             # under the brake positions fall behind for good where their wheel slides
             blind = measurement._replace(variance_m2=math.inf)
-            memory = bank.followed(config, bank.misled(config, memory), blind, rail)
+            memory = bank.followed(config, misled(config, memory), blind, rail)
             return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
         if state.outliers + 1 >= config.max_outliers:
             anew = _anew(state, Event(Outcome.RESET, detail))
@@ -85,7 +87,7 @@ def _anew(state: State, event: Event) -> State:
 
 
 def _accepted(
-    config: Config, state: State, measurement: Measurement, memory: bank.Memory, stepping: Stepping | None = None
+    config: Config, state: State, measurement: Measurement, memory: Memory, stepping: Stepping | None = None
 ) -> tuple[State, Estimate | None]:
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
@@ -133,7 +135,7 @@ def _informed(config: Config, rail: Rail, t_ns: int, belief: Gaussian) -> Rail:
     return config.rail_map.informed(rail, way, config.speed_law, config.map_trust)
 
 
-def _verdict(memory: bank.Memory, findings: Findings, changed: bool) -> Verdict:
+def _verdict(memory: Memory, findings: Findings, changed: bool) -> Verdict:
     fit = Fit(
         window=memory.seen,
         iterations=int(memory.braked),

@@ -14,8 +14,8 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from .bank.following import Memory
 from .bank.layout import POSITION, SPEED
+from .bank.memory import Memory
 from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge

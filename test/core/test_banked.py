@@ -20,7 +20,7 @@ from oracles import drive, ride
 
 from adhesion_node.core import Config, Estimate, Measurement, Outcome, Regime, State, init, predict, step
 from adhesion_node.core.bank import following
-from adhesion_node.core.bank.following import Memory
+from adhesion_node.core.bank.memory import Memory
 
 S = 10**9
 BANK = Config(method="bank", grade_std=0.005, mass_std=0.05, brake_std=0.1, rotating_mass_std=0.02, law_probability=0.5)

@@ -14,9 +14,9 @@ import math
 from typing import NamedTuple
 
 from ..physics.train import GRAVITY
-from .following import Memory
 from .kinds import KINDS
 from .layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, RADIUS, SCALE
+from .memory import Memory
 
 
 class Quantity(NamedTuple):

@@ -11,11 +11,21 @@
 from __future__ import annotations
 
 import math
+from statistics import median
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..intake.samples import Measurement
+from ..physics.train import GRAVITY
 from .layout import RADIUS, SPEED, Bank
+from .memory import Memory, S
+from .motion import resistance, use
 from .seeing import CLIPPED, corrected, speed_seen
+from .wheels import LEARNING_MPS
+
+if TYPE_CHECKING:
+    from ..config import Config
 
 ROLLING_SHARE, FASTEST_SHARE = 0.02, 0.008
 """Error of the rims' speed, relative: of the middle one while no brake is applied, of the fastest under the brake."""
@@ -29,8 +39,45 @@ ROLLS = 0.006
 SLIDES = 0.2
 """Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new."""
 
+UNISON_S = 3.0
+"""For so long, and the brake's build-up, behind the opening all axles may begin to slide as one."""
+
+TRUSTED_NS = 450_000_000
+"""How often the fastest rim is taken for the train's speed, as its errors last."""
+
 UNSEEN = 1e12
 """Variance of what is not seen."""
+
+
+def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
+    """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
+    if not measurement.wheels:
+        return memory
+    pressed, wheels, newest = memory.is_pressed(config), memory.wheels, measurement.wheels[-1]
+    rim, std = rim_speed(memory.bank)
+    for sample in measurement.wheels:
+        wheels = wheels.after(config, sample, rim, std, pressed)
+    rims, memory = wheels.rims(config, newest), memory._replace(wheels=wheels)
+    if rims and memory.braked:
+        return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns)
+    trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
+    memory = memory._replace(wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf))
+    if rims and not pressed and rim > LEARNING_MPS:
+        return memory._replace(bank=rolling(memory.bank, median(rims)).normalised())
+    return memory
+
+
+def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -> Memory:
+    """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
+    bank, resisting = memory.bank, resistance(config, memory.bank)
+    slowing = GRAVITY * float(bank.weight @ (use(config, bank, memory.braking, resisting).value + resisting))
+    rim_mps -= slowing * (memory.t_ns - t_ns) / S
+    if rim_mps <= config.slowest_mps:
+        return memory
+    bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
+    if memory.t_ns >= wheels.trusted_ns:
+        bank, wheels = as_fast(bank, rim_mps), wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS)
+    return memory._replace(wheels=wheels, bank=bank.normalised())
 
 
 def rim_speed(bank: Bank) -> tuple[float, float]:

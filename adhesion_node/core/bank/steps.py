@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..belief.rail import Rail
 from ..intake.samples import Measurement
-from .following import Memory, followed
+from .following import followed
 from .layout import POSITION
+from .memory import Memory
 from .motion import Foreseen
 from .plausible import Course
 

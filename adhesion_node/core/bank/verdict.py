@@ -21,9 +21,10 @@ from ..belief.regime import Regime
 from ..physics.train import Array
 from ..setting import once
 from . import kinds
-from .following import SPEED_ERROR_MPS, Memory, S
+from .following import SPEED_ERROR_MPS
 from .kernels import mixture, weighing
 from .layout import SPEED, Bank
+from .memory import Memory, S
 from .motion import Braking, Use, model_of, resistance, use
 from .seeing import ROLLED
 

@@ -19,9 +19,10 @@ from banks import CONFIG, FULL, FULL_PA, S, bank_of, braked_run, measurements
 from oracles import specific_resistance
 
 from adhesion_node.core.bank.branching import closed
-from adhesion_node.core.bank.following import Memory, followed, met
+from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.kinds import HELD, KINDS, SLIDES
 from adhesion_node.core.bank.layout import BRAKE, MU, POSITION, SIZE, SPEED
+from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, moved
 from adhesion_node.core.bank.seeing import corrected, position_seen
 from adhesion_node.core.belief.rail import Rail

@@ -17,8 +17,9 @@ import numpy as np
 import pytest
 from banks import CONFIG, FULL_PA, S
 
-from adhesion_node.core.bank.following import Memory, followed, met
+from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.layout import BRAKE, MU, POSITION, SCALE, SPEED
+from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import ImuSample, Measurement, SpeedSample

@@ -15,8 +15,9 @@ from dataclasses import replace
 import pytest
 from banks import CONFIG, S
 
-from adhesion_node.core.bank.following import Memory, followed, met
+from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.layout import POSITION, SPEED
+from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Foreseen
 from adhesion_node.core.bank.steps import Stepping
 from adhesion_node.core.belief.rail import Rail

@@ -21,11 +21,11 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 
 from adhesion_node.core.bank.brake import BrakeSeen
-from adhesion_node.core.bank.following import Memory
 from adhesion_node.core.bank.kernels import mixture as mixtures
 from adhesion_node.core.bank.kernels import weighing
 from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED, Bank, joined
+from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, resistance, use
 from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
 from adhesion_node.core.bank.wheels import WheelsSeen

@@ -1,0 +1,119 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""When a braking opens and closes, what has changed since, and whether the positions can be believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ..belief.rail import Rail
+from ..intake.samples import MAX_VARIANCE_M2
+from .branching import branched, closed, opened, pruned, unlikely_kept
+from .kernels import weighing
+from .kinds import HELD, PASSING, SLIDES
+from .layout import MU, POSITION, SPEED, Bank
+from .memory import Memory, S, steps
+from .motion import Braking, resistance, use
+from .plausible import Course
+from .seeing import wheels_seen
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+BRANCH_S = 0.5
+"""How often it is asked whether rail or limit have changed."""
+
+PAST_NS = 4 * S
+"""How far back it can go."""
+
+DOUBTED, PASSED, CERTAIN, CHANGED = 0.1, 0.5, 0.99, 0.2
+"""Probabilities from which a change of the rail is in doubt, up to which it still goes on, and from which it is told,
+and by how much it must have changed."""
+
+SETTLING_S = 6.0
+"""For so long, and the brake's build-up, behind its opening a braking tells no change."""
+
+SLID = 0.9
+"""Probability from which axles slid."""
+
+FORGOTTEN = 0.02
+"""Least probability of how positions err while no brake is applied: sensors change, and unknown traction looks like an
+error that wanders."""
+
+
+def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
+    """Open or close a braking, ask what has changed, weigh what wheels and slide protection tell."""
+    bank, now_s = memory.bank, memory.t_ns / S
+    pressed = memory.is_pressed(config)
+    if memory.misled:
+        return memory if pressed else _led_again(memory)
+    braked = pressed and bank.mean_of(SPEED) >= config.slowest_mps
+    if braked and not memory.braked:
+        known = rail()
+        told_s = now_s + SETTLING_S + config.brake_build_up_s
+        return memory._replace(bank=opened(config, bank, known), since_s=0.0, seen=1, told_s=told_s, known=known)
+    if memory.braked and not braked:
+        return memory._replace(bank=closed(bank), seen=0)
+    if not memory.braked:  # one hypothesis has nothing beside it that could be forgotten
+        return memory if bank.kind.size == 1 else memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
+    if memory.since_s >= BRANCH_S - 1e-6:
+        if memory.course.is_impossible(config, bank, memory.declared_m):
+            return misled(config, memory)
+        if memory.braking.told:
+            bank = wheels_seen(config, bank, memory.braking, memory.since_s).normalised()
+        bank = branched(config, bank, memory.braking, now_s, memory.since_s)
+        kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
+        memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
+    return _with_changes(config, memory, pruned(bank))
+
+
+def misled(config: Config, memory: Memory) -> Memory:
+    """The positions were those of a sliding wheel: go back to before, and on without them, whatever the brake does."""
+    t_ns, bank = memory.past[0] if memory.past else (memory.t_ns, memory.bank)
+    half = 0.5 * config.train.specific_brake(memory.brake.demanded_pa)
+    before = memory._replace(bank=closed(bank).with_fresh(MU, half, half), t_ns=t_ns, seen=0, past=())
+    ahead = before
+    for until_ns in steps(t_ns, memory.t_ns):
+        ahead = ahead._replace(bank=ahead.bank_at(config, until_ns), t_ns=until_ns)
+    return ahead._replace(misled=True, since_s=0.0)
+
+
+def _led_again(memory: Memory) -> Memory:
+    """The brake is released, no wheel slides any more: positions count again, wherever they say that the train is."""
+    bank = memory.bank.with_fresh(POSITION, memory.bank.mean[:, POSITION], math.sqrt(MAX_VARIANCE_M2))
+    return memory._replace(bank=bank, misled=False, course=Course())
+
+
+def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
+    """Tell a change of the rail once it is certain and passed, and the adhesion used another than before any doubt.
+
+    That axles roll, where they slid before, is one, too. While the brake may still build up, or the border of the last
+    one lies under the train, none is told.
+    """
+    now_s, held, seen = memory.t_ns / S, HELD if memory.slid else PASSING, memory.seen + 1
+    changed, passing, sliding = weighing.changing(
+        bank.log_weight, bank.changed_s, bank.kind, SLIDES, memory.told_s + 1e-6, PASSING, held
+    )
+    settling = now_s < memory.told_s
+    if not settling and (DOUBTED <= changed < CERTAIN or passing > PASSED):
+        return memory._replace(bank=bank, seen=seen)
+    steady, slid = (bank, memory.braking), sliding > SLID
+    if settling or changed < DOUBTED:
+        return memory._replace(bank=bank, seen=seen, steady=steady, slid=slid)
+    before = 0.0 if memory.steady is None else _used(config, *memory.steady)
+    changes = memory.changes + (abs(_used(config, *steady) - before) > CHANGED * before)
+    passed_s = now_s + config.train.length_m / max(bank.mean_of(SPEED), config.slowest_mps)
+    return memory._replace(bank=bank, seen=seen, told_s=passed_s, changes=changes, steady=steady, slid=slid)
+
+
+def _used(config: Config, bank: Bank, braking: Braking) -> float:
+    """Adhesion that is used, over all hypotheses."""
+    return float(bank.weight @ use(config, bank, braking, resistance(config, bank)).value)

@@ -1,0 +1,114 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""What the bank remembers from measurement to measurement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
+
+from ..belief.rail import Rail
+from ..intake.samples import MAX_VARIANCE_M2
+from ..quick import quick
+from .brake import BrakeSeen
+from .kernels import weighing
+from .layout import POSITION, Bank
+from .motion import Braking, moved
+from .plausible import Course
+from .seeing import Observation, corrected
+from .wheels import WheelsSeen
+
+if TYPE_CHECKING:
+    from ..config import Config
+
+S = 1_000_000_000
+
+HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
+
+STEP_S = 0.2
+"""Longest step in time."""
+
+
+@quick
+class Memory(NamedTuple):
+    """What the bank remembers."""
+
+    bank: Bank
+    t_ns: int
+    declared_m: float
+    """Standard deviation that the last position declared."""
+    brake: BrakeSeen = BrakeSeen()
+    wheels: WheelsSeen = WheelsSeen()
+    braking: Braking = Braking(0.0)
+    since_s: float = 0.0
+    """Since it was last asked what has changed."""
+    known: Rail = Rail(0.0, 1.0, 0.0)
+    """The rail as it was known when the braking began."""
+    told_s: float = 0.0
+    """Until when no change is told: the brake builds up, or the border of the last one lies under the train."""
+    changes: int = 0
+    """Changes of the rail told."""
+    steady: tuple[Bank, Braking] | None = None
+    """What was believed when none was in doubt, ..."""
+    slid: bool = False
+    """... and whether axles slid then."""
+    course: Course = Course()
+    past: tuple[tuple[int, Bank], ...] = ()
+    """Beliefs of some seconds ago, to go back to where positions turn out to be wrong."""
+    misled: bool = False
+    """Whether the positions are those of a sliding wheel: they are left out until the brake is released."""
+    seen: int = 0
+    """Measurements of the present braking; 0 while there is none."""
+    fixes: int = 0
+    """Positions taken in; a speed counts as two, as it takes two positions to tell one."""
+    log_likelihood: float = 0.0
+    """Sum of ln p of what positions, speeds and accelerometer told since the last estimate, in m, m/s and g."""
+
+    @property
+    def braked(self) -> bool:
+        """Whether a braking is open."""
+        return self.seen > 0
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether any position has said where the train is."""
+        return bool(self.bank.covariance[0, POSITION, POSITION] < 0.5 * MAX_VARIANCE_M2)
+
+    def told(self, seen: Observation, fixes: int = 0) -> Memory:
+        """Take in an observation."""
+        bank = corrected(self.bank, seen)
+        total = weighing.total(bank.log_weight)
+        return self._replace(
+            bank=bank.believing(bank.mean, bank.covariance, bank.log_weight - total),
+            fixes=self.fixes + fixes,
+            log_likelihood=self.log_likelihood + total - HALF_LOG_2PI,
+        )
+
+    def is_pressed(self, config: Config) -> bool:
+        """Whether a brake is applied."""
+        return self.brake.demanded_pa >= max(config.brake_threshold_pa, 1.0)
+
+    def bank_at(self, config: Config, until_ns: int) -> Bank:
+        """The bank moved on to a time, if that is later."""
+        if until_ns <= self.t_ns:
+            return self.bank
+        return moved(config, self.bank, (until_ns - self.t_ns) / S, self.braking, self.declared_m)
+
+
+def steps(from_ns: int, to_ns: int, times_ns: Sequence[int] = ()) -> Sequence[int]:
+    """Ends of the steps up to a time: at some times on the way, and no step too long."""
+    if not times_ns and to_ns - from_ns <= STEP_S * S:
+        return (to_ns,)
+    ends: list[int] = []
+    for until_ns in (*sorted({each for each in times_ns if from_ns < each < to_ns}), to_ns):
+        count = max(math.ceil((until_ns - from_ns) / (STEP_S * S)), 1)
+        ends += [from_ns + (until_ns - from_ns) * index // count for index in range(1, count + 1)]
+        from_ns = until_ns
+    return ends
