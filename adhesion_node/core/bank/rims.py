@@ -58,8 +58,8 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     for sample in measurement.wheels:
         wheels = wheels.after(config, sample, rim, std, pressed)
     rims, memory = wheels.rims(config, newest), memory._replace(wheels=wheels)
-    if rims and memory.braked:
-        return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns)
+    if memory.braked:
+        return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns) if rims else memory
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
     memory = memory._replace(wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf))
     if rims and not pressed and rim > LEARNING_MPS:
