@@ -16,9 +16,8 @@ from scipy.special import ndtri
 
 from .config import Config
 from .estimate import Estimate
-from .physics import braking
 from .physics.adhesion import AdhesionLaw
-from .physics.braking import BrakingCurve
+from .physics.braking import BrakingCurve, Slowdown, slowdown
 from .physics.train import Train
 
 
@@ -38,13 +37,14 @@ def predict(config: Config, estimate: Estimate) -> Prediction:
     The safe curve holds the bound at its present value: on the published laws adhesion only rises while the train
     slows down. Its brake is that of the configured confidence. The nominal curve follows the identified law.
     """
-    resistance = config.track.least_resistance(estimate.position_m)
+    ahead = abs(estimate.speed_mps), 0.0, config.track.least_resistance(estimate.position_m)
+    slowing = slowdown(config.train, *ahead)
     return Prediction(
         estimate,
-        _curve(_cautious(config), estimate.speed_mps, estimate.mu_lower, resistance)
+        _curve(slowdown(_cautious(config), *ahead), estimate.mu_lower)
         if estimate.ahead is None
-        else _curve(config.train, estimate.speed_mps, estimate.ahead, resistance),
-        None if estimate.withheld else _curve(config.train, estimate.speed_mps, _expected(estimate), resistance),
+        else _curve(slowing, estimate.ahead),
+        None if estimate.withheld else _curve(slowing, _expected(estimate)),
     )
 
 
@@ -63,8 +63,8 @@ def _expected(estimate: Estimate) -> float | AdhesionLaw:
     return replace(shape, scale=shape.scale * max(estimate.mu, 1e-6) / now)
 
 
-def _curve(train: Train, speed_mps: float, mu: float | AdhesionLaw, resistance: float) -> BrakingCurve | None:
+def _curve(slowing: Slowdown, mu: float | AdhesionLaw) -> BrakingCurve | None:
     try:
-        return braking.curve(train, abs(speed_mps), mu, grade=resistance)
+        return slowing.curve(mu)
     except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
         return None

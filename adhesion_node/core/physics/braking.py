@@ -14,6 +14,7 @@ speed: exact quadrature on a speed grid, no time stepping.
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -39,6 +40,44 @@ class BrakingCurve:
     time_s: Array
 
 
+class Slowdown(NamedTuple):
+    """What all braking curves of a train from one speed to another have in common."""
+
+    train: Train
+    speed_mps: Array
+    """Of the points of a curve, and behind them of the nodes between two of them."""
+    resistance: Array
+    """R/(M g) at these speeds, N/N, the grade's part included."""
+    integrands: Array
+    """v and 1 at the nodes, which over the deceleration give way and time: shape (2, points - 1, nodes)."""
+    weights: Array
+    grade: float
+
+    def curve(self, mu: float | AdhesionLaw) -> BrakingCurve:
+        """The curve that adhesion `mu` limits; raises ValueError where it is no adhesion, or the train not slowed."""
+        if not callable(mu):
+            _require(mu=mu)
+        train, adhesion = self.train, mu(self.speed_mps) if callable(mu) else mu
+        found = train.deceleration(adhesion, train.specific_brake(train.full_pressure_pa), self.resistance)
+        weakest = float(np.minimum.reduce(found))  # what found.min() calls
+        if not weakest > 0.0:
+            slowing = f"deceleration {weakest:.4g} m/s^2 at grade {self.grade:g}"
+            raise ValueError(f"braking curve: {slowing}: the train does not slow")
+        sums = np.zeros((2, POINTS))
+        steps = self.integrands / found[POINTS:].reshape(-1, _NODES.size) @ self.weights
+        np.add.accumulate(steps, axis=1, out=sums[:, 1:])  # what np.cumsum calls
+        return BrakingCurve(sums[0], self.speed_mps[:POINTS], found[:POINTS], sums[1])
+
+
+def slowdown(train: Train, speed_mps: float, target_mps: float = 0.0, grade: float = 0.0) -> Slowdown:
+    """A train that slows down to a target speed; arguments as those of `curve`, which checks them."""
+    lost = max(speed_mps - target_mps, 0.0)
+    every = target_mps + lost * _EVERY
+    integrands = np.ones((2, POINTS - 1, _NODES.size))
+    integrands[0] = every[POINTS:].reshape(-1, _NODES.size)
+    return Slowdown(train, every, train.specific_resistance(every) + grade, integrands, _HALF * lost * _WEIGHTS, grade)
+
+
 def curve(
     train: Train, speed_mps: float, mu: float | AdhesionLaw, target_mps: float = 0.0, grade: float = 0.0
 ) -> BrakingCurve:
@@ -51,39 +90,12 @@ def curve(
     _require(speed_mps=speed_mps, target_mps=target_mps)
     if not math.isfinite(grade):
         raise ValueError(f"braking curve grade = {grade!r}: give a finite rise over run")
-    if not callable(mu):
-        _require(mu=mu)
-    lost = max(speed_mps - target_mps, 0.0)
-    every = target_mps + lost * _EVERY
-    found = _deceleration(train, every, mu, grade)
-    weakest = float(np.minimum.reduce(found))  # what found.min() calls
-    if not weakest > 0.0:
-        raise ValueError(f"braking curve: deceleration {weakest:.4g} m/s^2 at grade {grade:g}: the train does not slow")
-    inner, slowing = every[POINTS:].reshape(-1, _NODES.size), found[POINTS:].reshape(-1, _NODES.size)
-    weights = _HALF * lost * _WEIGHTS
-    return BrakingCurve(
-        distance_m=_cumulate(inner / slowing @ weights),
-        speed_mps=every[:POINTS],
-        deceleration_mps2=found[:POINTS],
-        time_s=_cumulate(1.0 / slowing @ weights),
-    )
+    return slowdown(train, speed_mps, target_mps, grade).curve(mu)
 
 
 def distance_to(braking: BrakingCurve, target_mps: float) -> float:
     """Distance, m, along the curve to where the train reaches `target_mps` (0 when already slower)."""
     return float(np.interp(-target_mps, -braking.speed_mps, braking.distance_m))
-
-
-def _deceleration(train: Train, speed: Array, mu: float | AdhesionLaw, grade: float) -> Array:
-    adhesion = mu(speed) if callable(mu) else mu
-    full_brake = train.specific_brake(train.full_pressure_pa)
-    return train.deceleration(adhesion, full_brake, train.specific_resistance(speed) + grade)
-
-
-def _cumulate(steps: Array) -> Array:
-    sums = np.zeros(steps.size + 1)
-    np.add.accumulate(steps, out=sums[1:])  # what np.cumsum calls
-    return sums
 
 
 def _require(**values: float) -> None:

@@ -96,6 +96,7 @@ class Track:
     train_length_m: float = 200.0
     _breaks: Array = field(init=False, repr=False, compare=False)
     _levels: Array = field(init=False, repr=False, compare=False)
+    _least: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.train_length_m, Real) and 0.0 < self.train_length_m < math.inf):
@@ -123,6 +124,7 @@ class Track:
             levels[first + 1 : last + 1] += s.resistance(self.train_length_m)
         object.__setattr__(self, "_breaks", breaks)
         object.__setattr__(self, "_levels", levels)
+        object.__setattr__(self, "_least", np.minimum.accumulate(levels[::-1])[::-1])
 
     def specific_resistance(self, position_m: Array) -> Array:
         """Sum of grade, curve and tunnel resistance R2/(M g), N/N, at each position (7)."""
@@ -150,7 +152,7 @@ class Track:
 
     def least_resistance(self, from_m: float) -> float:
         """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""
-        return float(self._levels[np.searchsorted(self._breaks, from_m, side="right") :].min())
+        return float(self._least[self._breaks.searchsorted(from_m, side="right")])
 
 
 def _turned(section: Section) -> Section:
