@@ -132,7 +132,9 @@ def _passed(config: Config, state: State, pushed: gate.Pushed) -> tuple[State, t
         state, before = _take_all(config, state, pushed.ended)
         state, last = last_estimate(config, state)
         state, before = state.forgotten(), before + last
-    state = state._replace(inbox=pushed.inbox).told(*pushed.events)
+    state = state._replace(inbox=pushed.inbox)
+    if pushed.events:
+        state = state.told(*pushed.events)
     if not pushed.matched:
         return state, before
     state, estimates = _take_all(config, state, pushed.matched)
@@ -143,7 +145,8 @@ def _take_all(config: Config, state: State, matched: Iterable[Matched]) -> tuple
     estimates = []
     for each in matched:
         state, estimate = follow(config, state, _measurement(config, each))
-        estimates += [] if estimate is None else [estimate]
+        if estimate is not None:
+            estimates.append(estimate)
     return state, tuple(estimates)
 
 

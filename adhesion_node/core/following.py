@@ -22,8 +22,8 @@ from .windowed import follow_windowed, last_window
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
-    seen = state.seen
-    if measurement.has_position:
+    seen, placed = state.seen, measurement.has_position
+    if placed:
         repeated = state.repeated.after(measurement, state.sure)
         if repeated.is_stuck(measurement):
             return _unseen(config, state, measurement)
@@ -31,11 +31,12 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         repeated = state.repeated
     pace = state.pace.after(measurement)
     measurement, refused = in_mps(measurement, (pace.speed_mps, math.nan if seen is None else seen.speed_mps))
-    unseen = 0 if measurement.has_position else state.unseen
-    state = state._replace(repeated=repeated, unseen=unseen, pace=pace).told(*refused)
-    if refused and is_kmh(state.followed_mps, pace.speed_mps):
-        detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
-        state = state.forgotten()._replace(pace=pace).told(Event(Outcome.RESET, detail))
+    state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace)
+    if refused:
+        state = state.told(*refused)
+        if is_kmh(state.followed_mps, pace.speed_mps):
+            detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
+            state = state.forgotten()._replace(pace=pace).told(Event(Outcome.RESET, detail))
     if state.method is None:
         return follow_banked(config, state, measurement)
     return follow_windowed(config, state, measurement)

@@ -24,11 +24,13 @@ def quick(kind: type[Made]) -> type[Made]:
     named: Any = kind
     places = {name: index for index, name in enumerate(named._fields)}
 
+    make = tuple.__new__
+
     def replaced(self: Made, /, **changes: Any) -> Made:
-        values = list(self)
+        values = [*self]
         for name, value in changes.items():
             values[places[name]] = value
-        return tuple.__new__(kind, values)
+        return make(kind, values)
 
     named._replace = replaced
     return kind

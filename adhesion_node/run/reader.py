@@ -48,11 +48,11 @@ class Reader:
         return sample._replace(t_ns=sample.t_ns - round(late_s * NS)) if late_s else sample
 
     def _read(self, topic: Topic, message: Any) -> Sample:
-        is_anchor = topic in self.anchors
-        if is_anchor and self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
+        is_better = topic is not self.source and topic in self.anchors
+        if is_better and self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
             raise Rejected(Reason.OTHER_SOURCE, f"{topic.name} beside {self.source.name}")
         sample: Sample = message if isinstance(message, Sample) else topic.read(message, self.line)
-        if is_anchor:
+        if is_better:
             self.source = topic
         return sample
 

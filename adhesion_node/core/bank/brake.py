@@ -73,7 +73,7 @@ class BrakeSeen(NamedTuple):
             most = before_s * config.train.full_pressure_pa / config.brake_build_up_s
             applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
             return BrakeSeen(recent, pressure, applied, None, full_ns)
-        peak = max(each.pressure_pa for each in recent[bisect_left(recent, (t_ns - DUMP_NS,)) :])
+        peak = max([each.pressure_pa for each in recent[bisect_left(recent, (t_ns - DUMP_NS,)) :]])
         dumps = peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak)
         if self.dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)

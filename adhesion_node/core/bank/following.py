@@ -25,9 +25,9 @@ from .kernels import weighing
 from .kinds import FREE, FREE_STD, NOISES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCALE, SIZE, SPEED, Bank
 from .memory import HALF_LOG_2PI, Memory, S, steps
-from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance
+from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
-from .seeing import CLIPPED, acceleration_seen, position_seen, speed_seen
+from .seeing import CLIPPED, acceleration_seen, speed_seen
 from .wheels import UNLEARNT, told
 
 if TYPE_CHECKING:
@@ -45,14 +45,8 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
     off = None if predicted is None else predicted.stds
     course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked, off)
-    known = predicted if predicted is not None and predicted.bank is bank else None
-    if known is not None or memory.is_placed:
-        if known is not None:
-            innovation, white = known.innovation, known.white
-        else:
-            seen = position_seen(bank, measurement.position_m, declared)
-            innovation, white = seen.innovation, seen.variances
-        *beliefs, total = weighing.placed(bank.mean, bank.covariance, bank.log_weight, innovation, white, CLIPPED)
+    if (predicted is not None and predicted.bank is not None) or memory.is_placed:
+        *beliefs, total = weighing.placed(*bank[:4], white_variances(declared), measurement.position_m, CLIPPED)
         return memory._replace(
             bank=bank.believing(*beliefs),
             declared_m=declared,
@@ -107,15 +101,16 @@ def followed(
     `rail` is asked for where a braking opens; `predicted` is what `off` has said of the measurement, if that is known.
     """
     pressures, speeds, start = _pressures(measurement), _speeds(config, measurement), memory
-    if measurement.brake_pressure_pa is None and measurement.demand_pa is None:
+    demand_pa, imu = measurement.demand_pa, measurement.imu
+    if measurement.brake_pressure_pa is None and demand_pa is None:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
-    for until_ns in steps(before_ns, measurement.t_ns, [each.t_ns for each in speeds]):
+    for until_ns in steps(before_ns, measurement.t_ns, speeds):
         ahead = predicted.bank if predicted is not None and until_ns == measurement.t_ns else None
         bank = memory.bank_at(config, until_ns) if ahead is None or memory is not start else ahead
         since_ns, before_ns, braking = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
-        brake = memory.brake.after(config, now, measurement.demand_pa)
+        brake = memory.brake.after(config, now, demand_pa)
         memory = memory._replace(
             bank=bank,
             t_ns=until_ns,
@@ -123,8 +118,8 @@ def followed(
             brake=brake,
             braking=_braking(config, memory, brake, until_ns),
         )
-        if measurement.imu:
-            felt = [each for each in measurement.imu if since_ns < each.t_ns <= until_ns]
+        if imu:
+            felt = [each for each in imu if since_ns < each.t_ns <= until_ns]
             memory = _felt(config, memory, felt, braking) if felt else memory
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):

@@ -63,7 +63,7 @@ class Bank(NamedTuple):
 
     def is_sound(self) -> bool:
         """Whether every number is finite and no variance below 0."""
-        return weighing.is_sound(self.mean, self.covariance, self.log_weight)
+        return weighing.is_sound(*self[:3])
 
     def believing(self, mean: Array, covariance: Array, log_weight: Array) -> Bank:
         """With these beliefs and weights under the same labels."""

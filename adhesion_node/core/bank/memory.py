@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..belief.rail import Rail
-from ..intake.samples import MAX_VARIANCE_M2
+from ..intake.samples import MAX_VARIANCE_M2, SpeedSample
 from ..quick import quick
 from .brake import BrakeSeen
 from .kernels import weighing
@@ -102,12 +102,12 @@ class Memory(NamedTuple):
         return moved(config, self.bank, (until_ns - self.t_ns) / S, self.braking, self.declared_m)
 
 
-def steps(from_ns: int, to_ns: int, times_ns: Sequence[int] = ()) -> Sequence[int]:
-    """Ends of the steps up to a time: at some times on the way, and no step too long."""
-    if not times_ns and to_ns - from_ns <= STEP_S * S:
+def steps(from_ns: int, to_ns: int, speeds: Sequence[SpeedSample] = ()) -> Sequence[int]:
+    """Ends of the steps up to a time: at those of the speeds that lie on the way, and no step too long."""
+    if not speeds and to_ns - from_ns <= STEP_S * S:
         return (to_ns,)
     ends: list[int] = []
-    for until_ns in (*sorted({each for each in times_ns if from_ns < each < to_ns}), to_ns):
+    for until_ns in (*sorted({each.t_ns for each in speeds if from_ns < each.t_ns < to_ns}), to_ns):
         count = max(math.ceil((until_ns - from_ns) / (STEP_S * S)), 1)
         ends += [from_ns + (until_ns - from_ns) * index // count for index in range(1, count + 1)]
         from_ns = until_ns

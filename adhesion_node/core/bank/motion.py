@@ -118,10 +118,6 @@ class Foreseen(NamedTuple):
     """In standard deviations, without sign, by the hypothesis nearest."""
     bank: Bank | None = None
     """What was foreseen."""
-    innovation: Array = np.empty(0)
-    """Of the position under each hypothesis, m, shape (H,)."""
-    white: Array = np.empty(0)
-    """Variance of its white error, m^2, shape (H,)."""
 
     @property
     def stds(self) -> float:
@@ -140,10 +136,10 @@ def foreseen(
 ) -> Foreseen:
     """As `moved`, and how far a position is off, whose declared standard deviation is only a hint."""
     step = (dt_s, *braking, declared_m)
-    mean, covariance, innovation, white, metres, std_m, nearest = moving.foreseen(
-        model_of(config)[:], bank[:], step, position_m, position_std_m
+    mean, covariance, *off = moving.foreseen(
+        model_of(config)[:], bank[:], step, position_m, white_variances(position_std_m)
     )
-    return Foreseen(metres, std_m, nearest, bank.believing(mean, covariance, bank.log_weight), innovation, white)
+    return Foreseen(*off, bank.believing(mean, covariance, bank.log_weight))
 
 
 @once
@@ -178,11 +174,12 @@ def open_variance(config: Config, bank: Bank) -> Array:
 
 def white_variance(bank: Bank, declared_m: float) -> Array:
     """Variance of the positions' white part, m^2, shape (H,)."""
-    return _white_variances(declared_m)[bank.noise]
+    return white_variances(declared_m)[bank.noise]
 
 
 @lru_cache(maxsize=64)  # a receiver mostly declares the same
-def _white_variances(declared_m: float) -> Array:
+def white_variances(declared_m: float) -> Array:
+    """The same by the label `noise`, shape (N,)."""
     return np.asarray(np.square(np.maximum(kinds.WHITE[:, 0] * declared_m, kinds.WHITE[:, 1])))
 
 

@@ -78,8 +78,9 @@ def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, .
         inbox = inbox._replace(begun_ns=t_ns)
     values: list[Any] = []
     spent: dict[type[Any], Stream] = {}
+    others = inbox.others
     for source in sources:  # at every anchor: quicker than to make tuple and dictionary at once
-        stream = inbox.others.get(source.kind)
+        stream = others.get(source.kind)
         if stream is None:
             values.append(() if source.each else None)
         elif source.each:
@@ -88,7 +89,8 @@ def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, .
                 spent[source.kind] = stream.spent(values[-1][-1].t_ns)
         else:
             values.append(value_of(inbox, source, stream, t_ns))
-    others = MappingProxyType(inbox.others | spent) if spent else inbox.others
+    if spent:
+        others = MappingProxyType(others | spent)
     if isinstance(turn, Tick):
         return inbox._replace(released_ns=t_ns, others=others), tuple(values)
     anchors = inbox.anchors.after_first()
@@ -107,10 +109,12 @@ def _is_last(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
 
 def _lacks(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
     """Whether a sensor that is there has not come as far as a time, and is to be waited for by the anchors' stamps."""
-    newest_ns = inbox.anchors.newest_ns
+    newest_ns, begun_ns, others = inbox.anchors.newest_ns, inbox.begun_ns, inbox.others
     for source in gate.sources:  # at every anchor: quicker than `any`
         if newest_ns is None or t_ns > newest_ns - source.wait_ns:
-            stream = inbox.others.get(source.kind)
+            stream = others.get(source.kind)
+            if stream is None and t_ns > begun_ns + source.wait_ns:  # nor is it there
+                continue
             if (stream is None or not stream.has_reached(t_ns)) and is_present(inbox, source, stream, t_ns):
                 return True
     return False

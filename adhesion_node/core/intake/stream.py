@@ -80,7 +80,8 @@ class Stream(NamedTuple):
     @property
     def excess(self) -> int:
         """Samples beyond the most that are kept."""
-        return max(len(self.samples) - MOST, 0)
+        count = len(self.samples)
+        return count - MOST if count > MOST else 0
 
     def has_between(self, first_ns: int, last_ns: int) -> bool:
         """Whether a kept sample is stamped from the first to the last time."""

@@ -189,25 +189,23 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
 
 @kernel
 def foreseen(
-    model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers, position_m: float, declared_m: float
-) -> tuple[Array, Array, Array, Array, float, float, float]:
+    model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers, position_m: float, white: Array
+) -> tuple[Array, Array, float, float, float]:
     """Means and covariances after a step, and how far a position lies off what they foresee.
 
-    That is its innovation and the variance of its white error under each hypothesis, shape (H,); the mean innovation,
-    its standard deviation over all hypotheses, and the least one in its own.
+    That is the mean innovation, its standard deviation over all hypotheses, and the least one in its own. `white` is
+    the variance, m^2, of the position's white error by the label `noise`.
     """
     means, covariances = moved(model_numbers, bank, step_numbers)
-    noises, log_weight, noise = model_numbers[6], bank[2], bank[3]
-    innovation, white = np.empty(noise.size), np.empty(noise.size)
-    metres, spread, nearest = 0.0, 0.0, np.inf
+    log_weight, noise = bank[2], bank[3]
+    metres, spread, nearest, innovation = 0.0, 0.0, np.inf, np.empty(noise.size)
     for h in range(noise.size):
         innovation[h] = position_m - (means[h, POSITION] + means[h, OFFSET])
-        white[h] = max(noises[noise[h], 0] * declared_m, noises[noise[h], 1]) ** 2
         metres += math.exp(log_weight[h]) * innovation[h]
     for h in range(noise.size):
         p = covariances[h]
-        each = p[POSITION, POSITION] + p[POSITION, OFFSET] + p[OFFSET, POSITION] + p[OFFSET, OFFSET] + white[h]
+        each = p[POSITION, POSITION] + p[POSITION, OFFSET] + p[OFFSET, POSITION] + p[OFFSET, OFFSET] + white[noise[h]]
         nearest = min(nearest, abs(innovation[h]) / math.sqrt(each))
         spread += math.exp(log_weight[h]) * (each + (innovation[h] - metres) ** 2)
     # NaN where any number has failed
-    return means, covariances, innovation, white, metres, math.sqrt(spread), nearest + 0.0 * spread
+    return means, covariances, metres, math.sqrt(spread), nearest + 0.0 * spread

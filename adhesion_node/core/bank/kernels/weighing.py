@@ -165,17 +165,26 @@ def corrected(
 
 @kernel
 def placed(
-    mean: Array, covariance: Array, log_weight: Array, innovation: Array, variance: Array, clipped: float
+    mean: Array,
+    covariance: Array,
+    log_weight: Array,
+    noise: Labels,
+    white: Array,
+    position_m: float,
+    clipped: float,
 ) -> tuple[Array, Array, Array, float]:
-    """`corrected` by a position, of which place and slow error are seen, its weights normalised; ln of their sum."""
+    """`corrected` by a position, of which place and slow error are seen, its weights normalised; ln of their sum.
+
+    `white` is the variance, m^2, of the rest of its error, by the hypothesis' label `noise`.
+    """
     means, covariances, weights = np.empty_like(mean), np.empty_like(covariance), np.empty_like(log_weight)
     gain = np.empty(SIZE)
     for h in range(log_weight.size):
-        p = covariance[h]
+        p, innovation = covariance[h], position_m - (mean[h, POSITION] + mean[h, OFFSET])
         for i in range(SIZE):
             gain[i] = p[POSITION, i] + p[OFFSET, i]
-        spread = variance[h] + gain[POSITION] + gain[OFFSET]
+        spread = white[noise[h]] + gain[POSITION] + gain[OFFSET]
         before, after = (mean[h], p, log_weight[h]), (means[h], covariances[h])
-        weights[h] = _taken_in(before, innovation[h], gain, spread, clipped, after)
+        weights[h] = _taken_in(before, innovation, gain, spread, clipped, after)
     whole = total(weights)
     return means, covariances, weights - whole, whole
