@@ -16,7 +16,7 @@ from .bank import following as bank
 from .bank.judging import misled
 from .bank.memory import Memory
 from .bank.steps import Stepping
-from .bank.verdict import Findings, found
+from .bank.verdict import SPEED_ERROR, Findings, found
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail
 from .belief.rail_map import Way
@@ -115,7 +115,8 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
         before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
-    verdict = _verdict(memory, findings, memory.changes > knowledge.changes)
+    told = Gaussian(belief.mean, belief.covariance + SPEED_ERROR)
+    verdict = _verdict(memory, findings, told, memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict, findings.known)
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes, findings.ahead, memory.misled)
     memory = memory._replace(log_likelihood=0.0)
@@ -135,14 +136,14 @@ def _informed(config: Config, rail: Rail, t_ns: int, belief: Gaussian) -> Rail:
     return config.rail_map.informed(rail, way, config.speed_law, config.map_trust)
 
 
-def _verdict(memory: Memory, findings: Findings, changed: bool) -> Verdict:
+def _verdict(memory: Memory, findings: Findings, belief: Gaussian, changed: bool) -> Verdict:
     fit = Fit(
         window=memory.seen,
         iterations=int(memory.braked),
         log_likelihood=memory.log_likelihood,
-        ess=float(1.0 / np.sum(memory.bank.weight**2)),
+        ess=float(1.0 / np.add.reduce(memory.bank.weight**2)),  # what np.sum calls
     )
-    return Verdict(findings.regime, findings.rail, findings.belief, None, fit=fit, changed=changed)
+    return Verdict(findings.regime, findings.rail, belief, None, fit=fit, changed=changed)
 
 
 def last_banked(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -112,9 +113,13 @@ class Course(NamedTuple):
 
 def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:
     """Mean variance of the white errors, m^2, and of the worst that wander over the time that they last, m^2/s."""
-    white = float(bank.weight @ white_variance(bank, declared_m))
-    slow = [max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in kinds.NOISES]
+    white, slow = float(bank.weight @ white_variance(bank, declared_m)), _wandering(declared_m)
     return white, max(slow[noise] for noise in {RECEIVER, *bank.noise.tolist()})
+
+
+@lru_cache(maxsize=64)  # a receiver mostly declares the same
+def _wandering(declared_m: float) -> tuple[float, ...]:
+    return tuple(max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in kinds.NOISES)
 
 
 def _error(white: float, slow: float, span_s: float, count: int) -> float:

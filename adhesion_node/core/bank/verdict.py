@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..belief.gaussian import Gaussian
 from ..belief.rail import Rail
 from ..belief.regime import Regime
 from ..physics.train import Array
@@ -96,8 +95,6 @@ class Findings(NamedTuple):
 
     regime: Regime
     rail: Rail
-    belief: Gaussian
-    """Of (s, v)."""
     ahead: Ahead
     known: Rail
     """What it teaches of the rail: where the brake limits, that it gives at least so much."""
@@ -106,12 +103,10 @@ class Findings(NamedTuple):
 def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findings:
     """Judge the bank; `before` is the rail as it was known, aged to now, `nothing` what is known of any rail."""
     bank = memory.bank
-    mean, covariance = bank.moments(2)
-    belief = Gaussian(mean, covariance + SPEED_ERROR)
     if memory.misled:
-        return Findings(Regime.COASTING, nothing, belief, constant(nothing.lower), nothing)
+        return Findings(Regime.COASTING, nothing, constant(nothing.lower), nothing)
     if not memory.braked and memory.brake.known:
-        return Findings(Regime.COASTING, before, belief, constant(before.lower), before)
+        return Findings(Regime.COASTING, before, constant(before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     std = np.hypot(used.std(bank), config.used_ripple * used.value)
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
@@ -121,7 +116,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         free = before
         if rail.mu > SLOWING:
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
-        return Findings(Regime.COASTING, free, belief, constant(before.lower), free)
+        return Findings(Regime.COASTING, free, constant(before.lower), free)
     missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
     ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known, used)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
@@ -138,7 +133,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     lower = max(rail.lower, least)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
-    return Findings(regime, rail, belief, ahead, known)
+    return Findings(regime, rail, ahead, known)
 
 
 def _is_partial(config: Config, braking: Braking) -> bool:

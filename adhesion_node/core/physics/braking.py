@@ -28,6 +28,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 _GRID, _HALF = np.linspace(1.0, 0.0, POINTS), 0.5 / (POINTS - 1)
 _EVERY = np.concatenate((_GRID, ((_GRID[:-1] + _GRID[1:])[:, None] / 2 + _HALF * _NODES).ravel()))
 """Of the speed that is lost: the points of a curve, and behind them the nodes between two of them."""
+_ONES = np.ones((2, POINTS - 1, _NODES.size))
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +74,7 @@ def slowdown(train: Train, speed_mps: float, target_mps: float = 0.0, grade: flo
     """A train that slows down to a target speed; arguments as those of `curve`, which checks them."""
     lost = max(speed_mps - target_mps, 0.0)
     every = target_mps + lost * _EVERY
-    integrands = np.ones((2, POINTS - 1, _NODES.size))
+    integrands = _ONES.copy()
     integrands[0] = every[POINTS:].reshape(-1, _NODES.size)
     return Slowdown(train, every, train.specific_resistance(every) + grade, integrands, _HALF * lost * _WEIGHTS, grade)
 
