@@ -136,10 +136,10 @@ def foreseen(
 ) -> Foreseen:
     """As `moved`, and how far a position is off, whose declared standard deviation is only a hint."""
     step = (dt_s, *braking, declared_m)
-    mean, covariance, *off = moving.foreseen(
+    mean, covariance, metres, std_m, nearest = moving.foreseen(
         model_of(config)[:], bank[:], step, position_m, white_variances(position_std_m)
     )
-    return Foreseen(*off, bank.believing(mean, covariance, bank.log_weight))
+    return Foreseen(metres, std_m, nearest, bank.believing(mean, covariance, bank.log_weight))
 
 
 @once
