@@ -28,7 +28,7 @@ from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
 from .seeing import CLIPPED, acceleration_seen, speed_seen
-from .wheels import UNLEARNT, told
+from .wheels import BRAKE_BELOW, UNLEARNT, told
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -163,4 +163,5 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> B
     """What the brake does from now on."""
     share = memory.wheels.share(now_ns)
     applied = config.train.specific_brake(brake.applied_pa)
-    return Braking(applied, 1.0 if share is None else share, brake.rising, told(share, brake.has_slid(now_ns)))
+    sliding = share if share is not None and share >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
+    return Braking(applied, sliding, brake.rising, told(share, brake.has_slid(now_ns)))

@@ -26,6 +26,7 @@ from .layout import SPEED, Bank
 from .memory import Memory, S
 from .motion import Braking, Use, model_of, resistance, use
 from .seeing import ROLLED
+from .wheels import BRAKE_BELOW
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -59,10 +60,14 @@ PARTIAL = 0.8
 LIKELY = 0.5
 """Probability of sliding from which what is used is what the rail gives."""
 
-BRAKE_BELOW, SLIDES_FROM, CLAIMED = 0.05, 0.5, 0.8
-"""Shares of sliding axles that leave no doubt, and the probability from which something is claimed without them."""
+SLIDES_FROM, CLAIMED = 0.5, 0.8
+"""Share of sliding axles that leaves no doubt, and the probability from which something is claimed without them."""
 
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
+
+UNTOLD = 4.0
+"""Times its odds sliding counts for the way ahead while neither wheels nor slide protection tell of it: as if it were
+as likely as rolling when the brake was applied, so that nothing but what is measured since speaks for the brake."""
 
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
 """A change of the rail counts for the way ahead after so long, once it is so probable, or once all that are so young
@@ -122,12 +127,12 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, least)
-        ahead = ahead.at_least(least)
+        ahead = ahead.at_least(min(least, _whole_brake(config)))
     else:
         regime = _regime(config, memory, slides, rail.mu)
         rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
         if _is_partial(config, memory.braking) and rolls:
-            ahead = ahead.at_least(least)
+            ahead = ahead.at_least(min(least, _whole_brake(config)))
         else:
             least = 0.0
     lower = max(rail.lower, least)
@@ -137,7 +142,13 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
 
 
 def _is_partial(config: Config, braking: Braking) -> bool:
-    return braking.applied < PARTIAL * config.train.specific_brake(config.train.full_pressure_pa)
+    return braking.applied < PARTIAL * _whole_brake(config)
+
+
+@once
+def _whole_brake(config: Config) -> float:
+    """B/(M g) by the train's papers."""
+    return config.train.specific_brake(config.train.full_pressure_pa)
 
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
@@ -149,9 +160,7 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     part, error = mu / max(demanded, 1e-6), config.brake_error
     if slides > CLAIMED and (part < 1.0 - 2.0 * error or memory.braking.told > 0.0):
         return Regime.ADHESION_LIMITED
-    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.specific_brake(
-        config.train.full_pressure_pa
-    )
+    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * _whole_brake(config)
     if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not dumps:
         return Regime.BRAKE_LIMITED
     return Regime.COASTING
@@ -170,14 +179,18 @@ def counted_on(
     """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill.
 
     What is known of roughness and grade here fades along the way, and the way takes the mean of them. Axles that roll
-    under a weak brake leave the bound as it was `known` when the braking began: the whole brake may make them slide.
+    under a part of the brake leave the bound as it was `known` when the braking began, as far as the whole brake can
+    use it: that may make them slide.
     `used` is what each hypothesis uses now, if that is at hand.
     """
     used = use(config, bank, braking, resistance(config, bank)) if used is None else used
-    weight = bank.weight
+    weight, partial = bank.weight, _is_partial(config, braking)
     speeds = float(weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD
-    borne = ROLLED[0] / ROLLED[1] if _is_partial(config, braking) else 1.0
-    asked = mixture.Asked(float(missed), borne, float(known.lower))
+    if not (partial or braking.told):
+        weight = weight * np.where(used.slides, UNTOLD, 1.0)
+        weight /= weight.sum()
+    borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, _whole_brake(config))) if partial else (1.0, 0.0)
+    asked = mixture.Asked(float(missed), borne, float(least))
     low = mixture.counted_on(_ahead_of(config), bank, weight, used, speeds, asked)
     return Ahead(tuple(speeds.tolist()), tuple(low.tolist()))
 

@@ -39,6 +39,8 @@ UNLEARNT = 0.03
 LEARNING_MPS = 5.0
 """Radii are learnt from this speed on."""
 
+BRAKE_BELOW = 0.05
+"""Share of sliding axles below which the brake limits."""
 
 RISEN = 1.02
 """Times its lowest speed from which the fastest rim has risen, more than by noise."""
@@ -140,4 +142,4 @@ def told(share: float | None, dumping: bool) -> float:
     """
     if share is None:
         return 4.0 if dumping else 0.0
-    return 4.0 if share >= 0.25 else -4.0 if share < 0.05 else math.copysign(0.0, 1.0)
+    return 4.0 if share >= 0.25 else -4.0 if share < BRAKE_BELOW else math.copysign(0.0, 1.0)

@@ -26,6 +26,7 @@ from sim_node.real.sensors.fitted import FITTED
 from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
+from ...core.physics.track import Grade, Track
 from ...wire.line import NOMINAL, Line
 from ...wire.track_line import TrackLine, line_of
 from . import point_mass
@@ -63,7 +64,7 @@ class Case(NamedTuple):
     def config(self) -> Config:
         """What the estimator is told: the train by its papers, the known grades, what its sensors are, not how good."""
         if self.scenario == point_mass.NAME:
-            return Config()
+            return Config(track=Track((Grade(-known.LONG_M, known.LONG_M, 0.0),)))
         scenario = SCENARIOS[self.scenario]
         told: dict[str, Any] = {**known.brake(scenario), **FITTED[self.fitted].told}
         return Config(known.train(scenario), known.track(scenario), **told)

@@ -269,13 +269,18 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
     std = np.sqrt(np.maximum(variance, 1e-12)) * rising
     # the whole brake may make axles slide that roll under a part of it
-    partial = braking.applied < verdict.PARTIAL * config.train.specific_brake(config.train.full_pressure_pa)
+    whole = config.train.specific_brake(config.train.full_pressure_pa)
+    partial = braking.applied < verdict.PARTIAL * whole
     borne = used.value * (ROLLED[0] / ROLLED[1] if partial else 1.0)
-    foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < known.lower)
-    foreseen, std = np.where(more, known.lower, foreseen), np.where(more, 1e-6, std)
+    least = min(known.lower, whole) if partial else 0.0
+    foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < least)
+    foreseen, std = np.where(more, least, foreseen), np.where(more, 1e-6, std)
     middle = np.maximum(foreseen, verdict.LEAST_AHEAD)
     variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
-    low = np.exp(quantiles(bank.weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
+    # where nothing tells which, sliding is as likely as rolling beforehand
+    odds = np.where(sliding & (not partial) & (braking.told == 0.0), verdict.UNTOLD, 1.0) * bank.weight
+    weight = odds / odds.sum()
+    low = np.exp(quantiles(weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
     return speeds, low
 
 

@@ -132,9 +132,35 @@ def test_rolling_axles_may_slide_under_the_whole_brake(share: float, counted: fl
     bank = bank._replace(covariance=1e-8 * bank.covariance)
     config, braking = replace(CONFIG, ahead_std=0.0, grade_std=0.0, resistance_std=0.0), Braking(share * FULL)
     used = float(use(config, bank, braking, resistance(config, bank)).value[0])
-    for known in (0.0, 0.2 * FULL, 0.6 * FULL):
+    for known in (0.0, 0.2 * FULL, 0.6 * FULL, 3.0 * FULL):
         ahead = counted_on(config, bank, 0.5, braking, Rail(0.05, 0.04, known))
-        assert ahead.mu == pytest.approx([max(counted * used, known)] * 6, rel=0.01)
+        bears = min(known, FULL) if share < 1.0 else 0.0  # the whole brake shows what it gives
+        assert ahead.mu == pytest.approx([max(counted * used, bears)] * 6, rel=0.01)
+
+
+@pytest.mark.parametrize("share", [0.5, 1.0])
+def test_no_rail_lets_a_train_brake_harder_than_its_brake(share: float) -> None:
+    """A heavy one, whose whole brake uses less than is counted on where nothing is known of the rail."""
+    bank = bank_of([HELD, SMOOTH], spread=0.0).with_fresh(GRADE, 0.0, 0.0)
+    bank.mean[:, BRAKE], bank.mean[:, MU] = 1.0, 0.3
+    bank = bank._replace(covariance=1e-8 * bank.covariance)
+    config = replace(CONFIG, ahead_std=0.0, train=replace(CRH3, mass_kg=4.0e6))
+    gives = config.train.specific_brake(FULL_PA)
+    assert gives < NOTHING.lower
+    findings = found(config, memory_of(bank, Braking(share * gives), 3), NOTHING, NOTHING)
+    assert max(findings.ahead.mu) <= 1.001 * gives
+
+
+@pytest.mark.parametrize(("told", "odds"), [(0.0, 4.0), (-4.0, 1.0), (4.0, 1.0)])
+def test_what_limits_counts_by_what_is_measured_unless_wheels_tell(told: float, odds: float) -> None:
+    """Beforehand a brake that holds is likelier than one under which axles slide: that is no reason for a short way."""
+    held, slides = (ahead_bank(0.05, 50.0, [kind]) for kind in (HELD, SMOOTH))
+    slides.mean[:, MU] = 0.03
+    both = joined([held, slides])._replace(log_weight=np.log([0.99, 0.01]))
+    braking, config = Braking(FULL, told=told), replace(CONFIG, ahead_std=0.01)
+    missed = 0.5 * odds * 0.01 / (0.99 + odds * 0.01)  # so much lies below the middle of what sliding leaves
+    alone = counted_on(config, slides, 0.5, braking, NOTHING)
+    assert counted_on(config, both, missed, braking, NOTHING).mu[-1] == pytest.approx(alone.mu[-1], rel=0.03)
 
 
 @pytest.mark.parametrize(("probability", "counts"), [(0.15, False), (0.25, True)])

@@ -204,3 +204,20 @@ def test_the_fastest_rim_bounds_the_speed_while_positions_are_out() -> None:
         memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
     assert memory is not None
     assert memory.bank.mean_of(SPEED) >= 0.997 * speed
+
+
+def test_axles_that_begin_to_slide_unseen_and_all_alike_are_thought_of() -> None:
+    """20 s at 40 m/s, then the full brake on a rail that gives 0.03, all rims slower by too little to be told."""
+    memory: Memory | None = None
+    for index in range(212):
+        t_ns, braked_s = S + index * 100 * MS, max(0.1 * (index - 200), 0.0)
+        speed = 40.0 - 9.8 * 0.035 * braked_s
+        wheels = (sample(t_ns, speed, np.full(4, 0.02 * (braked_s > 0.0)), EVEN),)
+        where = 4.0 * index - 0.5 * 9.8 * 0.035 * braked_s**2
+        measured = Measurement(t_ns, where, 0.04, 410e3 * (braked_s > 0.0), wheels=wheels)
+        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
+    assert memory is not None
+    assert memory.wheels.share(memory.t_ns) == 0.0
+    speeds = memory.bank.mean[:, SPEED]
+    assert speeds.min() < speed - 0.2, "the brake holds"
+    assert speeds.max() > speed - 0.1, "or none of them rolls"
