@@ -190,8 +190,8 @@ class Config:
     pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
     used_ripple: float = _unsure(
         0.02,
-        "By how much the adhesion used swings about its mean over some seconds, as slide protection works in turns, "
-        "relative",
+        "By how much the adhesion that a train of 200 m uses swings about its mean over some seconds, as slide "
+        "protection works in turns, relative; the fewer axles, the more: it goes with 1/sqrt(length)",
         "",
         0.0,
         1.0,
@@ -291,6 +291,11 @@ class Config:
         """Standard deviation of the most that the brake can use, B/(M g), relative."""
         rotating = self.rotating_mass_std / (1.0 + self.train.rotating_mass_fraction)
         return math.hypot(self.mass_std, self.brake_std, rotating)
+
+    @property
+    def ripple(self) -> float:
+        """`used_ripple` of this train, relative; of a shorter one than 20 m no more than of that."""
+        return self.used_ripple * math.sqrt(200.0 / max(self.train.length_m, 20.0))
 
     @property
     def grade_error(self) -> float:

@@ -113,7 +113,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if not memory.braked and memory.brake.known:
         return Findings(Regime.COASTING, before, constant(before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
-    std = np.hypot(used.std(bank), config.used_ripple * used.value)
+    std = np.hypot(used.std(bank), config.ripple * used.value)
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
     rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))

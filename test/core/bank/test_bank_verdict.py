@@ -314,6 +314,17 @@ def test_the_bound_is_the_mixtures_and_below_its_median() -> None:
     assert low < rail.lower < rail.mu
 
 
+def test_the_fewer_axles_the_more_one_of_them_takes_away() -> None:
+    """Slide protection that lets go of one axle: of a tram of 32 m as sqrt(200/32) times of a train of 200 m."""
+    bank = bank_of([SMOOTH], spread=0.0).with_fresh(ROUGH, 0.0, 0.0)
+    bank = bank._replace(covariance=1e-12 * bank.covariance)
+    for length_m, ripple in ((200.0, 0.02), (32.0, 0.05), (700.0, 0.0107), (2.0, 0.0632)):
+        config = replace(CONFIG, train=replace(CRH3, length_m=length_m))
+        rail = found(config, memory_of(bank, Braking(FULL), 3), NOTHING, NOTHING).rail
+        assert rail.std == pytest.approx(ripple * rail.mu, rel=0.01)
+        assert rail.lower == pytest.approx((1.0 + norm.ppf(0.6 * 0.05) * ripple) * rail.mu, rel=0.01)
+
+
 def test_a_train_that_may_be_faster_than_told_counts_on_less() -> None:
     """Known for certain but for its speed, 30 +- 0.6 m/s: against ways drawn from that speed."""
     config = replace(CONFIG, ahead_std=0.0, grade_std=0.0, profile_std=0.0, resistance_std=0.0)
