@@ -10,7 +10,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
@@ -27,7 +28,9 @@ from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
 from ...core.physics.track import Grade, Track
+from ...core.setting import Value, settings_of
 from ...wire.line import NOMINAL, Line
+from ...wire.settings.given import parse_setting
 from ...wire.track_line import TrackLine, line_of
 from . import point_mass
 from .truth import USED_S
@@ -47,6 +50,8 @@ class Case(NamedTuple):
 
     scenario: str
     fitted: str
+    told: tuple[tuple[str, Value], ...] = ()
+    """Settings of the estimator that differ from what it is told else."""
 
     @property
     def name(self) -> str:
@@ -64,9 +69,9 @@ class Case(NamedTuple):
     def config(self) -> Config:
         """What the estimator is told: the train by its papers, the known grades, what its sensors are, not how good."""
         if self.scenario == point_mass.NAME:
-            return Config(track=Track((Grade(-known.LONG_M, known.LONG_M, 0.0),)))
+            return replace(Config(track=Track((Grade(-known.LONG_M, known.LONG_M, 0.0),))), **dict[str, Any](self.told))
         scenario = SCENARIOS[self.scenario]
-        told: dict[str, Any] = {**known.brake(scenario), **FITTED[self.fitted].told}
+        told: dict[str, Any] = {**known.brake(scenario), **FITTED[self.fitted].told, **dict(self.told)}
         return Config(known.train(scenario), known.track(scenario), **told)
 
     @property
@@ -143,10 +148,14 @@ CASES = tuple(
 """The lines of the table."""
 
 
-def chosen(only: str) -> tuple[Case, ...]:
-    """The cases whose names hold one of the texts, separated by commas. Raises ValueError without any."""
+def chosen(only: str, told: Sequence[str] = ()) -> tuple[Case, ...]:
+    """The cases whose names hold one of the texts, separated by commas, with settings NAME=VALUE.
+
+    Raises ValueError without any case, and for a setting that the estimator has not or that is out of its range.
+    """
+    others = tuple(parse_setting(text, settings_of(Config)) for text in told)
     wanted = [text.strip().lower() for text in only.split(",") if text.strip()]
     some = tuple(case for case in CASES if not wanted or any(text in case.name.lower() for text in wanted))
     if not some:
         raise ValueError(f"only = {only}: give parts of {'; '.join(case.name for case in CASES)}")
-    return some
+    return tuple(case._replace(told=others) for case in some)

@@ -72,6 +72,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study real`."""
     parser.add_argument("--runs", type=int, default=20, help="runs of each case (default %(default)s)")
     parser.add_argument("--only", default="", metavar="TEXT,...", help="cases whose names hold one of the texts")
+    other = "a setting of the estimator that shall differ from what it is told else; repeatable"
+    parser.add_argument("--set", metavar="NAME=VALUE", action="append", default=[], help=other)
     seeds = parser.add_mutually_exclusive_group()
     seeds.add_argument(
         "--first-seed", type=int, default=JUDGED_SEEDS, metavar="SEED", help="of the first run (default %(default)s)"
@@ -89,7 +91,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing, return a row per case, draw the figures."""
-    cases = found(chosen(options.only), options.first_seed, options.runs, running(options))
+    cases = found(chosen(options.only, options.set), options.first_seed, options.runs, running(options))
     table = [row(case, score(of_case)) for case, of_case in cases.items()]
     for entry in table:
         entry["first_seed"] = options.first_seed
@@ -108,13 +110,15 @@ def row(case: Case, scored: Mapping[str, Any]) -> dict[str, Any]:
         goal.figure: [limit if np.isfinite(limit) else None for limit in (goal.least, goal.most)]
         for goal in goals(case)
     }
-    named = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
+    named: dict[str, Any] = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
     at_best = least(case)
     bound = {
         "found_soonest_s": soonest(case),
         "error_least_percent": at_best.error_percent,
         "excess_least_percent": at_best.excess_percent,
     }
+    if case.told:
+        named["set"] = dict(case.told)
     return {**named, **scored, **bound, "goals": ranges, "missed": missed(case, scored)}
 
 

@@ -36,6 +36,16 @@ def test_cases_are_chosen_by_parts_of_their_names() -> None:
         chosen("mars")
 
 
+def test_a_setting_may_be_told_otherwise() -> None:
+    for case in chosen("point, tram_wet", ["profile_std=1e-5", "confidence=0.9"]):
+        assert (case.config.profile_std, case.config.confidence) == (1e-5, 0.9)
+        assert case.config.train == case._replace(told=()).config.train
+    with pytest.raises(ValueError, match=r"setting 'mars=1': write NAME=VALUE"):
+        chosen("", ["mars=1"])
+    with pytest.raises(ValueError, match=r"confidence = 2\.0"):
+        _ = chosen("point", ["confidence=2"])[0].config
+
+
 def test_the_cases_span_trains_rails_and_sensors() -> None:
     scenarios = {case.scenario for case in CASES}
     assert scenarios <= {*SCENARIOS, point_mass.NAME}
