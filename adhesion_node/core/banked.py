@@ -91,15 +91,16 @@ def _accepted(
 ) -> tuple[State, Estimate | None]:
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
+    placed, seen = measurement.has_position, state.seen
     state = state._replace(
         stepping=state.stepping if stepping is None else stepping,
-        counts=counted(state.counts, Event(Outcome.ACCEPTED if measurement.has_position else Outcome.TICK)),
+        counts=counted(state.counts, Event(Outcome.ACCEPTED if placed else Outcome.TICK)),
         newest=measurement,
         memory=memory,
-        outliers=0 if measurement.has_position else state.outliers,
+        outliers=0 if placed else state.outliers,
         since_estimate=state.since_estimate + 1,
     )
-    since_s = math.inf if state.seen is None else (measurement.t_ns - state.seen.t_ns) * 1e-9
+    since_s = math.inf if seen is None else (measurement.t_ns - seen.t_ns) * 1e-9
     if since_s < config.estimate_s - 1e-3 or memory.fixes < 2:
         return state, None
     return _told(config, state)

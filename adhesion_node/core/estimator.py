@@ -158,15 +158,6 @@ def _measurement(config: Config, matched: Matched) -> Measurement:
     )
     pressure, demand, pressures, speeds, wheels, imu = matched.values
     fresh = bool(speeds) and t_ns - speeds[-1].t_ns <= round(config.pressure_wait_s * 1e9)
-    return Measurement(
-        t_ns,
-        position_m,
-        variance_m2,
-        brake_pressure_pa=pressure and pressure.pressure_pa,
-        speed_mps=speeds[-1].speed_mps if fresh else None,
-        demand_pa=demand and demand.pressure_pa,
-        pressures=pressures,
-        speeds=speeds,
-        wheels=wheels,
-        imu=imu,
-    )
+    speed_mps = speeds[-1].speed_mps if fresh else None
+    newest = pressure and pressure.pressure_pa, speed_mps, demand and demand.pressure_pa
+    return Measurement(t_ns, position_m, variance_m2, *newest, pressures, speeds, wheels, imu)

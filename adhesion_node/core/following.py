@@ -30,7 +30,9 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     else:
         repeated = state.repeated
     pace = state.pace.after(measurement)
-    measurement, refused = in_mps(measurement, (pace.speed_mps, math.nan if seen is None else seen.speed_mps))
+    refused: tuple[Event, ...] = ()
+    if measurement.speeds or measurement.speed_mps is not None:
+        measurement, refused = in_mps(measurement, (pace.speed_mps, math.nan if seen is None else seen.speed_mps))
     state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace)
     if refused:
         state = state.told(*refused)

@@ -44,17 +44,14 @@ class Reader:
         if topic.name in self.line.unused:
             self.source = None if self.source is topic else self.source
             raise Rejected(Reason.SWITCHED_OFF, f"{USE}{topic.name} = false")
-        sample, late_s = self._read(topic, message), self.line.latency_s.get(topic.name)
-        return sample._replace(t_ns=sample.t_ns - round(late_s * NS)) if late_s else sample
-
-    def _read(self, topic: Topic, message: Any) -> Sample:
         is_better = topic is not self.source and topic in self.anchors
         if is_better and self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
             raise Rejected(Reason.OTHER_SOURCE, f"{topic.name} beside {self.source.name}")
         sample: Sample = message if isinstance(message, Sample) else topic.read(message, self.line)
         if is_better:
             self.source = topic
-        return sample
+        late_s = self.line.latency_s.get(topic.name)
+        return sample._replace(t_ns=sample.t_ns - round(late_s * NS)) if late_s else sample
 
 
 def _is_meant(topic: Topic, line: Line) -> bool:

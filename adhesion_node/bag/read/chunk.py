@@ -32,12 +32,8 @@ _MESSAGE = Struct("<HIQQ")
 """Channel, number, log time and time of publishing of a message; its data follow."""
 
 
-class Message(NamedTuple):
-    """What is used of a message."""
-
-    channel_id: int
-    log_ns: int
-    data: bytes
+Message = tuple[int, int, bytes]
+"""What is used of a message: its channel, its log time in ns, its data."""
 
 
 class Content(NamedTuple):
@@ -71,7 +67,7 @@ def unpack(opcode: int, body: bytes) -> Content:
             channel_id, _, log_ns, _ = _MESSAGE.unpack_from(content, offset)
             if log_ns > LATEST_NS:
                 raise ValueError(f"log time = {log_ns} ns: beyond what a recording may hold")
-            messages.append(Message(channel_id, log_ns, content[offset + _MESSAGE.size : end]))
+            messages.append((channel_id, log_ns, content[offset + _MESSAGE.size : end]))
         elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
             read = Schema.read if kind == Opcode.SCHEMA else Channel.read
             declared.append(read(ReadDataStream(BytesIO(content[offset:end]))))

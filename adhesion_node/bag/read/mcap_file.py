@@ -72,12 +72,12 @@ class McapFile:
         with path.open("rb") as stream:
             self._scan(stream)
 
-    def messages(self, block: Block) -> Iterator[Message]:
-        """Return the messages of a block in the order they were written; those of nameless channels are left out."""
+    def messages(self, block: Block) -> list[Message]:
+        """Return the messages of a block in the order they were written, those of nameless channels, too."""
         with self.path.open("rb") as stream:
             stream.seek(block.offset)
             body = stream.read(block.length)
-        return (each for each in unpack(block.opcode, body).messages if each.channel_id in self.topics)
+        return unpack(block.opcode, body).messages
 
     def _scan(self, stream: BinaryIO) -> None:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -116,8 +116,8 @@ class McapFile:
             self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
             return
         if messages:
-            self.blocks.append(Block(min(message.log_ns for message in messages), offset, opcode, len(body)))
-            self.counts.update(message.channel_id for message in messages)
+            self.blocks.append(Block(min(log_ns for _, log_ns, _ in messages), offset, opcode, len(body)))
+            self.counts.update(channel for channel, _, _ in messages)
 
     def _declare(self, records: list[Schema | Channel]) -> None:
         """Take over the schemas and channels.

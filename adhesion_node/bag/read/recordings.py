@@ -87,9 +87,11 @@ class McapRecording:
         pending: list[tuple[int, int, int, int, Record]] = []
         for (_, number, offset, block), following in zip_longest(blocks, blocks[1:]):
             of_channel = topics[number].get
-            for index, (channel, log_ns, cdr) in enumerate(self._files[number].messages(block)):
-                if (info := of_channel(channel)) is not None:
-                    pending.append((log_ns, number, offset, index, Record(info.name, info.type, cdr, log_ns)))
+            pending += [
+                (log_ns, number, offset, index, Record(info.name, info.type, cdr, log_ns))
+                for index, (channel, log_ns, cdr) in enumerate(self._files[number].messages(block))
+                if (info := of_channel(channel)) is not None
+            ]
             pending.sort()
             ready = bisect_left(pending, following[:1]) if following else len(pending)
             yield from map(itemgetter(4), pending[:ready])

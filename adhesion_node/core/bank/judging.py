@@ -55,14 +55,14 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     pressed = memory.is_pressed(config)
     if memory.misled:
         return memory if pressed else _led_again(memory)
-    braked = pressed and bank.mean_of(SPEED) >= config.slowest_mps
-    if braked and not memory.braked:
+    braked, before = pressed and bank.mean_of(SPEED) >= config.slowest_mps, memory.braked
+    if braked and not before:
         known = rail()
         told_s = now_s + SETTLING_S + config.brake_build_up_s
         return memory._replace(bank=opened(config, bank, known), since_s=0.0, seen=1, told_s=told_s, known=known)
-    if memory.braked and not braked:
+    if before and not braked:
         return memory._replace(bank=closed(bank), seen=0)
-    if not memory.braked:  # one hypothesis has nothing beside it that could be forgotten
+    if not before:  # one hypothesis has nothing beside it that could be forgotten
         return memory if bank.kind.size == 1 else memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):

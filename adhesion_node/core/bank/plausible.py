@@ -68,7 +68,7 @@ class Course(NamedTuple):
     def after(self, t_ns: int, position_m: float, braked: bool, off: float | None) -> Course:
         """With the next position, and how far off it is in standard deviations by the hypothesis nearest, if known."""
         first, end = bisect_left(self.recent, (t_ns - SPAN_NS,)), bisect_left(self.recent, (t_ns,))
-        before = self if braked else Course()
+        before = self if braked else UNBRAKED
         recent, braked_ns = (*self.recent[first:end], (t_ns, position_m)), before.braked_ns
         if braked_ns is None and braked:
             braked_ns = t_ns
@@ -109,6 +109,9 @@ class Course(NamedTuple):
             if slowing > most + error or (long and slowing < -GAIN_MPS2 - GRAVITY * grade - error):
                 return True
         return False
+
+
+UNBRAKED = Course()
 
 
 def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:

@@ -58,17 +58,21 @@ class Stepping(NamedTuple):
         if self.off_m and abs(off.metres - self.off_m[0]) < alike_m:
             return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
         calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m)
+        if not abs(off.metres) > FIRST_SIGMA * off.std_m:
+            return calm
         spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
         abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
         near = abs(off.metres) <= LARGEST * config.position_step_std_m
-        if abs(off.metres) > FIRST_SIGMA * off.std_m and spaced and abrupt and near:
+        if spaced and abrupt and near:
             return calm._replace(before=memory, since=(measurement,), off_m=(off.metres,))
         return calm
 
     def size_m(self, std_m: float) -> float:
         """Size of the step; 0 unless it is plain."""
+        if len(self.off_m) != AGREEING:
+            return 0.0
         mean = sum(self.off_m) / AGREEING
-        return mean if len(self.off_m) == AGREEING and abs(mean) > MEAN_SIGMA * std_m else 0.0
+        return mean if abs(mean) > MEAN_SIGMA * std_m else 0.0
 
     def taken(self, config: Config, size_m: float, rail: Callable[[], Rail]) -> tuple[Memory, Stepping]:
         """The train followed anew from before the step on, which moves its position and nothing else."""

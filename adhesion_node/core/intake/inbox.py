@@ -82,25 +82,26 @@ def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
     if refused is not None:
         of_others = Outcome.REPEATED if refused is Outcome.DUPLICATE else refused
         return Pushed(inbox, events=(Event(of_others, _named(sample)),))
-    overtaken = () if inbox.late[0] else _overtaken(gate, inbox, sample)
-    first_ns, now_ns = None, _newest(inbox.now_ns, sample)
-    if inbox.released_ns is not None and not stream.has_reached(sample.t_ns):
-        first_ns = inbox.released_ns - kept_ns(gate)  # what is out of order may belong to a time about to begin anew
+    overtaken: tuple[Event, ...] = ()
+    first_ns, now_ns, released_ns = None, _newest(inbox.now_ns, sample), inbox.released_ns
+    if released_ns is not None:
+        if sample.t_ns <= released_ns and not inbox.late[0]:  # a time that begins anew may still need it
+            overtaken = _overtaken(gate, inbox, sample, released_ns)
+        if not stream.has_reached(sample.t_ns):  # what is out of order may belong to a time about to begin anew
+            first_ns = released_ns - kept_ns(gate)
     stream = stream.delayed(now_ns - sample.t_ns).added(sample, first_ns)
     inbox = inbox.with_stream(type(sample), stream.after_first() if stream.excess else stream, now_ns)
     return _with(overtaken, Pushed(*release(gate, inbox, 0)))
 
 
-def _overtaken(gate: Gate, inbox: Inbox, sample: Any) -> tuple[Event, ...]:
-    """What becomes of a sample that no anchor or tick can be given any more; a time that begins anew may still."""
-    if inbox.released_ns is None or sample.t_ns > inbox.released_ns:
-        return ()
+def _overtaken(gate: Gate, inbox: Inbox, sample: Any, released_ns: int) -> tuple[Event, ...]:
+    """What becomes of a sample that no anchor or tick behind the last released one can be given any more."""
     sources = [source for source in gate.sources if source.kind is type(sample)]
     if not sources or not all(source.each for source in sources):
         return ()
     spent_ns = inbox.stream(type(sample)).spent_ns
     spent = spent_ns is not None and sample.t_ns <= spent_ns
-    too_old = sample.t_ns < inbox.released_ns - max(source.age_ns for source in sources)
+    too_old = sample.t_ns < released_ns - max(source.age_ns for source in sources)
     return (Event(Outcome.OVERTAKEN, _named(sample)),) if spent or too_old else ()
 
 
@@ -160,7 +161,7 @@ def _anew(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
 
 
 def _newest(now_ns: int | None, sample: Any) -> int:
-    return int(sample.t_ns) if now_ns is None else max(now_ns, sample.t_ns)
+    return now_ns if now_ns is not None and now_ns > sample.t_ns else int(sample.t_ns)
 
 
 def _named(sample: Any) -> str:

@@ -117,8 +117,6 @@ class Pace(NamedTuple):
 
 def in_mps(measurement: Measurement, known_mps: Iterable[float]) -> tuple[Measurement, tuple[Event, ...]]:
     """Without the speeds that are km/h of one of the train's known speeds (NaN: is not), and what is to be told."""
-    if measurement.speed_mps is None and not measurement.speeds:
-        return measurement, ()
     known = [speed for speed in known_mps if speed >= KMH_FROM_MPS]
 
     def is_wrong(speed_mps: float | None) -> bool:

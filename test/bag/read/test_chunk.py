@@ -19,7 +19,7 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
-from adhesion_node.bag.read.chunk import HEAD, Message, unpack
+from adhesion_node.bag.read.chunk import HEAD, unpack
 
 
 def chunk_of(content: bytes, checksum: int | None = None) -> bytes:
@@ -53,11 +53,11 @@ def test_a_chunk_holds_messages_and_declarations() -> None:
         at += HEAD.size + HEAD.unpack_from(written, at)[1]
     length = HEAD.unpack_from(written, at)[1]
     content = unpack(Opcode.CHUNK, written[at + HEAD.size : at + HEAD.size + length])
-    assert content.messages == [Message(channel, 5, b"one"), Message(channel, 4, b"")]
+    assert content.messages == [(channel, 5, b"one"), (channel, 4, b"")]
     assert [type(each).__name__ for each in content.declared] == ["Schema", "Channel"]
     known = record(200, b"??") + record(Opcode.MESSAGE, message(b"xy"))
-    assert unpack(Opcode.CHUNK, chunk_of(known)).messages == [Message(3, 7, b"xy")]
-    assert unpack(Opcode.MESSAGE, message(b"xy")).messages == [Message(3, 7, b"xy")], "one outside of any chunk"
+    assert unpack(Opcode.CHUNK, chunk_of(known)).messages == [(3, 7, b"xy")]
+    assert unpack(Opcode.MESSAGE, message(b"xy")).messages == [(3, 7, b"xy")], "one outside of any chunk"
 
 
 @pytest.mark.parametrize(
