@@ -14,6 +14,7 @@ paired with does not depend on the order of arrival.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -63,6 +64,22 @@ class Gate(NamedTuple):
     """Without an anchor for so long the other sensors are given out by themselves; 0: never."""
     tick_for_ns: int = 0
     """How long after the last anchor or sample of a source that `leads`."""
+
+
+@once
+def waits_of(gate: Gate) -> Mapping[type[Any], Mapping[int, tuple[tuple[int, Source], ...]]]:
+    """Sources of each sensor by how long they are waited for, with their places among those of the gate."""
+    waits: dict[type[Any], dict[int, tuple[tuple[int, Source], ...]]] = {}
+    for place, source in enumerate(gate.sources):
+        alike = waits.setdefault(source.kind, {})
+        alike[source.wait_ns] = (*alike.get(source.wait_ns, ()), (place, source))
+    return waits
+
+
+@once
+def missing_of(gate: Gate) -> tuple[Any, ...]:
+    """What an anchor is paired with where no other sensor is there."""
+    return tuple(() if source.each else None for source in gate.sources)
 
 
 @once
@@ -122,28 +139,23 @@ class Inbox(NamedTuple):
         return self._replace(others=MappingProxyType(self.others | {kind: stream}), now_ns=now_ns)
 
 
-def is_present(inbox: Inbox, source: Source, stream: Stream | None, t_ns: int) -> bool:
+def is_present(inbox: Inbox, wait_ns: int, stream: Stream | None, t_ns: int) -> bool:
     """Whether a sensor is there, of what it has measured: heard not long before, so by now, whatever came first.
 
     In the beginning each may still come.
     """
-    if inbox.begun_ns <= t_ns <= inbox.begun_ns + source.wait_ns:
+    if inbox.begun_ns <= t_ns <= inbox.begun_ns + wait_ns:
         return True
-    return stream is not None and stream.has_between(t_ns - PRESENT_NS, t_ns - source.wait_ns)
+    return stream is not None and stream.has_between(t_ns - PRESENT_NS, t_ns - wait_ns)
 
 
-def _known_ns(inbox: Inbox, source: Source, stream: Stream, t_ns: int) -> int:
-    """Up to when the samples of a sensor are used at a time: what was not waited for must have been there before."""
-    return t_ns if is_present(inbox, source, stream, t_ns) else t_ns - source.wait_ns
-
-
-def value_of(inbox: Inbox, source: Source, stream: Stream, t_ns: int) -> Any | None:
-    """The newest sample of a sensor at a time, unless it is too old or was not waited for."""
-    latest = stream.latest(_known_ns(inbox, source, stream, t_ns))
+def value_of(source: Source, stream: Stream, t_ns: int, known_ns: int) -> Any | None:
+    """The newest sample of a sensor at a time, unless it is too old; what came behind `known_ns` was not waited for."""
+    latest = stream.latest(known_ns)
     return None if latest is None or t_ns - latest.t_ns > source.age_ns else latest
 
 
-def each_of(inbox: Inbox, source: Source, stream: Stream, t_ns: int) -> tuple[Any, ...]:
-    """The samples of a sensor up to a time that are not used up, the newest ones where they are too many."""
+def each_of(inbox: Inbox, source: Source, stream: Stream, t_ns: int, known_ns: int) -> tuple[Any, ...]:
+    """The samples of a sensor up to `known_ns` that are not used up, the newest ones where they are too many."""
     before_ns = t_ns if inbox.released_ns is None else min(inbox.released_ns, t_ns)
-    return stream.unspent(before_ns - source.age_ns, _known_ns(inbox, source, stream, t_ns))[-MOST_EACH:]
+    return stream.unspent(before_ns - source.age_ns, known_ns)[-MOST_EACH:]

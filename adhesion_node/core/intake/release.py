@@ -21,9 +21,21 @@ from collections.abc import Iterable
 from types import MappingProxyType
 from typing import Any
 
-from .pairing import PRESENT_NS, Gate, Inbox, Matched, Source, Tick, each_of, is_present, longest_wait_ns, value_of
+from .pairing import (
+    PRESENT_NS,
+    Gate,
+    Inbox,
+    Matched,
+    Source,
+    Tick,
+    each_of,
+    is_present,
+    longest_wait_ns,
+    missing_of,
+    value_of,
+    waits_of,
+)
 from .samples import Measurement
-from .stream import Stream
 
 NEAR_TICK = 5
 """An anchor within this part of `tick_ns` behind a tick takes its place: sensors jitter."""
@@ -73,24 +85,20 @@ def _is_ready(gate: Gate, inbox: Inbox, anchor: Any, near_ns: int) -> bool:
 
 def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, ...]]:
     """The samples of the time of an anchor or tick, which waits no longer; those that come once are used up."""
-    t_ns, sources = turn.t_ns, () if isinstance(turn, Measurement) else gate.sources
+    t_ns, others, is_complete = turn.t_ns, inbox.others, isinstance(turn, Measurement)
     if _begins(gate, inbox, t_ns):
         inbox = inbox._replace(begun_ns=t_ns)
-    values: list[Any] = []
-    spent: dict[type[Any], Stream] = {}
-    others = inbox.others
-    for source in sources:  # at every anchor: quicker than to make tuple and dictionary at once
-        stream = others.get(source.kind)
-        if stream is None:
-            values.append(() if source.each else None)
-        elif source.each:
-            values.append(each_of(inbox, source, stream, t_ns))
-            if values[-1]:
-                spent[source.kind] = stream.spent(values[-1][-1].t_ns)
-        else:
-            values.append(value_of(inbox, source, stream, t_ns))
-    if spent:
-        others = MappingProxyType(others | spent)
+    values = [] if is_complete else [*missing_of(gate)]
+    for kind, stream in () if is_complete else inbox.others.items():
+        for wait_ns, sources in waits_of(gate).get(kind, {}).items():
+            # what was not waited for must have been there before
+            known_ns = t_ns if is_present(inbox, wait_ns, stream, t_ns) else t_ns - wait_ns
+            for place, source in sources:
+                if not source.each:
+                    values[place] = value_of(source, stream, t_ns, known_ns)
+                elif each := each_of(inbox, source, stream, t_ns, known_ns):
+                    values[place] = each
+                    others = MappingProxyType(others | {kind: stream.spent(each[-1].t_ns)})
     if isinstance(turn, Tick):
         return inbox._replace(released_ns=t_ns, others=others), tuple(values)
     anchors = inbox.anchors.after_first()
@@ -115,7 +123,7 @@ def _lacks(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
             stream = others.get(source.kind)
             if stream is None and t_ns > begun_ns + source.wait_ns:  # nor is it there
                 continue
-            if (stream is None or not stream.has_reached(t_ns)) and is_present(inbox, source, stream, t_ns):
+            if (stream is None or not stream.has_reached(t_ns)) and is_present(inbox, source.wait_ns, stream, t_ns):
                 return True
     return False
 
@@ -147,7 +155,7 @@ def _earliest(gate: Gate, inbox: Inbox, sources: Iterable[Source], before_ns: in
         new_ns = stream.next_ns(before_ns)
         if new_ns is not None:
             t_ns = before_ns - (before_ns - new_ns) // gate.tick_ns * gate.tick_ns
-            if not is_present(inbox, source, stream, t_ns):
+            if not is_present(inbox, source.wait_ns, stream, t_ns):
                 t_ns = before_ns - (before_ns - new_ns - source.wait_ns) // gate.tick_ns * gate.tick_ns
             ticks.append(t_ns)
     return min(ticks, default=None)
