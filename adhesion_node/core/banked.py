@@ -22,7 +22,7 @@ from .belief.rail import Rail
 from .belief.rail_map import Way
 from .config import Config
 from .estimate import Estimate, estimate_of, unknown
-from .intake.outcome import Event, Outcome, counted
+from .intake.outcome import ACCEPTED, TICK, Event, Outcome, counted
 from .intake.samples import Measurement
 from .methods.protocol import Fit, Verdict
 from .state import State
@@ -94,7 +94,7 @@ def _accepted(
     placed, seen = measurement.has_position, state.seen
     state = state._replace(
         stepping=state.stepping if stepping is None else stepping,
-        counts=counted(state.counts, Event(Outcome.ACCEPTED if placed else Outcome.TICK)),
+        counts=counted(state.counts, ACCEPTED if placed else TICK),
         newest=measurement,
         memory=memory,
         outliers=0 if placed else state.outliers,

@@ -18,7 +18,7 @@ from .belief.gaussian import Gaussian, coast
 from .belief.window import WindowSample
 from .config import Config
 from .estimate import Estimate, estimate_of, judge
-from .intake.outcome import Event, Outcome, counted
+from .intake.outcome import ACCEPTED, TICK, Event, Outcome, counted
 from .intake.samples import MAX_VARIANCE_M2, Measurement
 from .methods.protocol import AnyMethod, Verdict
 from .state import State
@@ -74,7 +74,7 @@ def _accept(
     if window is not None:
         window = _method(state).extend(window, sample)
     state = state._replace(
-        counts=counted(state.counts, Event(Outcome.ACCEPTED if measurement.has_position else Outcome.TICK)),
+        counts=counted(state.counts, ACCEPTED if measurement.has_position else TICK),
         newest=measurement,
         belief=belief,
         window=window,

@@ -28,8 +28,8 @@ MAX_CHUNK_BYTES = 32 * 2**20
 """Length of a chunk when decompressed. Writers end theirs at 64 kB to 4 MB, or with one longer message; a few bytes
 can stand for any number of them. Of the shortest messages so many make some 400 MB of objects."""
 
-_MESSAGE = Struct("<HIQQ")
-"""Channel, number, log time and time of publishing of a message; its data follow."""
+_MESSAGE = Struct("<H4xQ8x")
+"""Channel and log time of a message, its number and time of publishing passed over; its data follow."""
 
 
 Message = tuple[int, int, bytes]
@@ -64,7 +64,7 @@ def unpack(opcode: int, body: bytes) -> Content:
         if kind == Opcode.MESSAGE:
             if length < _MESSAGE.size:
                 raise ValueError(f"message of {length} bytes: shorter than its head")
-            channel_id, _, log_ns, _ = _MESSAGE.unpack_from(content, offset)
+            channel_id, log_ns = _MESSAGE.unpack_from(content, offset)
             if log_ns > LATEST_NS:
                 raise ValueError(f"log time = {log_ns} ns: beyond what a recording may hold")
             messages.append((channel_id, log_ns, content[offset + _MESSAGE.size : end]))

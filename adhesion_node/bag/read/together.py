@@ -27,7 +27,7 @@ from ...wire.topic import Topic
 from ..types import deserialize, typestore
 from .recordings import Record
 
-MOST_TOGETHER = 256
+MOST_TOGETHER = 512
 """Messages that are read together: what is theirs stays in the processor's cache."""
 
 _HEAD_BYTES = 4

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.special import ndtri
 
 from ..intake import inbox as gate
-from ..intake.outcome import NO_COUNTS, Event, Outcome, counted
+from ..intake.outcome import ACCEPTED, NO_COUNTS, Event, Outcome, counted
 from ..intake.pairing import Gate, Inbox, Matched, S, Source
 from ..intake.samples import ForceSample, Sample, SpeedSample, WheelSample
 from ..physics.train import Array
@@ -169,7 +169,7 @@ def _accept(
     if config.restart and recursion.sums.weight >= config.min_samples and is_changing(config, recursion):
         state = _told(state, Event(Outcome.CHANGED))
         recursion = advanced(config, begin(config), creep, adhesions, noise)
-    counts = counted(state.counts, Event(Outcome.ACCEPTED))
+    counts = counted(state.counts, ACCEPTED)
     return state._replace(counts=counts, recursion=recursion, since_estimate=state.since_estimate + 1)
 
 

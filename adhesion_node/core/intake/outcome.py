@@ -84,6 +84,10 @@ class Event(NamedTuple):
         return self.outcome.name not in QUIET
 
 
+ACCEPTED, TICK = Event(Outcome.ACCEPTED), Event(Outcome.TICK)
+"""Nothing other: a sample was used."""
+
+
 def counted(counts: Mapping[Outcome, int], *events: Event) -> Mapping[Outcome, int]:
     """The counts with those of the events added."""
     if not events:

@@ -88,9 +88,9 @@ def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, .
     t_ns, others, is_complete = turn.t_ns, inbox.others, isinstance(turn, Measurement)
     if _begins(gate, inbox, t_ns):
         inbox = inbox._replace(begun_ns=t_ns)
-    values = [] if is_complete else [*missing_of(gate)]
+    values, waits = [] if is_complete else [*missing_of(gate)], waits_of(gate)
     for kind, stream in () if is_complete else inbox.others.items():
-        for wait_ns, sources in waits_of(gate).get(kind, {}).items():
+        for wait_ns, sources in waits.get(kind, {}).items():
             # what was not waited for must have been there before
             known_ns = t_ns if is_present(inbox, wait_ns, stream, t_ns) else t_ns - wait_ns
             for place, source in sources:
