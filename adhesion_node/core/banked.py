@@ -65,17 +65,16 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         state = state._replace(stepping=stepping)
         detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
         behind = memory.braked and -LOST_S * state.followed_mps < off.metres < 0.0
+        blind = measurement._replace(variance_m2=math.inf)
         if state.outliers + 1 >= config.max_outliers and behind:
             # under the brake positions fall behind for good where their wheel slides
-            blind = measurement._replace(variance_m2=math.inf)
             memory = bank.followed(config, misled(config, memory), blind, rail)
             return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
         if state.outliers + 1 >= config.max_outliers:
             anew = _anew(state, Event(Outcome.RESET, detail))
             return _accepted(config, anew, measurement, bank.met(config, measurement))
-        memory = bank.followed(config, memory, measurement._replace(variance_m2=math.inf), rail)
-        state = state._replace(memory=memory, outliers=state.outliers + 1)
-        return state.told(Event(Outcome.OUTLIER, detail)), None
+        state = state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail))
+        return _accepted(config, state, blind, bank.followed(config, memory, blind, rail))
     memory = bank.followed(config, memory, measurement, rail, off)
     return _accepted(config, state, measurement, memory, stepping)
 

@@ -86,6 +86,21 @@ def test_a_step_of_the_positions_moves_neither_mu_nor_speed(size_m: float, at_s:
         assert abs(e.position_m - size_m - without.position_m) < 1.0
 
 
+def test_positions_that_are_not_believed_silence_nothing() -> None:
+    """2 s of stamps that are a second late, too short to be believed: followed without them, less sure."""
+    measurements = ride([(40.0, 0.0)], seed=1)
+    until = measurements[118].t_ns
+    late = [m._replace(position_m=m.position_m - 40.0 * (100 <= i < 118)) for i, m in enumerate(measurements)]
+    state, estimates = drive(BANK, late)
+    assert state.counts[Outcome.OUTLIER] == 18
+    assert state.counts[Outcome.RESET] == 0
+    assert max(b.t_ns - a.t_ns for a, b in pairwise(estimates)) <= 0.5 * S
+    before, blind = ([e for e in estimates if a <= e.t_ns < b] for a, b in ((8 * S, 10 * S), (11 * S, until)))
+    assert min(e.speed_std_mps for e in blind) > max(e.speed_std_mps for e in before)
+    sound = {e.t_ns: e for e in drive(replace(BANK, estimate_s=0.0), measurements)[1]}
+    assert all(abs(e.speed_mps - sound[e.t_ns].speed_mps) < 3.0 * e.speed_std_mps for e in blind)
+
+
 def test_the_next_step_may_come_a_spacing_behind_where_the_last_was_plain() -> None:
     """Three positions make it so: those of 6.0, 6.1 and 6.2 s."""
     measurements = stepped(ride(STOP, seed=3), 6.0, 5.0)
