@@ -76,8 +76,7 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     mu = max(rail.mu, LEAST_MU)
     std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
     steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
-    parts = [bank.with_fresh(MU, mu, std * mu).labelled(HELD, 0, -math.inf, math.log(KINDS[HELD].prior))]
-    laws = laws_of(config)
+    parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], laws_of(config)
     for law, (_, probability) in enumerate(laws):
         for kind in SLIDING:
             grows = KINDS[kind].growth > 0.0  # more than any law does, so that none of them matters
@@ -86,9 +85,12 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
                 prior = KINDS[kind].prior * share / len(steps)
                 if prior > 0.0:
                     middle = mu * math.exp(off)
-                    part = bank.with_fresh(MU, middle, within * middle).with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
-                    parts.append(part.labelled(kind, law, -math.inf, math.log(prior)))
-    return joined(parts).normalised()
+                    parts.append((kind, law, middle, within * middle, KINDS[kind].roughness, math.log(prior)))
+    count = bank.kind.size
+    kinds, law_of, means, stds, roughness, priors = (np.repeat(column, count) for column in zip(*parts, strict=True))
+    every = bank.part(np.tile(np.arange(count), len(parts)))
+    fresh = every.with_fresh(MU, means, stds).with_fresh(ROUGH, 0.0, roughness)
+    return fresh.labelled(kinds, law_of, -math.inf, priors).normalised()
 
 
 def closed(bank: Bank) -> Bank:

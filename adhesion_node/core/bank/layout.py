@@ -93,7 +93,7 @@ class Bank(NamedTuple):
         covariance[:, component, component] = np.square(std)
         return self._replace(mean=means, covariance=covariance)
 
-    def labelled(self, kind: int, law: int | Indices, born_s: float, log_prior: float | Array) -> Bank:
+    def labelled(self, kind: int | Indices, law: int | Indices, born_s: float, log_prior: float | Array) -> Bank:
         """As hypotheses of another label, their weights times a prior probability."""
         size = self.log_weight.size
         return self._replace(
