@@ -58,18 +58,10 @@ C1, C2, C3, C4, C5, C6 = (np.float32(math.log(2.0) ** n / math.factorial(n)) for
 """Taylor's series of 2^x."""
 
 
-class Cloud(NamedTuple):
-    """Particles of one time: places, in `UNIT` from one of them, and weights, or their logarithms to the base 2."""
-
-    s: Singles
-    v: Singles
-    weight: Singles
-
-
 class Near(NamedTuple):
     """Of each particle: the first one near it on the other side of the step, and the first one behind those.
 
-    Both are multiples of `AT_ONCE`, so the clouds are as long.
+    Both are multiples of `AT_ONCE`, so the rows of particles are as long.
     """
 
     first: Bounds
@@ -84,29 +76,6 @@ def _power(x: np.float32) -> np.float32:
     series = ONE + r * (C1 + r * (C2 + r * (C3 + r * (C4 + r * (C5 + r * C6)))))
     bits = np.float32(series).view(np.int32) + (np.float32(moved).view(np.int32) << 23)
     return np.int32(bits).view(np.float32)
-
-
-@kernel
-def _summed(before: Cloud, after: Cloud, near: Near, totals: Singles) -> None:
-    """Sum up w_t^i p(x_t+1^j | x_t^i) over the ancestors of each particle after a step, up to a constant."""
-    totals[:] = 0.0
-    for i in range(near.first.size):
-        s, v, weight = before.s[i], before.v[i], before.weight[i]
-        for j in range(near.first[i], near.last[i]):
-            off_s, off_v = after.s[j] - s, after.v[j] - v
-            totals[j] += _power(max(weight - off_s * off_s - off_v * off_v, LEAST_BITS))
-
-
-@kernel
-def _shared(before: Cloud, after: Cloud, rows: int, near: Near, totals: Singles, least: float, now: Singles) -> None:
-    """Share the smoothed weights after a step among the ancestors (27), save where these sum up to less than that."""
-    now[:] = 0.0
-    for j in range(rows):
-        if totals[j] >= least:
-            s, v, share = after.s[j], after.v[j], after.weight[j] / totals[j]
-            for i in range(near.first[j], near.last[j]):
-                off_s, off_v = before.s[i] - s, before.v[i] - v
-                now[i] += share * _power(max(before.weight[i] - off_s * off_s - off_v * off_v, LEAST_BITS))
 
 
 @kernel
@@ -178,52 +147,78 @@ def _sorted(here: Array, there: Array, alive: Indices) -> tuple[Indices, Indices
 
 
 @kernel
-def _fill(cloud: Cloud, places: Array, weights: Array, k: int, unit: float, which: Indices, count: int) -> None:
-    """Take so many particles, in that order, as singles."""
-    for i in range(count):
-        cloud.s[i], cloud.v[i] = places[0, which[i]] * UNIT, places[1, which[i]] * UNIT
-        cloud.weight[i] = weights[k, which[i]] * unit
+def _scaled(places: Array, k: int, origin: tuple[float, float], per: tuple[float, float]) -> Array:
+    """Places of one time in standard deviations of the process noise, (2, N)."""
+    found = np.empty((2, places.shape[2]))
+    for c in range(2):
+        for i in range(found.shape[1]):
+            found[c, i] = (places[c, k, i] - origin[c]) * per[c]
+    return found
 
 
 @kernel
 def smoothed(particles: Particles, spread: Array) -> Array:
     """Smoothed weights w_t|S of the particles, (K + 1, N); `spread` of the process noise, (2, K).
 
-    With the backward kernels p(x_t = i | x_t+1 = j, y) they are the sums over j of the pairwise weights (27).
+    With the backward kernels p(x_t = i | x_t+1 = j, y) they are the sums over j of the pairwise weights (27): those
+    after a step are shared among their ancestors, save where the ancestors' weights sum up to too little. The loops
+    over pairs stand here, as few particles take no longer than a call for each step would.
     """
     states, stepped, logs = particles
     steps, count = stepped.shape[1], logs.shape[1]
-    marginal, here, there = np.empty((steps + 1, count)), np.empty((2, count)), np.empty((2, count))
-    memory = np.zeros((8, _padded(count)), dtype=np.float32)
-    before, after = Cloud(memory[0], memory[1], memory[2]), Cloud(memory[3], memory[4], memory[5])
-    totals, now, alive = memory[6], memory[7], np.empty(count, dtype=np.int64)
-    everyone, whole = np.arange(count), Near(np.zeros(count, np.uint64), np.full(count, now.size, np.uint64))
-    least = count / LEFT_OUT * (math.exp(-0.5 * REACH**2) if count >= MANY else 2.0**LEAST_BITS)
+    padded, many, marginal = _padded(count), count >= MANY, np.empty((steps + 1, count))
+    memory = np.zeros((7, padded), dtype=np.float32)
+    s, v, bits, after_s, after_v = memory[0], memory[1], memory[2], memory[3], memory[4]
+    totals, now, alive, nobody = memory[5], memory[6], np.empty(count, np.int64), np.empty(0, np.uint64)
+    order, kept, ahead_first, ahead_last, behind_first, behind_last = alive, alive, nobody, nobody, nobody, nobody
+    least = count / LEFT_OUT * (math.exp(-0.5 * REACH**2) if many else 2.0**LEAST_BITS)
     marginal[steps] = np.exp(logs[steps])
     marginal[steps] /= marginal[steps].sum()
     for k in range(steps - 1, -1, -1):
         rows = 0
-        for i in range(count):
-            alive[rows] = i
-            rows += int(marginal[k + 1, i] > NEGLIGIBLE)
-        for c in range(2):  # in standard deviations of the process noise, from one of them
-            origin, per = stepped[c, k, 0], 1.0 / spread[c, k]
-            for i in range(count):
-                here[c, i] = (stepped[c, k, i] - origin) * per
-                there[c, i] = (states[c, k + 1, i] - origin) * per
-        order, kept, ahead, behind = everyone, alive, whole, whole
-        if count >= MANY:
+        for j in range(count):
+            alive[rows] = j
+            rows += int(marginal[k + 1, j] > NEGLIGIBLE)
+        origin, per = (stepped[0, k, 0], stepped[1, k, 0]), (1.0 / spread[0, k], 1.0 / spread[1, k])
+        if many:
+            here, there = _scaled(stepped, k, origin, per), _scaled(states, k + 1, origin, per)
             order, kept, ahead, behind = _sorted(here, there, alive[:rows])
-        _fill(before, here, logs, k, BITS, order, count)
-        _fill(after, there, marginal, k + 1, 1.0, kept, rows)
-        _summed(before, after, ahead, totals)
-        _shared(before, after, rows, behind, totals, least, now)
+            (ahead_first, ahead_last), (behind_first, behind_last) = ahead, behind
+        for i in range(count):
+            at = order[i] if many else i
+            s[i] = (stepped[0, k, at] - origin[0]) * per[0] * UNIT
+            v[i] = (stepped[1, k, at] - origin[1]) * per[1] * UNIT
+            bits[i] = logs[k, at] * BITS
+        for j in range(rows):
+            after_s[j] = (states[0, k + 1, kept[j]] - origin[0]) * per[0] * UNIT
+            after_v[j] = (states[1, k + 1, kept[j]] - origin[1]) * per[1] * UNIT
+        totals[:] = 0.0
+        first, last = np.uint64(0), np.uint64(_padded(rows))
+        for i in range(count):
+            if many:
+                first, last = ahead_first[i], ahead_last[i]
+            s_i, v_i, bits_i = s[i], v[i], bits[i]
+            for j in range(first, last):
+                off_s, off_v = after_s[j] - s_i, after_v[j] - v_i
+                totals[j] += _power(max(bits_i - off_s * off_s - off_v * off_v, LEAST_BITS))
+        now[:] = 0.0
+        first, last = np.uint64(0), np.uint64(padded)
+        for j in range(rows):
+            if totals[j] >= least:
+                if many:
+                    first, last = behind_first[j], behind_last[j]
+                s_j, v_j, share = after_s[j], after_v[j], np.float32(marginal[k + 1, kept[j]]) / totals[j]
+                for i in range(first, last):
+                    off_s, off_v = s[i] - s_j, v[i] - v_j
+                    now[i] += share * _power(max(bits[i] - off_s * off_s - off_v * off_v, LEAST_BITS))
         total = 0.0
         for i in range(count):
-            marginal[k, order[i]] = now[i]
-            total += marginal[k, order[i]]
+            at = order[i] if many else i
+            marginal[k, at] = now[i]
+            total += marginal[k, at]
         for j in range(rows):
             if totals[j] < least:
+                here, there = _scaled(stepped, k, origin, per), _scaled(states, k + 1, origin, per)
                 _alone(here, logs[k], there[:, kept[j]], marginal[k + 1, kept[j]], marginal[k])
                 total += marginal[k + 1, kept[j]]
         for i in range(count):
