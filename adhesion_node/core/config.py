@@ -319,4 +319,9 @@ class Config:
     def brake(self, pressure_pa: float | None) -> float:
         """Brake B/(M g) of a measured gauge pressure; 0 below the threshold, the assumed one without a measurement."""
         pressure = self.assumed_pressure_pa if pressure_pa is None else pressure_pa
-        return self.train.specific_brake(pressure) if pressure >= max(self.brake_threshold_pa, 1.0) else 0.0
+        return self.train.specific_brake(pressure) if self.is_braked(pressure) else 0.0
+
+    def is_braked(self, pressure_pa: float | None) -> bool:
+        """Whether a measured gauge pressure, without one the assumed one, is above the threshold."""
+        pressure = self.assumed_pressure_pa if pressure_pa is None else pressure_pa
+        return pressure >= max(self.brake_threshold_pa, 1.0)

@@ -32,7 +32,7 @@ def follow_windowed(config: Config, state: State, measurement: Measurement) -> t
     if state.newest is None or state.belief is None:
         return _accept(config, state, measurement, _met(config, measurement), 0.0)
     dt_s = (measurement.t_ns - state.newest.t_ns) * 1e-9
-    braked = config.brake(state.newest.brake_pressure_pa) > 0.0
+    braked = config.is_braked(state.newest.brake_pressure_pa)
     belief = coast(state.belief, dt_s, config.speed_noise_rate(braked))
     if measurement.has_position and belief.covariance[0, 0] > 0.5 * MAX_VARIANCE_M2:
         state, belief = state._replace(window=None), tracker.place(belief, measurement)
@@ -83,13 +83,15 @@ def _accept(
     )
     if brake == 0.0 or belief.mean[1] < config.slowest_mps:
         return _release(config, state)
-    settled = (
-        tracker.is_settled(belief, measurement.variance_m2 * dt_s, config.speed_noise_rate(True), config.settled_ratio)
-        if measurement.has_position
-        else math.isfinite(sample.speed_variance)
-    )
-    if window is None and settled:
-        state = state._replace(window=_method(state).open(belief, sample))
+    if window is None:
+        settled = (
+            tracker.is_settled(
+                belief, measurement.variance_m2 * dt_s, config.speed_noise_rate(True), config.settled_ratio
+            )
+            if measurement.has_position
+            else math.isfinite(sample.speed_variance)
+        )
+        state = state._replace(window=_method(state).open(belief, sample) if settled else None)
     if state.since_estimate < config.step and measurement.has_position:
         return state, None
     state, _, estimate = _estimate(config, state)

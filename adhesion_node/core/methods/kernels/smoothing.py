@@ -147,6 +147,16 @@ def _sorted(here: Array, there: Array, alive: Indices) -> tuple[Indices, Indices
 
 
 @kernel
+def _lonely(places: Array, logs: Array, after: Array, weights: Array, which: Indices, now: Array) -> float:
+    """Share those of the particles after a step that no other explains well; the sum of their weights."""
+    total = 0.0
+    for j in which:
+        _alone(places, logs, after[:, j], weights[j], now)
+        total += weights[j]
+    return total
+
+
+@kernel
 def _scaled(places: Array, k: int, origin: tuple[float, float], per: tuple[float, float]) -> Array:
     """Places of one time in standard deviations of the process noise, (2, N)."""
     found = np.empty((2, places.shape[2]))
@@ -169,8 +179,9 @@ def smoothed(particles: Particles, spread: Array) -> Array:
     padded, many, marginal = _padded(count), count >= MANY, np.empty((steps + 1, count))
     memory = np.zeros((7, padded), dtype=np.float32)
     s, v, bits, after_s, after_v = memory[0], memory[1], memory[2], memory[3], memory[4]
-    totals, now, alive, nobody = memory[5], memory[6], np.empty(count, np.int64), np.empty(0, np.uint64)
-    order, kept, ahead_first, ahead_last, behind_first, behind_last = alive, alive, nobody, nobody, nobody, nobody
+    totals, now, alive, nobody = memory[5], memory[6], np.empty(count, np.int64), np.uint64(0)
+    order, kept, none = alive, alive, np.empty(0, np.uint64)
+    ahead_first, ahead_last, behind_first, behind_last = none, none, none, none
     least = count / LEFT_OUT * (math.exp(-0.5 * REACH**2) if many else 2.0**LEAST_BITS)
     marginal[steps] = np.exp(logs[steps])
     marginal[steps] /= marginal[steps].sum()
@@ -193,34 +204,31 @@ def smoothed(particles: Particles, spread: Array) -> Array:
             after_s[j] = (states[0, k + 1, kept[j]] - origin[0]) * per[0] * UNIT
             after_v[j] = (states[1, k + 1, kept[j]] - origin[1]) * per[1] * UNIT
         totals[:] = 0.0
-        first, last = np.uint64(0), np.uint64(_padded(rows))
+        every = np.uint64(_padded(rows))
         for i in range(count):
-            if many:
-                first, last = ahead_first[i], ahead_last[i]
+            first, last = (ahead_first[i], ahead_last[i]) if many else (nobody, every)
             s_i, v_i, bits_i = s[i], v[i], bits[i]
             for j in range(first, last):
                 off_s, off_v = after_s[j] - s_i, after_v[j] - v_i
                 totals[j] += _power(max(bits_i - off_s * off_s - off_v * off_v, LEAST_BITS))
         now[:] = 0.0
-        first, last = np.uint64(0), np.uint64(padded)
+        every, lonely = np.uint64(padded), 0
         for j in range(rows):
-            if totals[j] >= least:
-                if many:
-                    first, last = behind_first[j], behind_last[j]
-                s_j, v_j, share = after_s[j], after_v[j], np.float32(marginal[k + 1, kept[j]]) / totals[j]
-                for i in range(first, last):
-                    off_s, off_v = s[i] - s_j, v[i] - v_j
-                    now[i] += share * _power(max(bits[i] - off_s * off_s - off_v * off_v, LEAST_BITS))
+            lonely += int(totals[j] < least)
+            share = np.float32(marginal[k + 1, kept[j]]) / totals[j] if totals[j] >= least else np.float32(0.0)
+            s_j, v_j = after_s[j], after_v[j]
+            first, last = (behind_first[j], behind_last[j]) if many else (nobody, every)
+            for i in range(first, last):
+                off_s, off_v = s[i] - s_j, v[i] - v_j
+                now[i] += share * _power(max(bits[i] - off_s * off_s - off_v * off_v, LEAST_BITS))
         total = 0.0
         for i in range(count):
             at = order[i] if many else i
             marginal[k, at] = now[i]
             total += marginal[k, at]
-        for j in range(rows):
-            if totals[j] < least:
-                here, there = _scaled(stepped, k, origin, per), _scaled(states, k + 1, origin, per)
-                _alone(here, logs[k], there[:, kept[j]], marginal[k + 1, kept[j]], marginal[k])
-                total += marginal[k + 1, kept[j]]
+        if lonely:
+            here, there = _scaled(stepped, k, origin, per), _scaled(states, k + 1, origin, per)
+            total += _lonely(here, logs[k], there, marginal[k + 1], kept[:rows][totals[:rows] < least], marginal[k])
         for i in range(count):
             marginal[k, i] /= total
     return marginal

@@ -145,9 +145,10 @@ def identify(e_step: EStep, search: Search) -> Identified:
     while True:
         expected = e_step(mu)
         done += 1
-        top = float(expected.limit.max())
+        _, weight, limit = expected.statistics
+        top = float(limit.max())
         mu = min(mu, top)  # what is beyond the brakes makes no difference
-        seen = min(e_step.observed(mu) / float(expected.weight @ (expected.limit >= mu)), 1.0)
+        seen = min(e_step.observed(mu) / float(weight.dot(limit >= mu)), 1.0)
         left = kept_of_start(seen, 1.0, search.iterations)
         leap = (1.0 - left) / seen if left < 1.0 else search.iterations
         passes = math.ceil((PASSES + (1.0 - PASSES) * left) * search.iterations)

@@ -86,7 +86,7 @@ class ParticleFilter:
             rng.standard_normal(out=normal)
             rng.standard_normal(out=start)
         else:
-            mirrored = slice(0, 1) if self.passes % 4 == 2 else slice(0, 2)
-            normal[mirrored] *= -1.0
-            start[:, mirrored] *= -1.0
+            mirrored = 1 if self.passes % 4 == 2 else 2
+            for noise in (normal[:mirrored], start[:, :mirrored]):
+                np.negative(noise, out=noise)
         self.passes += 1
