@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from adhesion_node.core.physics.train import KMH, Array
+from adhesion_node.core.physics.train import KMH, Array, Real
 from adhesion_node.core.setting import check_settings, setting
 
 from .scenario import RUN_ON_S, Rail, Scenario
@@ -148,13 +148,12 @@ def _deceleration(scenario: Scenario, time_s: float, position_m: float, speed_mp
         return 0.0
     mu = scenario.rail.mu(position_m, speed_mps)
     brake = scenario.train.specific_brake(scenario.brake.gauge_pressure(time_s))
-    return float(scenario.train.deceleration(mu, brake, _resistance(scenario, position_m, speed_mps)))
+    return scenario.train.deceleration(mu, brake, _resistance(scenario, position_m, speed_mps))
 
 
-def _resistance(scenario: Scenario, position_m: float | Array, speed_mps: float | Array) -> Array:
+def _resistance(scenario: Scenario, position_m: Real, speed_mps: Real) -> Real:
     """Resistance of train and track per weight, N/N (5)."""
-    running = scenario.train.specific_resistance(np.asarray(speed_mps))
-    return running + scenario.track.specific_resistance(np.asarray(position_m))
+    return scenario.train.specific_resistance(speed_mps) + scenario.track.specific_resistance(position_m)
 
 
 def _truth(scenario: Scenario, t_ns: int, position_m: float, speed_mps: float) -> Truth:
@@ -165,7 +164,7 @@ def _truth(scenario: Scenario, t_ns: int, position_m: float, speed_mps: float) -
     if speed_mps <= 0.0:  # the rail is asked for nothing, so nothing of mu can be seen
         return Truth(t_ns, position_m, speed_mps, mu, 0.0, pressure, BRAKE_LIMITED)
     brake = scenario.train.specific_brake(pressure)
-    applied = float(scenario.train.used_adhesion(mu, brake, _resistance(scenario, position_m, speed_mps)))
+    applied = scenario.train.used_adhesion(mu, brake, _resistance(scenario, position_m, speed_mps))
     regime = BRAKE_LIMITED if applied < mu else ADHESION_LIMITED
     return Truth(t_ns, position_m, speed_mps, mu, applied, pressure, regime)
 

@@ -14,8 +14,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
-import numpy as np
-
 from adhesion_node.core.physics.adhesion import DRY, SNOW, WET, SpeedLaw
 from adhesion_node.core.physics.track import LEVEL, Grade, Track, Tunnel
 from adhesion_node.core.physics.train import CRH3, KMH, Train
@@ -45,7 +43,7 @@ class Rail:
     def mu(self, position_m: float, speed_mps: float) -> float:
         """Adhesion coefficient available at a place and speed."""
         law = self.laws[max(bisect_right(self._starts, position_m) - 1, 0)][1]
-        return float(law(np.asarray(speed_mps)))
+        return law(speed_mps)
 
 
 @dataclass(frozen=True, slots=True)

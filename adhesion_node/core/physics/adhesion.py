@@ -10,7 +10,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, overload
 
 import numpy as np
 
@@ -46,8 +46,14 @@ class SpeedLaw:
             if not math.isfinite(value) or value < least:
                 raise ValueError(f"adhesion law {name} = {value!r}: give a finite number of at least {least}")
 
-    def __call__(self, speed_mps: Array) -> Array:
-        speed_kmh = np.maximum(speed_mps, 0.0) / KMH
+    @overload
+    def __call__(self, speed_mps: float) -> float: ...
+
+    @overload
+    def __call__(self, speed_mps: Array) -> Array: ...
+
+    def __call__(self, speed_mps: float | Array) -> float | Array:
+        speed_kmh = (max(speed_mps, 0.0) if isinstance(speed_mps, float) else np.maximum(speed_mps, 0.0)) / KMH
         return self.scale * (self.floor + self.gain_kmh / (self.offset_kmh + speed_kmh))
 
     def slope(self, speed_mps: Array) -> Array:

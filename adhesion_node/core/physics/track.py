@@ -12,8 +12,10 @@ All resistances are per weight (N/N), so that they do not depend on the train's 
 """
 
 import math
+from bisect import bisect_right
 from dataclasses import astuple, dataclass, field, replace
 from numbers import Real
+from typing import overload
 
 import numpy as np
 
@@ -126,8 +128,16 @@ class Track:
         object.__setattr__(self, "_levels", levels)
         object.__setattr__(self, "_least", np.minimum.accumulate(levels[::-1])[::-1])
 
-    def specific_resistance(self, position_m: Array) -> Array:
+    @overload
+    def specific_resistance(self, position_m: float) -> float: ...
+
+    @overload
+    def specific_resistance(self, position_m: Array) -> Array: ...
+
+    def specific_resistance(self, position_m: float | Array) -> float | Array:
         """Sum of grade, curve and tunnel resistance R2/(M g), N/N, at each position (7)."""
+        if isinstance(position_m, float):
+            return float(self._levels[bisect_right(self._breaks, position_m)])
         if not self.sections:
             return np.zeros_like(position_m)
         if position_m.size >= MANY:

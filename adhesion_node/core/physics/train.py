@@ -14,7 +14,7 @@ Everything is SI. The published running-resistance coefficients take km/h; the c
 
 import math
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeVar, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,7 @@ class Train:
         rigging = self.rigging_efficiency * self.rigging_ratio * self.pad_friction * self.pads
         return piston_area * self.disc_radius_m / self.wheel_radius_m * rigging * pressure_pa
 
-    def specific_resistance(self, speed_mps: Array) -> Array:
+    def specific_resistance(self, speed_mps: Real) -> Real:
         """Basic running resistance per weight, N/N (6): (c0 + c1 v + c2 v^2) 1e-3 with v in km/h."""
         c0, c1, c2 = self.resistance_si  # one multiplication less per particle and step
         return c0 + speed_mps * (c1 + c2 * speed_mps)
@@ -110,7 +110,20 @@ class Train:
         """
         return self.brake_force(pressure_pa) / (self.mass_kg * GRAVITY)
 
-    def used_adhesion(self, mu: float | Array, specific_brake: float | Array, resistance: Array) -> Array:
+    @overload
+    def used_adhesion(self, mu: float, specific_brake: float, resistance: float) -> float: ...
+
+    @overload
+    def used_adhesion(self, mu: float | Array, specific_brake: float | Array, resistance: Array) -> Array: ...
+
+    @overload
+    def used_adhesion(
+        self, mu: float | Array, specific_brake: float | Array, resistance: float | Array
+    ) -> float | Array: ...
+
+    def used_adhesion(
+        self, mu: float | Array, specific_brake: float | Array, resistance: float | Array
+    ) -> float | Array:
         """Adhesion that the brakes make use of, min(F, B)/(M g), the two cases (2) and (3); all per weight, N/N.
 
         With rotating masses M (1 + rho) a = B + R holds while the brake limits and M a = F + R at the rail, so
@@ -118,9 +131,17 @@ class Train:
         """
         rho = self.rotating_mass_fraction
         limit = (specific_brake - rho * resistance) / (1.0 + rho) if rho else specific_brake
-        return np.minimum(mu, limit)
+        return min(mu, limit) if isinstance(mu, float) and isinstance(limit, float) else np.minimum(mu, limit)
 
-    def deceleration(self, mu: float | Array, specific_brake: float | Array, resistance: Array) -> Array:
+    @overload
+    def deceleration(self, mu: float, specific_brake: float, resistance: float) -> float: ...
+
+    @overload
+    def deceleration(self, mu: float | Array, specific_brake: float | Array, resistance: Array) -> Array: ...
+
+    def deceleration(
+        self, mu: float | Array, specific_brake: float | Array, resistance: float | Array
+    ) -> float | Array:
         """Deceleration, m/s^2, under adhesion `mu`, brake B/(M g) and resistance R/(M g), (2) and (3)."""
         return GRAVITY * (self.used_adhesion(mu, specific_brake, resistance) + resistance)
 
