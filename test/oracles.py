@@ -138,7 +138,7 @@ class ExactEStep(NamedTuple):
     window: Window
 
     def __call__(self, mu: float) -> Expectation:
-        """Statistics of Q from the exact smoother of this one window."""
+        """Statistics of Q from the exact smoother of this one window, information on mu by dense algebra."""
         exact = rts(self.model, self.prior, self.window, mu)
         used, weight = [], []
         for k in range(self.window.steps):
@@ -148,11 +148,9 @@ class ExactEStep(NamedTuple):
             precision = np.linalg.inv(self.model.noise(dt))
             weight.append(per_mu @ precision @ per_mu)
             used.append(per_mu @ precision @ moved / weight[-1])
-        return Expectation(np.array((used, weight, self.window.brake)), exact.log_likelihood, math.inf)
-
-    def observed(self, mu: float) -> float:
-        """Information on mu by dense algebra."""
-        return dense_information(self.model, self.prior, self.window, mu)
+        statistics = np.array((used, weight, self.window.brake))
+        observed = dense_information(self.model, self.prior, self.window, min(mu, float(self.window.brake.max())))
+        return Expectation(statistics, observed, exact.log_likelihood, math.inf)
 
 
 def make_window(

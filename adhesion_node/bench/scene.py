@@ -62,7 +62,7 @@ def maximised(scene: Scene, states: Array, marginal: Array, mu: float) -> float:
     stepped = scene.motion.advance(states[0, :-1], states[1, :-1], window.dt_s[:, None], window.brake[:, None], mu)
     particles = Particles(states, np.array(stepped), np.zeros(marginal.shape))
     statistics = filtering.reduced(given(*scene), mu, particles, np.ascontiguousarray(marginal))
-    return filtering.maximised(statistics, 0.0)
+    return filtering.maximised(statistics, 0.0)[0]
 
 
 def braking_window(steps: int, rng: np.random.Generator) -> Scene:

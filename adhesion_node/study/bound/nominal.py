@@ -8,6 +8,7 @@
 
 """The bound along a noise-free run of a scenario, at the nominal noise."""
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -54,6 +55,7 @@ class Nominal(NamedTuple):
         return 100.0 * MEAN_OF_STD * float(self.bound.mu_relative_std[scored].mean())
 
 
+@cache
 def nominal(case: Case) -> Nominal:
     """Bound along the noise-free run of a scenario with a wet rail at the nominal noise."""
     config, scenario = Config(), find(case.scenario)

@@ -63,7 +63,7 @@ def _particles(motion: Motion, window: Window, count: int, seed: int = 0) -> Par
 
 
 def _expected(used: ArrayLike, weight: ArrayLike, limit: ArrayLike) -> Expectation:
-    return Expectation(np.array((used, weight, limit)), 0.0, 0.0)
+    return Expectation(np.array((used, weight, limit)), 0.0, 0.0, 0.0)
 
 
 def _information(window: Window, mu: float) -> float:
@@ -253,8 +253,8 @@ def test_observed_information_is_that_of_the_exact_expectation() -> None:
     window = _window()
     complete = float(_exact(window, 0.05).weight.sum())
     assert complete == pytest.approx(30 * 5042.1)
-    observed = ExactEStep(SEEN, PRIOR, window).observed(0.05)
-    assert _particles(SEEN.motion, window, 5).observed(0.05) == pytest.approx(observed)
+    observed = _exact(window, 0.05).observed
+    assert _particles(SEEN.motion, window, 5)(0.05).observed == pytest.approx(observed)
     assert 0.005 < observed / complete < 0.5  # neither all seen nor nothing: the rate tests mean something
 
 

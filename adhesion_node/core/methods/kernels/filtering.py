@@ -105,25 +105,6 @@ def _exp(x: float) -> float:
 
 
 @kernel
-def _moved(given: Given, mu: float, states: Array, stepped: Array, k: int) -> None:
-    """Noise-free step of the particles at time k, at adhesion `mu`."""
-    dt, unresisted = given.window[DT, k], _limit(given, k, 0.0)
-    by_resistance = _limit(given, k, 1.0) - unresisted
-    c0, c1, c2 = given.resistance[0], given.resistance[1], given.resistance[2]
-    for i in range(states.shape[2]):
-        stepped[0, k, i] = given.levels[0]
-    for section in range(given.breaks.size):
-        begins, level = given.breaks[section], given.levels[section + 1]
-        for i in range(states.shape[2]):
-            stepped[0, k, i] = level if states[0, k, i] >= begins else stepped[0, k, i]
-    for i in range(states.shape[2]):
-        v = states[1, k, i]
-        resisting = c0 + v * (c1 + c2 * v) + stepped[0, k, i]
-        slower = v - dt * GRAVITY * (min(mu, unresisted + by_resistance * resisting) + resisting)
-        stepped[0, k, i], stepped[1, k, i] = states[0, k, i] + 0.5 * dt * (v + slower), slower
-
-
-@kernel
 def systematic(weights: Array, offset: float) -> Indices:
     """Systematic resampling by relative weights, (N,): the particles on which the numbers (j + offset)/N fall."""
     count, upto, done, total = weights.size, 0.0, 0, weights.sum()
@@ -143,24 +124,38 @@ def filtered(given: Given, mu: float, draws: Draws, particles: Particles) -> tup
     """Fill the particles; return ln p(y_1:K) (14)(15) up to the measurements' constants, and the smallest ESS."""
     states, stepped, logs = particles
     window, count, (normal, uniform, start) = given.window, logs.shape[1], draws
+    c0, c1, c2 = given.resistance[0], given.resistance[1], given.resistance[2]
     for i in range(count):
         for c in range(2):
             states[c, 0, i] = given.mean[c] + start[i, 0] * given.root[c, 0] + start[i, 1] * given.root[c, 1]
     logs[0] = 0.0
-    weights, themselves = np.ones(count), np.arange(count)
+    weights, parents = np.ones(count), np.empty(0, np.int64)
     total, square, log_likelihood, ess = float(count), float(count), 0.0, float(count)
     for k in range(window.shape[1]):
-        _moved(given, mu, states, stepped, k)
+        dt, unresisted = window[DT, k], _limit(given, k, 0.0)
+        by_resistance = _limit(given, k, 1.0) - unresisted
+        stepped[0, k] = given.levels[0]
+        for section in range(given.breaks.size):
+            begins, level = given.breaks[section], given.levels[section + 1]
+            for i in range(count):
+                stepped[0, k, i] = level if states[0, k, i] >= begins else stepped[0, k, i]
+        for i in range(count):
+            v = states[1, k, i]
+            resisting = c0 + v * (c1 + c2 * v) + stepped[0, k, i]
+            slower = v - dt * GRAVITY * (min(mu, unresisted + by_resistance * resisting) + resisting)
+            stepped[0, k, i], stepped[1, k, i] = states[0, k, i] + 0.5 * dt * (v + slower), slower
         poor = total * total < 0.5 * count * square
-        parents = systematic(weights, uniform[k]) if poor else themselves
         if poor:
+            parents = systematic(weights, uniform[k])
             log_likelihood += math.log(total / count)
         by_place, by_rate = -0.5 / window[PLACE_VARIANCE, k], -0.5 / window[RATE_VARIANCE, k]
-        kept = 0.0 if poor else 1.0
+        kept, place, rate = 0.0 if poor else 1.0, window[PLACE, k], window[RATE, k]
+        spread_s, spread_v = given.spread[0, k], given.spread[1, k]
         for i in range(count):
-            s = given.spread[0, k] * normal[0, k, i] + stepped[0, k, parents[i]]
-            v = given.spread[1, k] * normal[1, k, i] + stepped[1, k, parents[i]]
-            states[0, k + 1, i], states[1, k + 1, i], off_s, off_v = s, v, window[PLACE, k] - s, window[RATE, k] - v
+            parent = parents[i] if poor else i
+            s = spread_s * normal[0, k, i] + stepped[0, k, parent]
+            v = spread_v * normal[1, k, i] + stepped[1, k, parent]
+            states[0, k + 1, i], states[1, k + 1, i], off_s, off_v = s, v, place - s, rate - v
             logs[k + 1, i] = kept * logs[k, i] + by_place * off_s * off_s + by_rate * off_v * off_v
         top = logs[k + 1].max()
         log_likelihood += top
@@ -203,8 +198,8 @@ def reduced(given: Given, mu: float, particles: Particles, marginal: Array) -> A
 
 
 @kernel
-def maximised(found: Array, lowest: float) -> float:
-    """Adhesion of at least `lowest` that maximises Q, of `reduced` statistics: exact, also at the kink.
+def maximised(found: Array, lowest: float) -> tuple[float, float]:
+    """Adhesion of at least `lowest` that maximises Q, of `reduced` statistics: exact, also at the kink; largest limit.
 
     Between two neighbouring limits Q is a parabola; beyond the largest limit it is flat, so the answer never
     exceeds that limit: "at least this much adhesion".
@@ -224,7 +219,14 @@ def maximised(found: Array, lowest: float) -> float:
             best, mu = loss, tried
         kept, least = kept + weight * (limit - used) ** 2, limit
         weights, weighted, squares = weights - weight, weighted - weight * used, squares - weight * used**2
-    return mu
+    return mu, found[2, order[-1]]
+
+
+@kernel
+def expected(given: Given, mu: float, particles: Particles, marginal: Array) -> tuple[Array, float]:
+    """The `reduced` statistics, and the observed information at `mu`, or at their largest limit where that is less."""
+    found = reduced(given, mu, particles, marginal)
+    return found, tracked(given, min(mu, found[2].max()))[3]
 
 
 @kernel

@@ -37,6 +37,9 @@ class Expectation(NamedTuple):
     statistics: Array
     """Of each step, (3, K): u_t, smoothed adhesion used in it; c_t, its information, which is the complete-data
     information on mu; and the largest adhesion that the brake could use."""
+    observed: float
+    """Information on mu that the window's measurements hold, at that adhesion, or the largest that the brake could use
+    in any step where that is less."""
     log_likelihood: float
     ess: float
 
@@ -61,10 +64,6 @@ class EStep(Protocol):
 
     def __call__(self, mu: float) -> Expectation: ...
 
-    def observed(self, mu: float) -> float:
-        """Information on mu that the window's measurements hold, at that adhesion."""
-        ...
-
 
 class ParticleEStep:
     """The paper's E-step: bootstrap filter and marginal smoother with so many particles."""
@@ -75,15 +74,11 @@ class ParticleEStep:
         """Smoothed weights of the last call."""
 
     def __call__(self, mu: float) -> Expectation:
-        """Filter, smooth and reduce to the statistics of Q."""
+        """Filter, smooth and reduce to the statistics of Q; what is observed is that of the extended Kalman filter."""
         particles, log_likelihood, ess = self.filter.run(mu, self.rng)
         self.marginal = smoothing.smoothed(particles, self.filter.given.spread)
-        statistics = filtering.reduced(self.filter.given, float(mu), particles, self.marginal)
-        return Expectation(statistics, log_likelihood, ess)
-
-    def observed(self, mu: float) -> float:
-        """That of the extended Kalman filter."""
-        return filtering.tracked(self.filter.given, float(mu))[3]
+        statistics, observed = filtering.expected(self.filter.given, float(mu), particles, self.marginal)
+        return Expectation(statistics, observed, log_likelihood, ess)
 
 
 PASSES = 0.5
@@ -127,7 +122,7 @@ def gradient(expected: Expectation, mu: float) -> float:
 
 def maximise(expected: Expectation, lowest: float) -> float:
     """Adhesion of at least `lowest` that maximises Q, the goal of (33)."""
-    return filtering.maximised(expected.statistics, float(lowest))
+    return filtering.maximised(expected.statistics, float(lowest))[0]
 
 
 def identify(e_step: EStep, search: Search) -> Identified:
@@ -145,16 +140,15 @@ def identify(e_step: EStep, search: Search) -> Identified:
     while True:
         expected = e_step(mu)
         done += 1
-        _, weight, limit = expected.statistics
-        top = float(limit.max())
+        best, top = filtering.maximised(expected.statistics, float(search.lowest))
         mu = min(mu, top)  # what is beyond the brakes makes no difference
-        seen = min(e_step.observed(mu) / float(weight.dot(limit >= mu)), 1.0)
+        seen = min(expected.observed / float(expected.weight.dot(expected.limit >= mu)), 1.0)
         left = kept_of_start(seen, 1.0, search.iterations)
         leap = (1.0 - left) / seen if left < 1.0 else search.iterations
         passes = math.ceil((PASSES + (1.0 - PASSES) * left) * search.iterations)
         kept = passes * (passes + 1) * left
         slowness = kept + done * (done + 1) * (1.0 - left)
-        aim = mu + leap * 2.0 * done / slowness * (maximise(expected, search.lowest) - mu)
+        aim = mu + leap * 2.0 * done / slowness * (best - mu)
         previous, mu = mu, max(min(aim, top), search.lowest)
         # At either end of its range mu stands still for the end's sake, not because EM has arrived.
         moved = abs(mu - previous) if search.lowest < mu < top else np.inf

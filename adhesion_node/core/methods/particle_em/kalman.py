@@ -39,4 +39,9 @@ class Filtered(NamedTuple):
 
 def filter_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Filtered:
     """Filter a window at an adhesion."""
-    return Filtered(*filtering.tracked(given(motion, prior, window), float(mu)))
+    return filtered_by(given(motion, prior, window), mu)
+
+
+def filtered_by(known: filtering.Given, mu: float) -> Filtered:
+    """The same where it is already put as the compiled loops need it."""
+    return Filtered(*filtering.tracked(known, float(mu)))

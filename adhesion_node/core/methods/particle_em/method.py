@@ -23,7 +23,7 @@ from ...belief.regime import Regime
 from ...belief.window import WindowSample, window_of
 from ..protocol import Context, Fit, Verdict, spent
 from .em import Identified, ParticleEStep, Search, identify
-from .kalman import Filtered, filter_window
+from .kalman import Filtered, filtered_by
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -56,7 +56,7 @@ class ParticleEm:
         prior, arrays = window.prior, window_of(window.samples)
         e_step = ParticleEStep(config.motion, config.particles, prior, arrays, context.rng)
         identified = identify(e_step, _search(config, context))
-        filtered = filter_window(config.motion, prior, arrays, identified.mu)
+        filtered = filtered_by(e_step.filter.given, identified.mu)
         return _verdict(config, window, context, identified, filtered)
 
 
