@@ -76,6 +76,7 @@ def test_many_places_at_once_are_each_in_their_section(middle_m: float) -> None:
     places = np.random.default_rng(2).normal(middle_m, 20.0, (3, MANY))
     one_by_one = [float(track.specific_resistance(np.array(place))) for place in places.flat]
     assert track.specific_resistance(places).tolist() == np.reshape(one_by_one, places.shape).tolist()
+    assert [track.specific_resistance(place) for place in places.ravel().tolist()] == one_by_one
 
 
 def test_level_line_and_least_resistance() -> None:

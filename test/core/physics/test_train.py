@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.train import CRH3, GRAVITY, KMH, Train
 
 V300 = np.array(300 / 3.6)
@@ -67,6 +68,16 @@ def test_cases_2_and_3_the_smaller_force_acts() -> None:
     assert float(CRH3.deceleration(0.0726, 0.09, r)) == pytest.approx(0.839468, rel=1e-9)
     assert float(CRH3.deceleration(0.1432, 0.09, r)) == pytest.approx(1.009988, rel=1e-9)
     assert CRH3.used_adhesion(np.array([0.05, 0.09, 0.2]), 0.09, r).tolist() == [0.05, 0.09, 0.09]
+
+
+def test_one_speed_gives_as_a_number_what_it_gives_as_an_array() -> None:
+    train, speeds = replace(CRH3, rotating_mass_fraction=0.08), [-1.0, 0.0, 30.3, 81.7]
+    for mu in (0.05, 0.2):
+        resistance = train.specific_resistance(np.array(speeds))
+        numbers = [train.deceleration(mu, 0.09, train.specific_resistance(v)) for v in speeds]
+        assert numbers == train.deceleration(mu, 0.09, resistance).tolist()
+        assert all(type(each) is float for each in numbers)
+    assert [WET(v) for v in speeds] == WET(np.array(speeds)).tolist()
 
 
 def test_slope_of_the_resistance_by_finite_differences() -> None:

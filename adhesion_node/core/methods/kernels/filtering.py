@@ -199,7 +199,7 @@ def reduced(given: Given, mu: float, particles: Particles, marginal: Array) -> A
 
 @kernel
 def maximised(found: Array, lowest: float) -> tuple[float, float]:
-    """Adhesion of at least `lowest` that maximises Q, of `reduced` statistics: exact, also at the kink; largest limit.
+    """Adhesion of at least `lowest` that maximises Q, of `reduced` statistics, exact, also at kinks; the largest limit.
 
     Between two neighbouring limits Q is a parabola; beyond the largest limit it is flat, so the answer never
     exceeds that limit: "at least this much adhesion".

@@ -172,7 +172,7 @@ def smoothed(particles: Particles, spread: Array) -> Array:
 
     With the backward kernels p(x_t = i | x_t+1 = j, y) they are the sums over j of the pairwise weights (27): those
     after a step are shared among their ancestors, save where the ancestors' weights sum up to too little. The loops
-    over pairs stand here, as few particles take no longer than a call for each step would.
+    over pairs stand here, as calls at every step would take a fair part of the time of few particles.
     """
     states, stepped, logs = particles
     steps, count = stepped.shape[1], logs.shape[1]
