@@ -165,7 +165,9 @@ def test_the_documented_log_is_imported_and_replayed(
     assert [programs[program](arguments) for program, *arguments in commands] == [0, 1]
     said, errors = capsys.readouterr()
     assert "mu_final" in said
-    assert "nothing is identified: the brake limited throughout: the adhesion is at least 0.07" in errors
+    least = re.search(r"nothing is identified: the brake limited throughout: the adhesion is at least (0\.\d+)", errors)
+    assert least is not None, errors
+    assert 0.06 <= float(least[1]) <= 0.0714, "what it used: 0.75 m/s^2 less the resistance at 40 m/s"
     with BagReader(tmp_path / "my_run") as reader:
         counts = {name.lstrip("/"): count for name, count in reader.counts.items()}
     others = ("brake_pressure", "brake_demand", "speed", "imu", "wheel_speed")
