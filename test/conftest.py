@@ -21,6 +21,8 @@ import subprocess
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Protocol
 
@@ -81,8 +83,8 @@ def pytest_xdist_auto_num_workers() -> int:
 def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the kernels once, before there are workers: in a fresh clone that takes longer than some tests wait."""
     if not hasattr(session.config, "workerinput"):
-        for method in (BANK, *METHODS):
-            warm_up(Config(method=method, identify_noise=True))
+        with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+            list(pool.map(warm_up, (Config(method=method, identify_noise=True) for method in (BANK, *METHODS))))
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
