@@ -127,14 +127,11 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, least)
-        ahead = ahead.at_least(min(least, _whole_brake(config)))
     else:
         regime = _regime(config, memory, slides, rail.mu)
         rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
-        if _is_partial(config, memory.braking) and rolls:
-            ahead = ahead.at_least(min(least, _whole_brake(config)))
-        else:
-            least = 0.0
+        least = least if _is_partial(config, memory.braking) and rolls else 0.0
+    ahead = ahead.at_least(min(least, _whole_brake(config)))
     lower = max(rail.lower, least)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
