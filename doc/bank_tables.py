@@ -27,7 +27,8 @@ COMPONENTS = [
 ]
 """Names of the components of the state."""
 
-MODULES = sorted(path.stem for path in Path(package.__file__).parent.glob("[a-z]*.py"))
+FOLDER = Path(package.__file__).parent
+MODULES = [path for path in FOLDER.rglob("[a-z]*.py") if path.parent.name != "kernels"]
 
 
 def parts() -> dict[str, str]:
@@ -64,9 +65,10 @@ def _laws() -> Iterator[Sequence[str]]:
 
 def _constants() -> Iterator[Sequence[str]]:
     """Yield every number that has words below it."""
-    for name in MODULES:
-        module = importlib.import_module(f"{package.__name__}.{name}")
-        body = ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8")).body
+    for path in sorted(MODULES, key=lambda path: path.stem):
+        name = path.stem
+        module = importlib.import_module(".".join((package.__name__, *path.relative_to(FOLDER).with_suffix("").parts)))
+        body = ast.parse(path.read_text(encoding="utf-8")).body
         for one, below in pairwise(body):
             if isinstance(one, ast.Assign) and isinstance(below, ast.Expr) and isinstance(below.value, ast.Constant):
                 names = [node.id for node in ast.walk(one.targets[0]) if isinstance(node, ast.Name)]

@@ -13,10 +13,10 @@ import math
 import numpy as np
 
 from .bank import following as bank
+from .bank.findings.verdict import SPEED_ERROR, Findings, found
 from .bank.judging import misled
 from .bank.memory import Memory
 from .bank.steps import Stepping
-from .bank.verdict import SPEED_ERROR, Findings, found
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail
 from .belief.rail_map import Way

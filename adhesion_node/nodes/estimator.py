@@ -19,7 +19,7 @@ from typing import Any
 
 from adhesion_node.core import Config, Estimate, Outcome, Regime
 from adhesion_node.core.atp.supervision import Severity
-from adhesion_node.core.bank.learnt import learnt
+from adhesion_node.core.bank.findings.learnt import learnt
 from adhesion_node.core.estimator import warm_up
 from adhesion_node.core.physics.train import KMH
 from adhesion_node.run.pipeline import BACKWARDS, Pipeline

@@ -19,7 +19,8 @@ import numpy as np
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
 from ..physics.train import Array
-from .brake import BrakeSeen
+from .gear.brake import BrakeSeen
+from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
 from .judging import judged
 from .kernels import weighing
 from .kinds import FREE, FREE_STD, NOISES
@@ -28,7 +29,6 @@ from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
 from .seeing import CLIPPED, acceleration_seen, speed_seen
-from .wheels import BRAKE_BELOW, UNLEARNT, told
 
 if TYPE_CHECKING:
     from ..config import Config

@@ -17,13 +17,13 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2, SpeedSample
 from ..quick import quick
-from .brake import BrakeSeen
+from .gear.brake import BrakeSeen
+from .gear.wheels import WheelsSeen
 from .kernels import weighing
 from .layout import POSITION, Bank
 from .motion import Braking, moved
 from .plausible import Course
 from .seeing import Observation, corrected
-from .wheels import WheelsSeen
 
 if TYPE_CHECKING:
     from ..config import Config

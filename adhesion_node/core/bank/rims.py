@@ -18,11 +18,11 @@ import numpy as np
 
 from ..intake.samples import Measurement
 from ..physics.train import GRAVITY
+from .gear.wheels import LEARNING_MPS
 from .layout import RADIUS, SPEED, Bank
 from .memory import Memory, S
 from .motion import resistance, use
 from .seeing import CLIPPED, corrected, speed_seen
-from .wheels import LEARNING_MPS
 
 if TYPE_CHECKING:
     from ..config import Config

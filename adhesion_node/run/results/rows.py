@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core import Prediction
+from ...core.bank.findings.learnt import KIND, QUANTITIES, learnt
 from ...core.bank.kinds import KINDS
-from ...core.bank.learnt import KIND, QUANTITIES, learnt
 from ...core.physics.braking import BrakingCurve
 from ..pipeline import Pipeline
 

@@ -16,7 +16,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtr
 
-from adhesion_node.core.bank import branching, kinds, motion, verdict
+from adhesion_node.core.bank import branching, kinds, motion
+from adhesion_node.core.bank.findings import verdict
 from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, RADIUS, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from banks import FULL_PA, S
 
-from adhesion_node.core.bank.brake import BrakeSeen
+from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import PressureSample
 

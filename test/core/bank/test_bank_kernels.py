@@ -20,12 +20,13 @@ import numpy_bank as by_numpy
 import pytest
 from banks import FULL, bank_of
 
-from adhesion_node.core.bank import branching, kernels, motion, seeing, verdict
+from adhesion_node.core.bank import branching, kernels, motion, seeing
+from adhesion_node.core.bank.findings import verdict
+from adhesion_node.core.bank.findings.verdict import quantiles
 from adhesion_node.core.bank.kernels import parabola, weighing
 from adhesion_node.core.bank.kinds import HELD, KINDS, NOISES, PASSING, SLIDES
 from adhesion_node.core.bank.layout import Bank
 from adhesion_node.core.bank.motion import Braking
-from adhesion_node.core.bank.verdict import quantiles
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.estimator import warm_up

@@ -20,9 +20,9 @@ from hypothesis import strategies as st
 
 from adhesion_node.core import Config, Measurement, Outcome, finish, init, step
 from adhesion_node.core.bank.branching import MOST
+from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.memory import Memory
-from adhesion_node.core.bank.verdict import found
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.intake.samples import ImuSample, PressureSample, SpeedSample, WheelSample
 from adhesion_node.core.physics.train import CRH3

@@ -17,9 +17,9 @@ import pytest
 from banks import S, bank_of
 from scipy.stats import norm
 
+from adhesion_node.core.bank.findings.learnt import learnt
 from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.layout import RADIUS, SPEED
-from adhesion_node.core.bank.learnt import learnt
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.rims import (
     CREEP,

@@ -20,15 +20,15 @@ from banks import FULL, FULL_PA, S, bank_of
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from adhesion_node.core.bank.brake import BrakeSeen
+from adhesion_node.core.bank.findings.verdict import Ahead, constant, counted_on, found, quantiles
+from adhesion_node.core.bank.gear.brake import BrakeSeen
+from adhesion_node.core.bank.gear.wheels import WheelsSeen
 from adhesion_node.core.bank.kernels import mixture as mixtures
 from adhesion_node.core.bank.kernels import weighing
 from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, resistance, use
-from adhesion_node.core.bank.verdict import Ahead, constant, counted_on, found, quantiles
-from adhesion_node.core.bank.wheels import WheelsSeen
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.belief.regime import Regime
 from adhesion_node.core.config import Config

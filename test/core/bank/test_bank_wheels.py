@@ -17,9 +17,9 @@ import pytest
 from banks import S
 
 from adhesion_node.core.bank.following import followed, met
+from adhesion_node.core.bank.gear.wheels import FRESH_NS, SLID_NS, WheelsSeen, told
 from adhesion_node.core.bank.layout import SPEED
 from adhesion_node.core.bank.memory import Memory
-from adhesion_node.core.bank.wheels import FRESH_NS, SLID_NS, WheelsSeen, told
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import Measurement, SpeedSample, WheelSample

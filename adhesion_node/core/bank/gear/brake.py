@@ -15,10 +15,10 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..intake.samples import PressureSample
+from ...intake.samples import PressureSample
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 S = 1_000_000_000
 

@@ -13,10 +13,10 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from ..physics.train import GRAVITY
-from .kinds import KINDS
-from .layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, RADIUS, SCALE
-from .memory import Memory
+from ...physics.train import GRAVITY
+from ..kinds import KINDS
+from ..layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, RADIUS, SCALE
+from ..memory import Memory
 
 
 class Quantity(NamedTuple):

@@ -14,10 +14,10 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..intake.samples import WheelSample
+from ...intake.samples import WheelSample
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 S = 1_000_000_000
 

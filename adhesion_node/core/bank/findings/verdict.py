@@ -15,21 +15,21 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..belief.rail import Rail
-from ..belief.regime import Regime
-from ..physics.train import Array
-from ..setting import once
-from . import kinds
-from .following import SPEED_ERROR_MPS
-from .kernels import mixture, weighing
-from .layout import SPEED, Bank
-from .memory import Memory, S
-from .motion import Braking, Use, model_of, resistance, use
-from .seeing import ROLLED
-from .wheels import BRAKE_BELOW
+from ...belief.rail import Rail
+from ...belief.regime import Regime
+from ...physics.train import Array
+from ...setting import once
+from .. import kinds
+from ..following import SPEED_ERROR_MPS
+from ..gear.wheels import BRAKE_BELOW
+from ..kernels import mixture, weighing
+from ..layout import SPEED, Bank
+from ..memory import Memory, S
+from ..motion import Braking, Use, model_of, resistance, use
+from ..seeing import ROLLED
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 
 SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
