@@ -48,8 +48,9 @@ class Seen:
     """Takes the estimates of a run as they come; keeps no more than what the newest seconds need."""
 
     def __init__(self) -> None:
-        self._limited = self._at_brake = self._told = 0
-        """Estimates while the adhesion limited, while the brake did, and while either may and what is used is known."""
+        self._limited = self._at_brake = self._told = self._open = 0
+        """Estimates while the adhesion limited, while the brake did, while either may and what is used is known, and
+        while either may in a braking."""
         self.hardest_mps2 = 0.0
         self.most_pa: float | None = None
         """Of the brake's pressure or demand; None: neither was measured."""
@@ -73,6 +74,7 @@ class Seen:
             self._at_least = max(mu_lower, self._at_least)
         else:
             self._told += slows_mps2 >= BRAKES_MPS2 and is_known(mu, mu_lower)
+            self._open += (pressure_pa or 0.0) >= BRAKED_PA and abs(speed_mps) > RUNS_MPS
         self.hardest_mps2 = max(self.hardest_mps2, 0.0 if math.isnan(slows_mps2) else slows_mps2)
         if pressure_pa is not None:
             self.most_pa = max(pressure_pa, self.most_pa or 0.0)
@@ -140,7 +142,7 @@ class Seen:
             yield f"the train was never faster than {self._fastest_mps:.2g} m/s: are its positions degrees, or km?"
         if self.hardest_mps2 < BRAKES_MPS2:
             yield f"no braking harder than {BRAKES_MPS2:g} m/s^2: the hardest was {self.hardest_mps2:.2f}"
-        if self._at_brake:
+        if self._at_brake > self._open:
             yield f"the brake limited throughout: the adhesion is at least {self._at_least:.2g}"
         yield (
             f"braked by up to {self.hardest_mps2:.2f} m/s^2, and a weaker brake would look the same as a slippery rail:"

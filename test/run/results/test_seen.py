@@ -78,6 +78,18 @@ def test_the_first_moments_at_the_limit_of_the_brake_are_no_identification(open_
     assert seen.identified is identified
 
 
+@pytest.mark.parametrize(("limited_s", "why"), [(10, "the brake limited throughout"), (4, "braked by up to 0.90")])
+def test_a_brake_that_limited_for_moments_did_not_limit_throughout(limited_s: int, why: str) -> None:
+    """A metro on leaves, known by the speed of an axle; it stands at the end, its brake applied."""
+    seen = Seen()
+    for i in range(120):
+        regime = "BRAKE_LIMITED" if i < 2 * limited_s else "COASTING"
+        seen.note(i * S // 2, regime, 0.1, 0.03, max(18.0 - 0.45 * i, 0.0), 4e5)
+    said = seen.why_not()
+    assert said is not None
+    assert said.startswith(why)
+
+
 def test_a_gap_is_no_braking() -> None:
     """40 m/s, then after a minute without estimates 5 m/s: nobody saw how it slowed down."""
     seen = Seen()
