@@ -166,7 +166,11 @@ class Config:
     )
     creep_samples: int = _wheels(10, "Newest measurements whose creep tells sliding wheels", low=1, high=1000)
     sliding_creep: float = _wheels(
-        0.03, "Creep of the median axle from which the wheels slide; below half of it they roll", low=1e-3, high=1.0
+        0.03,
+        "Creep from which an axle slides; it rolls where no error lets its creep be twice that. In windows: creep of "
+        "the median axle, and the wheels roll below half of it",
+        low=1e-3,
+        high=1.0,
     )
     brake_threshold_pa: float = _brake(
         10e3, "Brake-cylinder pressure (gauge) from which the brake counts as applied", "Pa", 0.0, 1e6
