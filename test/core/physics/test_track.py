@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -108,8 +109,29 @@ def test_refuses_a_text_it_cannot_read(text: str) -> None:
         (Grade(0.0, math.inf, 1.0), "give finite numbers"),
         (Grade(0.0, 100.0, math.nan), "give finite numbers"),
         (Curve(0.0, 100.0, 0.0, 1.0), "give a radius_m of at least 10 m"),
+        (Curve(0.0, 100.0, math.nextafter(10.0, 0.0), 1.0), "give a radius_m of at least 10 m"),
+        (Grade(0.0, 1e6, 5e6), "rises by 500 %, and trains climb 15 % at most: rise_m is the height gained between"),
+        (Grade(0.0, 100.0, -15.1), "rises by -15.1 %, and trains climb 15 % at most"),
+        (("grade", 0, 1, 2), r"track section \('grade', 0, 1, 2\): give a Grade, a Curve or a Tunnel"),
     ],
 )
-def test_refuses_an_impossible_section(section: Section, message: str) -> None:
+def test_refuses_an_impossible_section(section: Any, message: str) -> None:
     with pytest.raises(ValueError, match=message):
-        Track((section,))
+        Track((Tunnel(0.0, 1e3), section))
+
+
+@pytest.mark.parametrize("section", [Grade(0.0, 100.0, 15.0), Grade(0.0, 100.0, -15.0), Curve(0.0, 100.0, 10.0, 1.0)])
+def test_takes_the_steepest_and_the_tightest(section: Section) -> None:
+    assert Track((section,)).sections == (section,)
+
+
+def test_refuses_what_is_no_tuple_of_sections() -> None:
+    nothing: Any = Grade(0.0, 1e6, 10.0)
+    with pytest.raises(ValueError, match=r"track sections = Grade\(.*\): give a tuple of them, \(Grade\("):
+        Track(nothing)
+
+
+@pytest.mark.parametrize("length_m", [-200.0, 0.0, math.inf, math.nan, "200"])
+def test_refuses_what_is_no_length_of_a_train(length_m: Any) -> None:
+    with pytest.raises(ValueError, match=f"track train_length_m = {length_m!r}: give a length above 0 m"):
+        Track((), length_m)
