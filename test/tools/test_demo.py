@@ -113,7 +113,7 @@ def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_k
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    short = replace(REAL["metro_leaves"], speed_mps=12.0, demands=((4.0, 1.0),))
+    short = replace(REAL["metro_leaves"], speed_mps=8.0, demands=((4.0, 1.0),))
     for module in (simulator, demo):
         monkeypatch.setattr(module, "REAL", {"metro_leaves": short})
     result = run_demo("--scenario", "metro_leaves", "--sensors", sensors)
