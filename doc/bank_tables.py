@@ -20,7 +20,7 @@ from interface_tables import table
 import adhesion_node.core.bank as package
 from adhesion_node.core import Config
 from adhesion_node.core.bank import kinds, layout
-from adhesion_node.core.bank.motion import laws_of
+from adhesion_node.core.bank.laws import laws_of
 
 COMPONENTS = [
     name for name, value in vars(layout).items() if name.isupper() and isinstance(value, int) and name != "SIZE"
@@ -36,7 +36,7 @@ def parts() -> dict[str, str]:
     return {
         "bank kinds": table(("kind", "limits", "drift", "grows", "roughness", "restless", "prior"), _kinds()),
         "bank noises": table(("white σ", "slow σ", "lasts, s", "prior"), _noises()),
-        "bank laws": table(("law over speed", "prior"), _laws()),
+        "bank laws": table(("law over speed", "on a slippery rail", "on a wet one"), _laws()),
         "bank constants": table(("module", "constant", "value", "what it is"), _constants()),
     }
 
@@ -59,8 +59,9 @@ def _noises() -> Iterator[Sequence[str]]:
 
 def _laws() -> Iterator[Sequence[str]]:
     config = Config()
-    names = (f"`law` = {config.law}", "half of its dependence on speed", "none: the same at any speed")
-    return ((name, f"{prior:g}") for name, (_, prior) in zip(names, laws_of(config), strict=True))
+    names = (f"`law` = {config.law}", "a third of its dependence on speed", "none: the same at any speed")
+    laws = zip(names, laws_of(config), strict=True)
+    return ((name, *(f"{prior:.2g}" for prior in priors)) for name, (_, priors) in laws)
 
 
 def _constants() -> Iterator[Sequence[str]]:

@@ -20,14 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..belief.rail import Rail
-from ..physics.train import Array
-from ..setting import once
 from .kernels import springing, uniting
 from .kernels.springing import Rule
 from .kernels.uniting import Pruning
 from .kinds import FREE, FREE_STD, HELD, KINDS, PASSING, SLIDING
+from .laws import LEVELS, law_priors
 from .layout import MU, ROUGH, Bank, joined
-from .motion import Braking, laws_of, rolling_use
+from .motion import Braking, rolling_use
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -65,6 +64,9 @@ ALIKE, ALIKE_STD = 0.3, 1.4
 """Hypotheses of one label say the same where speed and adhesion differ by less than this part of their standard
 deviations, and these by less than this factor."""
 
+# roughness and prior of each kind, 0 of those that do not slide
+SLIDING_KINDS = np.array([(kind.roughness, kind.prior if kind.slides else 0.0) for kind in KINDS])
+
 PRUNING = Pruning(math.log(LEAST), MOST, ALIKE, ALIKE_STD)
 
 
@@ -76,15 +78,15 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     mu = max(rail.mu, LEAST_MU)
     std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
     steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
-    parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], laws_of(config)
-    for law, (_, probability) in enumerate(laws):
+    parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], law_priors(config)
+    for law in range(len(laws)):
         for kind in SLIDING:
             grows = KINDS[kind].growth > 0.0  # more than any law does, so that none of them matters
-            share = float(law == len(laws) - 1) if grows else probability
             for off, within in steps:
+                middle = mu * math.exp(off)
+                share = float(law == len(laws) - 1) if grows else springing.law_prior(laws, LEVELS, law, middle)
                 prior = KINDS[kind].prior * share / len(steps)
                 if prior > 0.0:
-                    middle = mu * math.exp(off)
                     parts.append((kind, law, middle, within * middle, KINDS[kind].roughness, math.log(prior)))
     count = bank.kind.size
     kinds, law_of, means, stds, roughness, priors = (np.repeat(column, count) for column in zip(*parts, strict=True))
@@ -114,7 +116,6 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
     than the brake needs, a little less while the brake rises, else any less. Where the wheels tell which it is, the
     other does not spring.
     """
-    laws, sliding = _likely(config)
     rule = Rule(
         now_s=now_s,
         elapsed_s=elapsed_s,
@@ -130,17 +131,11 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         less_std=LESS_STD,
         applied=float(braking.applied),
         told=float(braking.told),
-        laws=laws,
-        sliding=sliding,
+        laws=law_priors(config),
+        levels=LEVELS,
+        sliding=SLIDING_KINDS,
     )
     return Bank(*springing.branched(bank, rolling_use(config, bank, braking), rule)).normalised()
-
-
-@once
-def _likely(config: Config) -> tuple[Array, Array]:
-    """Probabilities of the laws; roughness and prior of each kind, 0 of those that do not slide."""
-    kinds = [(kind.roughness, kind.prior if kind.slides else 0.0) for kind in KINDS]
-    return np.array([probability for _, probability in laws_of(config)]), np.array(kinds)
 
 
 def pruned(bank: Bank) -> Bank:

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 SPEED_ERROR_MPS = 0.03
 """Of any measured speed, beside what its message tells; it lasts, so that no filter makes it less."""
 
-PITCH_MEAN, PITCH_STD, BIAS_STD = 0.08, 0.08, 0.005
+PITCH_MEAN, PITCH_STD, BIAS_STD = 0.09, 0.04, 0.005
 """Of an accelerometer: 0.3 to 1 degree under a full brake, 0.05 m/s^2."""
 
 

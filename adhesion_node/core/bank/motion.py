@@ -23,13 +23,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.adhesion import SpeedLaw
 from ..physics.train import Array
 from ..setting import once
 from . import kinds
 from .kernels import moving
 from .kernels.weighing import variances
 from .kinds import SLIDES
+from .laws import laws_of
 from .layout import BRAKE, POSITION, SPEED, Bank, Mask
 
 if TYPE_CHECKING:
@@ -44,10 +44,6 @@ BIAS_DRIFT = 1e-4
 
 RADIUS_DRIFT = 3e-4
 """Of what the rims are too fast by, within 1 s: they creep a little as traction changes."""
-
-
-HALF_AT_MPS = 30.0
-"""Where a law that depends on the speed half as much meets the other: slide protection levels out what it uses."""
 
 
 class Braking(NamedTuple):
@@ -76,13 +72,6 @@ class Use(NamedTuple):
     def std(self, bank: Bank) -> Array:
         """Standard deviations, shape (H,)."""
         return np.asarray(np.sqrt(np.maximum(variances(self.slope, bank.covariance), 1e-12)))
-
-
-def laws_of(config: Config) -> tuple[tuple[SpeedLaw, float], ...]:
-    """How adhesion may depend on speed, with probabilities: the law, half as much, not at all."""
-    law, rest = config.speed_law, (1.0 - config.law_probability) / 2.0
-    half = SpeedLaw(law.floor + float(law(np.asarray(HALF_AT_MPS))) / law.scale, law.gain_kmh, law.offset_kmh)
-    return ((law, config.law_probability), (half, rest), (SpeedLaw(1.0), rest))
 
 
 def resistance(config: Config, bank: Bank) -> Array:

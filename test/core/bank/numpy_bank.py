@@ -19,8 +19,9 @@ from scipy.special import ndtr
 from adhesion_node.core.bank import branching, kinds, motion
 from adhesion_node.core.bank.findings import verdict
 from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
+from adhesion_node.core.bank.laws import SLIPPERY, WET, laws_of
 from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, RADIUS, ROUGH, SPEED, Bank, joined
-from adhesion_node.core.bank.motion import Braking, laws_of, open_variance, resistance, slow_variance
+from adhesion_node.core.bank.motion import Braking, open_variance, resistance, slow_variance
 from adhesion_node.core.bank.seeing import CLIPPED, ROLLED, Observation
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
@@ -142,12 +143,11 @@ def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> l
     """Adhesion depends otherwise on speed; or a border is passed."""
     now = np.full(sliding.log_weight.size, now_s)
     children = []
-    for law, (_, probability) in enumerate(laws_of(config)):
-        if probability > 0.0:
-            laws = np.full(now.size, law)
-            weight = sliding.log_weight + math.log(probability * elapsed_s)
-            bent = sliding._replace(log_weight=weight - math.log(branching.BEND_S), law=laws, born_s=now)
-            children.append(bent.part(sliding.law != law))
+    for law, (_, priors) in enumerate(laws_of(config)):
+        probability = np.interp(sliding.mean[:, MU], (SLIPPERY, WET), priors)
+        weight = sliding.log_weight + np.log(np.maximum(probability, 1e-300) * elapsed_s / branching.BEND_S)
+        bent = sliding._replace(log_weight=weight, law=np.full(now.size, law), born_s=now)
+        children.append(bent.part((sliding.law != law) & (probability > 0.0)))
     steady, passing = sliding.part(sliding.kind != PASSING), sliding.part(sliding.kind == PASSING)
     lasting = [kind for kind in SLIDING if kind != PASSING]
     for kind in lasting:
@@ -180,15 +180,17 @@ def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, 
     parts = branching.LESS[:1] if braking.rising else branching.LESS
     rate = elapsed_s / (branching.RISING_S if braking.rising else branching.STEADY_S) / len(parts)
     share = sum(KINDS[kind].prior for kind in SLIDING)
-    return [
-        held.with_fresh(MU, less * needed, branching.LESS_STD * less * needed + 0.003)
-        .with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
-        .labelled(kind, law, now_s, math.log(rate * probability * KINDS[kind].prior / share))
-        for less in parts
-        for law, (_, probability) in enumerate(laws_of(config))
-        for kind in SLIDING
-        if probability > 0.0
-    ]
+    found = []
+    for less in parts:
+        gives = less * needed
+        for law, (_, priors) in enumerate(laws_of(config)):
+            probability = np.interp(gives, (SLIPPERY, WET), priors)
+            for kind in SLIDING:
+                likely = np.log(np.maximum(rate * probability * KINDS[kind].prior / share, 1e-300))
+                fresh = held.with_fresh(MU, gives, branching.LESS_STD * gives + 0.003)
+                fresh = fresh.with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
+                found.append(fresh.labelled(kind, law, now_s, likely).part(probability > 0.0))
+    return found
 
 
 def pruned(bank: Bank) -> Bank:

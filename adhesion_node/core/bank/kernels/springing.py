@@ -61,19 +61,29 @@ class Rule(NamedTuple):
     applied: float
     told: float
     laws: Array
-    """Probabilities."""
+    """Probabilities on a slippery and on a wet rail, shape (L, 2)."""
+    levels: Array
+    """Adhesion up to which a rail is the one, and from which on it is the other."""
     sliding: Array
     """Roughness and prior of each kind, shape (K, 2); the prior is 0 where it does not slide."""
 
 
 @kernel
+def law_prior(laws: Array, levels: Array, law: int, mu: float) -> float:
+    """Probability of a law where the rail gives `mu`."""
+    wet = min(max((mu - levels[0]) / (levels[1] - levels[0]), 0.0), 1.0)
+    return float(laws[law, 0] + wet * (laws[law, 1] - laws[law, 0]))
+
+
+@kernel
 def _bent(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
     """Adhesion depends otherwise on speed."""
-    for law in range(rule.laws.size):
+    for law in range(rule.laws.shape[0]):
         for h in range(slides.size):
-            if slides[h] and rule.laws[law] > 0.0 and bank.law[h] != law:
+            likely = law_prior(rule.laws, rule.levels, law, bank.mean[h, MU])
+            if slides[h] and likely > 0.0 and bank.law[h] != law:
                 rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, bank.kind[h], LAW
-                weight[size] = bank.log_weight[h] + math.log(rule.laws[law] * rule.elapsed_s / rule.bend_s)
+                weight[size] = bank.log_weight[h] + math.log(likely * rule.elapsed_s / rule.bend_s)
                 size += 1
     return size
 
@@ -118,14 +128,15 @@ def _rolling(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, 
 
 
 @kernel
-def _begun(bank: Bank, holds: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+def _begun(bank: Bank, holds: Mask, needed: Array, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
     """Adhesion has become less than the brake needs."""
     rate = rule.elapsed_s / rule.begin_s / rule.sliding[:, 1].sum() / rule.less.size
     for part in range(rule.less.size):
-        for law in range(rule.laws.size):
+        for law in range(rule.laws.shape[0]):
             for kind in range(rule.sliding.shape[0]):
-                likely = rate * rule.laws[law] * rule.sliding[kind, 1]
                 for h in range(holds.size):
+                    gives = rule.less[part] * needed[h]
+                    likely = rate * law_prior(rule.laws, rule.levels, law, gives) * rule.sliding[kind, 1]
                     if holds[h] and likely > 0.0:
                         rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, SLIDES + part
                         weight[size] = bank.log_weight[h] + math.log(likely)
@@ -151,7 +162,7 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     strong = np.exp(bank.log_weight) > rule.strong
     slides = strong & (rule.sliding[:, 1][bank.kind] > 0.0)
     holds = strong & (bank.kind == HELD) & (rule.told >= 0.0)
-    kinds, laws = rule.sliding.shape[0], rule.laws.size
+    kinds, laws = rule.sliding.shape[0], rule.laws.shape[0]
     most = count + (laws + 1 + kinds) * slides.sum() + laws * kinds * rule.less.size * holds.sum()
     rows, weight = np.zeros((most, 4), np.intp), np.empty(most)
     for h in range(count):
@@ -160,7 +171,7 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     size = _passing(bank, slides, rule, rows, weight, size)
     if rule.told <= 0.0 and slides.any():
         size = _rolling(bank, slides, rule, rows, weight, size)
-    size = _begun(bank, holds, rule, rows, weight, size)
+    size = _begun(bank, holds, needed, rule, rows, weight, size)
     parent, law, kind = rows[:size, 0].copy(), rows[:size, 1].copy(), rows[:size, 2].copy()
     mean, covariance = bank.mean[parent], bank.covariance[parent]
     born, changed = bank.born_s[parent], bank.changed_s[parent]
