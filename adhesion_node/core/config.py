@@ -204,7 +204,7 @@ class Config:
         0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
     )
     ahead_std: float = _unsure(
-        0.035,
+        0.045,
         "By how much the adhesion, or the brake's force, may differ over the way ahead in the mean, relative",
         "",
         0.0,
@@ -215,13 +215,9 @@ class Config:
         0.005, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
     profile_std: float = _unsure(
-        0.0003,
-        "The same where the track profile has sections, which balises tell in whole per mille",
-        "",
-        0.0,
-        0.1,
+        0.0004, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1
     )
-    resistance_std: float = _unsure(0.1, "Standard deviation of the running resistance, relative", "", 0.0, 1.0)
+    resistance_std: float = _unsure(0.12, "Standard deviation of the running resistance, relative", "", 0.0, 1.0)
     mass_std: float = _unsure(0.05, "Standard deviation of the mass, relative", "", 0.0, 1.0)
     brake_std: float = _unsure(0.1, "Standard deviation of the brake force, relative", "", 0.0, 1.0)
     rotating_mass_std: float = _unsure(0.02, "Standard deviation of the rotating mass fraction", "", 0.0, 1.0)
