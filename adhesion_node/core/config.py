@@ -51,8 +51,9 @@ class Config:
         "wet", "Adhesion law whose shape over speed the rail is taken to have", choices=tuple(sorted(LAWS))
     )
     law_probability: float = _method(
-        0.1,
-        "Probability of that shape; else of a third as much of it (rail_condition: low_adhesion's), or of none",
+        0.3,
+        "Probability of that shape, of the bank on a slippery rail its square; else of a third of its dependence on speed "
+        "(rail_condition: low_adhesion's), or of none",
         low=0.0,
         high=1.0,
     )

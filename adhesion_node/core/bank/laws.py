@@ -35,13 +35,16 @@ LEVELS = np.array([SLIPPERY, WET])
 
 
 def laws_of(config: Config) -> tuple[tuple[SpeedLaw, tuple[float, float]], ...]:
-    """Each law with its probability on a slippery and on a wet rail."""
-    law, known = config.speed_law, config.law_probability
+    """Each law with its probability on a slippery and on a wet rail; a film has that of a clean rail less likely."""
+    law, known = config.speed_law, np.array([config.law_probability**2, config.law_probability])
     level = (1.0 / PART - 1.0) * float(law(np.asarray(PART_AT_MPS))) / law.scale
     part = SpeedLaw(law.floor + level, law.gain_kmh, law.offset_kmh)
-    slippery, wet = ((1.0 - known) * flat for flat in (FLAT_SLIPPERY, FLAT_WET))
-    rest = 1.0 - known - slippery, 1.0 - known - wet
-    return ((law, (known, known)), (part, rest), (SpeedLaw(1.0), (slippery, wet)))
+    flat = np.array([FLAT_SLIPPERY, FLAT_WET])
+    shares = known, (1.0 - known) * (1.0 - flat), (1.0 - known) * flat
+    return tuple(
+        (each, (float(slippery), float(wet)))
+        for each, (slippery, wet) in zip((law, part, SpeedLaw(1.0)), shares, strict=True)
+    )
 
 
 @once

@@ -66,12 +66,11 @@ def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
     assert priors == pytest.approx({kind: KINDS[kind].prior / total for kind in priors})
     grows = np.array([kind.growth > 0.0 for kind in KINDS])[sliding.kind]
     steady = sliding.part(~grows)
+    on_slippery, on_wet = np.array([0.81, 0.19 * 0.1, 0.19 * 0.9]), np.array([0.9, 0.1 * 0.55, 0.1 * 0.45])
     for mu in set(steady.mean[:, MU].tolist()):  # the wetter, the less likely a film that gives the same at any speed
-        of_level = steady.part(steady.mean[:, MU] == mu)
+        of_level, wet = steady.part(steady.mean[:, MU] == mu), min(max((mu - 0.04) / 0.03, 0.0), 1.0)
         laws = [float(of_level.weight @ (of_level.law == law)) / float(of_level.weight.sum()) for law in range(3)]
-        assert laws == pytest.approx(
-            [0.9, *np.interp([mu, mu], (0.04, 0.07), (0.0, 1.0)) * [0.045, -0.045] + [0.01, 0.09]]
-        )
+        assert laws == pytest.approx((1.0 - wet) * on_slippery + wet * on_wet)
     assert set(sliding.law[grows]) == {2}
     for noise in range(3):
         assert float(bank.weight @ (bank.noise == noise)) == pytest.approx(start.weight[noise])
