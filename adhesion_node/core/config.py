@@ -52,7 +52,7 @@ class Config:
     )
     law_probability: float = _method(
         0.3,
-        "Probability of that shape, for the bank its square on a slippery rail; else of a part of its dependence on speed "
+        "Probability of that shape, for the bank its square on a slippery rail; else of a part of that shape "
         "(rail_condition: low_adhesion's), or of none",
         low=0.0,
         high=1.0,
