@@ -66,12 +66,12 @@ def ask(line: Any, node: str, **values: Any) -> Any:
 
 
 def test_the_bound_may_be_asked_with_more_confidence_while_the_train_brakes(line: Line) -> None:
-    play(line, 15.0, 26.0)
+    play(line, 15.0, 31.0)
     known, narrow = line.estimator.latest, line.estimator.latest
     accepted = line.estimator.pipeline.accepted
     assert ask(line, "/estimator", confidence=0.999, sensor_timeout_s=1).successful
     assert line.estimator.config.confidence == 0.999
-    play(line, 26.0, 27.0)
+    play(line, 31.0, 32.0)
     wide = line.estimator.latest
     assert line.estimator.pipeline.accepted == accepted + 10, "what was known stays"
     assert wide.window > narrow.window
