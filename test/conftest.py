@@ -41,7 +41,7 @@ from adhesion_node.core.methods import METHODS
 DOMAINS = range(1, 101)
 ROOT = Path(__file__).resolve().parent.parent
 
-_domain_lock = socket.socket(socket.AF_UNIX)
+_domain_locks: list[socket.socket] = []
 _ros_home = pytest.StashKey[str]()
 
 
@@ -62,7 +62,8 @@ def pytest_configure(config: pytest.Config) -> None:
     home = config.stash[_ros_home] = tempfile.mkdtemp(prefix="adhesion_node_test_")
     for name in ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"):
         os.environ.pop(name, None)
-    os.environ["ROS_DOMAIN_ID"] = str(_claim_domain())
+    worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
+    os.environ["ROS_DOMAIN_ID"] = str(_claim_domain(29 * int(worker)))  # the blocks of workers lie far apart
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrices are small, and the cores are taken by the workers
     os.environ["ROS_HOME"] = home
@@ -90,22 +91,38 @@ def pytest_sessionstart(session: pytest.Session) -> None:
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the logs and give the domain back."""
     shutil.rmtree(config.stash[_ros_home], ignore_errors=True)
-    _domain_lock.close()
+    _give_domain_back()
 
 
-def _claim_domain() -> int:
+def _claim_domain(behind: int = 0) -> int:
     """Return a domain that no other test process of this machine holds: an abstract socket is freed by any exit."""
-    for domain in DOMAINS:
+    for step in range(len(DOMAINS)):
+        domain, lock = DOMAINS[(behind + step) % len(DOMAINS)], socket.socket(socket.AF_UNIX)
         try:
-            _domain_lock.bind(f"\0adhesion_node_test_domain_{domain}")
+            lock.bind(f"\0adhesion_node_test_domain_{domain}")
         except OSError:
+            lock.close()
             continue
+        _domain_locks.append(lock)
         return domain
     raise pytest.UsageError(f"all {len(DOMAINS)} ROS domains are held by other test runs: wait for one to end")
 
 
+def _give_domain_back() -> None:
+    while _domain_locks:
+        _domain_locks.pop().close()
+
+
 @pytest.fixture
-def started() -> Iterator[list[subprocess.Popen[str]]]:
+def fresh_domain() -> None:
+    """Move this test to the next domain: a program that another one killed is still seen in its own for 20 s."""
+    behind = int(os.environ["ROS_DOMAIN_ID"])
+    _give_domain_back()
+    os.environ["ROS_DOMAIN_ID"] = str(_claim_domain(behind))
+
+
+@pytest.fixture
+def started(fresh_domain: None) -> Iterator[list[subprocess.Popen[str]]]:
     """Return a list for programs that end with the test at the latest."""
     programs: list[subprocess.Popen[str]] = []
     yield programs
@@ -115,7 +132,7 @@ def started() -> Iterator[list[subprocess.Popen[str]]]:
 
 
 @pytest.fixture
-def context() -> Iterator[Context]:
+def context(fresh_domain: None) -> Iterator[Context]:
     """Return an initialised context of this test alone; it is shut down after the test."""
     fresh = Context()
     rclpy.init(context=fresh)

@@ -189,13 +189,6 @@ def test_it_waits_for_a_subscriber_and_then_misses_nothing(
         spin_until(executor, lambda: len(listener.heard) == len(written))
 
 
-@pytest.fixture
-def alone(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A domain of this test: where an earlier one killed a program, that is seen for 20 s more."""
-    monkeypatch.setenv("ROS_DOMAIN_ID", "101")
-
-
-@pytest.mark.usefixtures("alone")
 def test_waiting_for_subscribers_is_bounded(
     tmp_path: Path,
     context: Context,
