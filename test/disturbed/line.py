@@ -131,12 +131,12 @@ class Line:
                 self.node.destroy_publisher(end)
 
     def set_clock(self, by_s: float) -> None:
-        """Another time on /clock, some times, between those of the simulator."""
+        """Another time on /clock for 2 s, between those of the simulator: some judgements are to fall into it."""
         from adhesion_node.nodes.ros.types import new
 
         stamps = self.sent[topics.STATE.name]
         at_ns = max(stamps[-1][1] + round(by_s * 1e9), 0)
-        for _ in range(20):
+        for _ in range(100):
             self.clock.publish(topics.CLOCK.build(new, at_ns))
             self.spin(0.02)
 
