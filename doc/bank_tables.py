@@ -34,7 +34,7 @@ MODULES = [path for path in FOLDER.rglob("[a-z]*.py") if path.parent.name != "ke
 def parts() -> dict[str, str]:
     """Return the tables by the name of their part."""
     return {
-        "bank kinds": table(("kind", "limits", "drift", "grows", "roughness", "restless", "prior"), _kinds()),
+        "bank kinds": table(("kind", "limits", "drift", "grows", "rough", "swings", "restless", "prior"), _kinds()),
         "bank noises": table(("white σ", "slow σ", "lasts, s", "prior"), _noises()),
         "bank laws": table(("law over speed", "on a slippery rail", "on a wet one"), _laws()),
         "bank constants": table(("module", "constant", "value", "what it is"), _constants()),
@@ -45,7 +45,8 @@ def _kinds() -> Iterator[Sequence[str]]:
     for each in kinds.KINDS:
         limits = "adhesion" if each.slides else "brake" if each.name == "brake" else "no brake"
         shares = (f"{share:.1%}".replace("%", " %") for share in (each.drift, each.growth, each.roughness))
-        yield f"`{each.name}`", limits, *shares, f"{each.restlessness_mps:g}", f"{each.prior:g}"
+        swings = "`used_ripple`" if each.swings else "–"
+        yield f"`{each.name}`", limits, *shares, swings, f"{each.restlessness_mps:g}", f"{each.prior:g}"
 
 
 def _noises() -> Iterator[Sequence[str]]:

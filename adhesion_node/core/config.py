@@ -194,9 +194,9 @@ class Config:
     )
     pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
     used_ripple: float = _unsure(
-        0.02,
-        "By how much the adhesion that a train of 200 m uses swings about its mean over some seconds, as slide "
-        "protection works in turns, relative; the fewer axles, the more: it goes with 1/sqrt(length)",
+        0.025,
+        "By how much the adhesion that a train of 200 m uses swings within a second, as slide protection works in "
+        "turns, relative; the fewer axles, the more: it goes with 1/sqrt(length)",
         "",
         0.0,
         1.0,

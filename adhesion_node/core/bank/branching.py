@@ -23,7 +23,7 @@ from ..belief.rail import Rail
 from .kernels import springing, uniting
 from .kernels.springing import Rule
 from .kernels.uniting import Pruning
-from .kinds import FREE, FREE_STD, HELD, KINDS, PASSING, SLIDING
+from .kinds import FREE, FREE_STD, HELD, KINDS, PASSING, SLIDING, roughness_of
 from .laws import LEVELS, law_priors
 from .layout import MU, ROUGH, Bank, joined
 from .motion import Braking, rolling_use
@@ -64,8 +64,7 @@ ALIKE, ALIKE_STD = 0.3, 1.4
 """Hypotheses of one label say the same where speed and adhesion differ by less than this part of their standard
 deviations, and these by less than this factor."""
 
-# roughness and prior of each kind, 0 of those that do not slide
-SLIDING_KINDS = np.array([(kind.roughness, kind.prior if kind.slides else 0.0) for kind in KINDS])
+SLIDING_PRIORS = np.array([kind.prior if kind.slides else 0.0 for kind in KINDS])
 
 PRUNING = Pruning(math.log(LEAST), MOST, ALIKE, ALIKE_STD)
 
@@ -78,6 +77,7 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     mu = max(rail.mu, LEAST_MU)
     std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
     steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
+    roughness = roughness_of(config)
     parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], law_priors(config)
     for law in range(len(laws)):
         for kind in SLIDING:
@@ -87,11 +87,11 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
                 share = float(law == len(laws) - 1) if grows else springing.law_prior(laws, LEVELS, law, middle)
                 prior = KINDS[kind].prior * share / len(steps)
                 if prior > 0.0:
-                    parts.append((kind, law, middle, within * middle, KINDS[kind].roughness, math.log(prior)))
+                    parts.append((kind, law, middle, within * middle, roughness[kind], math.log(prior)))
     count = bank.kind.size
-    kinds, law_of, means, stds, roughness, priors = (np.repeat(column, count) for column in zip(*parts, strict=True))
+    kinds, law_of, means, stds, rough, priors = (np.repeat(column, count) for column in zip(*parts, strict=True))
     every = bank.part(np.tile(np.arange(count), len(parts)))
-    fresh = every.with_fresh(MU, means, stds).with_fresh(ROUGH, 0.0, roughness)
+    fresh = every.with_fresh(MU, means, stds).with_fresh(ROUGH, 0.0, rough)
     return fresh.labelled(kinds, law_of, -math.inf, priors).normalised()
 
 
@@ -133,7 +133,7 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         told=float(braking.told),
         laws=law_priors(config),
         levels=LEVELS,
-        sliding=SLIDING_KINDS,
+        sliding=np.column_stack((roughness_of(config), SLIDING_PRIORS)),
     )
     return Bank(*springing.branched(bank, rolling_use(config, bank, braking), rule)).normalised()
 

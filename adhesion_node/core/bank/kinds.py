@@ -8,9 +8,16 @@
 
 """What may limit the motion, how smooth the rail may be, and how positions may err: the labels of hypotheses."""
 
-from typing import NamedTuple
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from ..physics.train import Array
+
+if TYPE_CHECKING:
+    from ..config import Config
 
 
 class Kind(NamedTuple):
@@ -29,15 +36,17 @@ class Kind(NamedTuple):
     """Probability when a braking begins."""
     growth: float = 0.0
     """Of the adhesion at one speed, in 1 s, relative."""
+    swings: bool = False
+    """Whether what is used swings within `SWING_S`, as slide protection works in turns; else the rail is rough."""
 
 
 KINDS = (
     Kind("free", False, 0.0, 0.0, 0.02, 1.0),
     Kind("brake", False, 0.0, 0.0, 0.03, 0.55),
-    Kind("smooth", True, 0.001, 0.0, 0.018, 0.16),
-    Kind("even", True, 0.003, 0.02, 0.035, 0.16),
-    Kind("rough", True, 0.005, 0.05, 0.05, 0.1),
-    Kind("restless", True, 0.02, 0.1, 0.07, 0.03),
+    Kind("smooth", True, 0.001, 0.0, 0.018, 0.14),
+    Kind("swinging", True, 0.001, 0.0, 0.01, 0.12, swings=True),
+    Kind("even", True, 0.006, 0.0, 0.01, 0.16, swings=True),
+    Kind("rough", True, 0.005, 0.05, 0.03, 0.1),
     Kind("drying", True, 0.02, 0.05, 0.05, 0.03, 0.025),
     Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
 )
@@ -48,10 +57,17 @@ SLIDES = np.array([kind.slides for kind in KINDS])
 DRIFT = np.array([kind.drift for kind in KINDS])
 ROUGHNESS = np.array([kind.roughness for kind in KINDS])
 GROWTH = np.array([kind.growth for kind in KINDS])
+SWINGS = np.array([kind.swings for kind in KINDS])
 RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
 
 ROUGHNESS_M, GRADE_M = 100.0, 1500.0
 """Correlation lengths of the roughness and of a grade that no profile tells."""
+
+SWING_S = 0.7
+"""Correlation time of a swing."""
+
+# how fast roughness or swing of each kind fades, per m and per s, shape (K, 2)
+FADING = np.array([(0.0, 1.0 / SWING_S) if kind.swings else (1.0 / ROUGHNESS_M, 0.0) for kind in KINDS])
 
 FREE_STD, FREE_S = 0.06, 5.0
 """Net deceleration over g of a train that no brake holds, and how long it lasts: traction is unknown."""
@@ -80,3 +96,8 @@ NOISES = (
 LASTS = np.array([noise.lasts_s for noise in NOISES])
 WHITE = np.array([(noise.white, noise.least_white_m) for noise in NOISES])
 SLOW = np.array([(noise.slow, noise.least_slow_m) for noise in NOISES])
+
+
+def roughness_of(config: Config) -> Array:
+    """Relative standard deviation of the roughness, or of the swing, of each kind, shape (K,)."""
+    return np.where(SWINGS, config.ripple, ROUGHNESS)

@@ -12,7 +12,7 @@
     u = (beta B - rotating r)/(1 + rotating)        where the brake does
     u = f mu (1 + rho) + (1 - f) beta B ...         where the share f of the axles slides
 
-Roughness rho and grade gamma fade with the way, the slow error of the positions with time.
+Roughness rho and grade gamma fade with the way, a swing rho and the slow error of the positions with time.
 """
 
 from __future__ import annotations
@@ -69,9 +69,10 @@ class Use(NamedTuple):
     resisting: Array
     """The resistance at which, N/N, shape (H,)."""
 
-    def std(self, bank: Bank) -> Array:
-        """Standard deviations, shape (H,)."""
-        return np.asarray(np.sqrt(np.maximum(variances(self.slope, bank.covariance), 1e-12)))
+    def std(self, config: Config, bank: Bank) -> Array:
+        """Standard deviations, shape (H,): it swings, whether a hypothesis says so or not."""
+        swing = np.where(kinds.SWINGS[bank.kind], 0.0, config.ripple * self.value)
+        return np.asarray(np.sqrt(np.maximum(variances(self.slope, bank.covariance) + np.square(swing), 1e-12)))
 
 
 def resistance(config: Config, bank: Bank) -> Array:
@@ -143,10 +144,11 @@ def model_of(config: Config) -> moving.Model:
         levels=levels,
         laws=np.array([(law.floor, law.gain_kmh, law.offset_kmh, law.scale) for law, _ in laws_of(config)]),
         kinds=np.column_stack(
-            (SLIDES.astype(np.float64), kinds.DRIFT, kinds.ROUGHNESS, kinds.RESTLESSNESS, kinds.GROWTH)
+            (SLIDES.astype(np.float64), kinds.DRIFT, kinds.roughness_of(config), kinds.RESTLESSNESS, kinds.GROWTH)
         ),
         noises=np.column_stack((kinds.WHITE, kinds.SLOW, kinds.LASTS)),
-        lengths=np.array([kinds.ROUGHNESS_M, kinds.GRADE_M]),
+        fading=kinds.FADING,
+        grade_m=kinds.GRADE_M,
         free=np.array([kinds.FREE_STD, kinds.FREE_S]),
         rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2, RADIUS_DRIFT**2]),
         grade_error=float(config.grade_error),

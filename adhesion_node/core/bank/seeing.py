@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 CLIPPED = 3.5
 """Deviation in standard deviations from which an observation pulls no harder (Huber), as tails are heavier."""
 
-STEADY_ERROR, BRAKING_ERROR = 0.002, 0.1
-"""What an accelerometer feels beside the mean brake: over g, and over the adhesion used, as axles slide in turns."""
+STEADY_ERROR, SWINGING = 0.002, 1.9
+"""What an accelerometer feels beside what is used in the mean: over g, and over the swing of that."""
 
 
 ROLLED, SLID = (0.85, 1.15), (1.0, 0.9)
@@ -72,7 +72,7 @@ def acceleration_seen(
 ) -> Observation:
     """An accelerometer along the train: it feels brake and resistance, not the grade; under the brake it pitches."""
     resisting = config.train.specific_resistance(bank.mean[:, SPEED])
-    used, error = use(config, bank, braking, resisting), BUILDING_UP if braking.rising else BRAKING_ERROR
+    used, error = use(config, bank, braking, resisting), BUILDING_UP if braking.rising else SWINGING * config.ripple
     felt, pitched = -(used.value + resisting), 1.0 + bank.mean[:, PITCH]
     slope = -used.slope * pitched[:, None]
     slope[:, PITCH] += felt

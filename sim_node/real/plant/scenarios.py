@@ -55,6 +55,10 @@ class Scenario:
     way_m: float = 12e3
 
 
+ROUGHER = 0.09
+"""Roughness of a rail that is worse than the others."""
+
+
 def _dry(level: float = 0.30, level_std: float = 0.10) -> Rail:
     return Rail(steady(level), level_std=level_std)
 
@@ -89,6 +93,10 @@ SCENARIOS: Mapping[str, Scenario] = {
         replace(_WET, name="wet_pads_weak", scatter=Scatter(pads=-0.15)),
         _LEAVES,
         replace(_LEAVES, name="leaves_severe", rail=_leaves(0.027)),
+        replace(_WET, name="wet_rough", rail=replace(_wet(), roughness=ROUGHER)),
+        replace(_WET, name="wet_falls", rail=replace(_wet(), level=along((0.0, 0.125), (1600.0, 0.095)))),
+        replace(_LEAVES, name="leaves_rough", rail=replace(_leaves(), roughness=ROUGHER)),
+        replace(_LEAVES, name="leaves_falls", rail=replace(_leaves(), level=along((0.0, 0.048), (3500.0, 0.034)))),
         replace(
             _UNIT,
             name="patches",

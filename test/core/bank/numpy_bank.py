@@ -20,7 +20,21 @@ from adhesion_node.core.bank import branching, kinds, motion
 from adhesion_node.core.bank.findings import verdict
 from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.laws import SLIPPERY, WET, laws_of
-from adhesion_node.core.bank.layout import BIAS, BRAKE, GRADE, MU, OFFSET, POSITION, RADIUS, ROUGH, SPEED, Bank, joined
+from adhesion_node.core.bank.layout import (
+    BIAS,
+    BRAKE,
+    GRADE,
+    MU,
+    OFFSET,
+    POSITION,
+    RADIUS,
+    ROUGH,
+    SPEED,
+    Bank,
+    Indices,
+    Mask,
+    joined,
+)
 from adhesion_node.core.bank.motion import Braking, open_variance, resistance, slow_variance
 from adhesion_node.core.bank.seeing import CLIPPED, ROLLED, Observation
 from adhesion_node.core.belief.rail import Rail
@@ -72,6 +86,16 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     return bank._replace(mean=means, covariance=covariance)
 
 
+def _swings(kind: Indices) -> Mask:
+    return np.array([KINDS[each].name in {"swinging", "even"} for each in kind])
+
+
+def _roughness(config: Config, kind: Indices) -> Array:
+    """Of the rail, or of the swing, of a train with fewer axles than 200 m of them more."""
+    rail = np.array([KINDS[each].roughness for each in kind])
+    return np.where(_swings(kind), config.used_ripple * math.sqrt(200.0 / max(config.train.length_m, 20.0)), rail)
+
+
 def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m: float) -> tuple[Array, Array]:
     """What lasts of each component over a step, and the variance that is added, shapes (H, SIZE)."""
     kind, speed = bank.kind, bank.mean[:, SPEED]
@@ -81,14 +105,14 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     lasting, noise = np.ones(bank.mean.shape), np.zeros(bank.mean.shape)
     grown = np.choose(bank.law, by_law) * np.exp(kinds.GROWTH[kind] * dt_s)
     lasting[:, MU] = np.where(kind == FREE, free, np.where(SLIDES[kind], grown, 1.0))
-    lasting[:, ROUGH] = np.exp(-way_m / kinds.ROUGHNESS_M)
+    lasting[:, ROUGH] = np.where(_swings(kind), np.exp(-dt_s / kinds.SWING_S), np.exp(-way_m / kinds.ROUGHNESS_M))
     lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
     lasting[:, OFFSET] = np.exp(-dt_s / kinds.LASTS[bank.noise])
     drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
     noise[:, POSITION] = config.motion.position_noise_rate * dt_s
     noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s
     noise[:, MU] = np.where(kind == FREE, kinds.FREE_STD**2 * (1.0 - free**2), drift)
-    noise[:, ROUGH] = np.square(kinds.ROUGHNESS[kind]) * (1.0 - lasting[:, ROUGH] ** 2)
+    noise[:, ROUGH] = np.square(_roughness(config, kind)) * (1.0 - lasting[:, ROUGH] ** 2)
     noise[:, BRAKE] = config.brake_drift**2 * dt_s
     noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)
     noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
@@ -154,7 +178,7 @@ def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> l
         share = KINDS[kind].prior / sum(KINDS[each].prior for each in lasting)
         passed = passing.labelled(kind, passing.law, now_s, math.log(share * elapsed_s / branching.PASSED_S))
         passed = passed._replace(changed_s=np.full(passed.law.size, now_s))
-        children.append(passed.with_fresh(ROUGH, 0.0, KINDS[kind].roughness))
+        children.append(passed.with_fresh(ROUGH, 0.0, _roughness(config, np.array([kind]))[0]))
     begun = steady.labelled(PASSING, steady.law, now_s, math.log(elapsed_s / branching.PASSING_S))
     return [*children, begun._replace(changed_s=np.full(begun.law.size, now_s))]
 
@@ -188,7 +212,7 @@ def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, 
             for kind in SLIDING:
                 likely = np.log(np.maximum(rate * probability * KINDS[kind].prior / share, 1e-300))
                 fresh = held.with_fresh(MU, gives, branching.LESS_STD * gives + 0.003)
-                fresh = fresh.with_fresh(ROUGH, 0.0, KINDS[kind].roughness)
+                fresh = fresh.with_fresh(ROUGH, 0.0, _roughness(config, np.array([kind]))[0])
                 found.append(fresh.labelled(kind, law, now_s, likely).part(probability > 0.0))
     return found
 
@@ -251,7 +275,9 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     speed, resisting = np.maximum(mean[:, SPEED], 1.0), resistance(config, bank)
     slowing = GRAVITY * np.maximum(used.value + resisting + mean[:, GRADE], 0.005)
     way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
-    rough_kept, rough_added = _mean_ahead(way_m, kinds.ROUGHNESS_M)
+    swinging = _swings(bank.kind)
+    lengths = np.where(swinging, time_s / kinds.SWING_S, way_m / kinds.ROUGHNESS_M)
+    rough_kept, rough_added = _mean_ahead(lengths, 1.0)
     grade_kept, grade_added = _mean_ahead(way_m, kinds.GRADE_M)
     slope = used.slope.copy()
     slope[:, ROUGH] *= rough_kept
@@ -261,7 +287,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     adhesion = used.value - used.slope[:, ROUGH] * mean[:, ROUGH] * (1.0 - rough_kept)
     adhesion = adhesion - 2.0 * slowing / GRAVITY * (mean[:, SPEED] - told) / told
     roughness = (
-        kinds.ROUGHNESS[bank.kind] ** 2 * rough_added
+        _roughness(config, bank.kind) ** 2 * rough_added
         + np.minimum(kinds.DRIFT[bank.kind], verdict.DRIFT_AHEAD) ** 2 * time_s / 3.0
     )
     variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added

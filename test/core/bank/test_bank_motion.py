@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from itertools import product
 
@@ -28,6 +29,7 @@ from adhesion_node.core.physics.train import CRH3, Array
 
 RISE = 0.004
 TRACK = Track((Grade(-1e5, 1e6, RISE * 1.1e6),))
+KIND_OF = {kind.name: index for index, kind in enumerate(KINDS)}
 LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
 BRAKINGS = [
     pytest.param(Braking(FULL), id="full"),
@@ -63,7 +65,8 @@ def rate(x: Array, label: tuple[int, int, int], braking: Braking, rotating: floa
     elif KINDS[kind].slides:
         bend = (LAWS[law](v + 1e-4) - LAWS[law](v - 1e-4)) / 2e-4 / LAWS[law](v)
         result[MU] = mu * (bend * -slowing + KINDS[kind].growth)
-    result[ROUGH], result[GRADE] = -rough * v / ROUGHNESS_M, -grade * v / GRADE_M
+    result[ROUGH] = -rough / 0.7 if KINDS[kind].name in {"swinging", "even"} else -rough * v / ROUGHNESS_M
+    result[GRADE] = -grade * v / GRADE_M
     result[OFFSET] = -x[OFFSET] / NOISES[noise].lasts_s
     return result
 
@@ -148,7 +151,8 @@ def test_noise_adds_up_to_the_stated_figures() -> None:
         assert after[index, BRAKE, BRAKE] == pytest.approx(0.005**2, rel=1e-3)
         # what fades keeps its variance: 2 sigma^2 per time, or way at 40 m/s
         assert after[index, OFFSET, OFFSET] == pytest.approx(2.0 * 2.0**2 / 30.0, rel=1e-3)
-        assert after[index, ROUGH, ROUGH] == pytest.approx(2.0 * kind.roughness**2 * 40.0 / 100.0, rel=1e-3)
+        rough = -(0.025**2) * math.expm1(-2e-3 / 0.7) / 1e-3 if kind.swings else 2.0 * kind.roughness**2 * 40.0 / 100.0
+        assert after[index, ROUGH, ROUGH] == pytest.approx(rough, rel=1e-3)
         mu = 2.0 * 0.06**2 / 5.0 if kind.name == "free" else (kind.drift * 0.05) ** 2
         assert after[index, MU, MU] == pytest.approx(mu, rel=1e-3)
 
@@ -164,13 +168,21 @@ def test_a_brake_that_is_being_applied_is_known_worse() -> None:
 
 @pytest.mark.parametrize("braking", BRAKINGS)
 def test_the_spread_of_what_is_used_is_that_of_a_sample(braking: Braking) -> None:
-    bank = bank_of([0, 1, 3], spread=0.0)
+    bank = bank_of([0, 1, 2], spread=0.0)
     tight = bank._replace(covariance=1e-4 * bank.covariance)
-    rng, config = np.random.default_rng(7), config_of(0.0)
+    rng, config = np.random.default_rng(7), replace(config_of(0.0), used_ripple=0.0)
     used = use(config, tight, braking, np.full(3, 0.004))
     for index in range(3):
         draws = rng.multivariate_normal(tight.mean[index], tight.covariance[index], 4000)
         many = tight.part(np.full(4000, index))._replace(mean=draws)
         values = use(config, many, braking, np.full(4000, 0.004)).value
         assert used.value[index] == pytest.approx(values.mean(), abs=5.0 * values.std() / 63.0 + 1e-9)
-        assert used.std(tight)[index] == pytest.approx(max(values.std(), 1e-6), rel=0.06)
+        assert used.std(config, tight)[index] == pytest.approx(max(values.std(), 1e-6), rel=0.06)
+
+
+def test_what_is_used_swings_whether_a_kind_says_so_or_not() -> None:
+    bank = bank_of([KIND_OF["smooth"], KIND_OF["swinging"]], spread=0.0)
+    known = bank._replace(covariance=np.zeros_like(bank.covariance)).with_fresh(ROUGH, 0.0, np.array([0.0, 0.1]))
+    config = replace(config_of(0.0), used_ripple=0.1)
+    used = use(config, known, Braking(FULL), np.full(2, 0.004))
+    assert used.std(config, known) == pytest.approx(0.1 * used.value, rel=1e-3)

@@ -77,7 +77,7 @@ def test_a_speed_with_its_scale() -> None:
 @pytest.mark.parametrize("share", [1.0, 0.5])
 @pytest.mark.parametrize("rising", [False, True])
 def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool) -> None:
-    braking, measured, variance = Braking(FULL, share, rising), -0.72, 0.05**2
+    braking, measured, variance = Braking(FULL, share, rising), -0.8, 0.05**2
 
     def felt(x: Array, index: int, resisting: float) -> tuple[float, float]:
         held = x[BRAKE] * FULL
@@ -91,7 +91,7 @@ def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool) -> Non
         foreseen, used = felt(x, index, resisting)
         step = 1e-6 * np.eye(SIZE)
         h = np.array([(felt(x + d, index, resisting)[0] - felt(x - d, index, resisting)[0]) / 2e-6 for d in step])
-        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 0.1) * used) ** 2
+        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 1.9 * 0.025) * used) ** 2
         rows.append((h, measured / 9.8 - foreseen, r))
     check(BANK, acceleration_seen(CONFIG, BANK, measured, variance, braking), rows)
 

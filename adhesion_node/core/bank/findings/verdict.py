@@ -113,9 +113,8 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if not memory.braked and memory.brake.known:
         return Findings(Regime.COASTING, before, constant(before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
-    std = np.hypot(used.std(bank), config.ripple * used.value)
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
-    low, bound, middle, high = quantiles(bank.weight, used.value, std, wanted)
+    low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
     rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
     if not memory.braked:
         free = before
@@ -195,9 +194,10 @@ def counted_on(
 @once
 def _ahead_of(config: Config) -> mixture.Ahead:
     return mixture.Ahead(
-        lengths=np.array([kinds.ROUGHNESS_M, kinds.GRADE_M]),
-        rough=np.square(kinds.ROUGHNESS),
+        rough=np.square(kinds.roughness_of(config)),
+        fading=kinds.FADING,
         drift=np.square(np.minimum(kinds.DRIFT, DRIFT_AHEAD)),
+        grade_m=kinds.GRADE_M,
         resistance=np.array(config.train.resistance_si),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),

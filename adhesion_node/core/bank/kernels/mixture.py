@@ -31,12 +31,14 @@ SPEED, MU, ROUGH, GRADE, SIZE = 1, 2, 3, 5, 11
 class Ahead(NamedTuple):
     """What changes on the way to a standstill."""
 
-    lengths: Array
-    """Correlation lengths of roughness and grade, m."""
     rough: Array
-    """Variance of the roughness of each kind, shape (K,) as the next."""
+    """Variance of the roughness of each kind, shape (K,)."""
+    fading: Array
+    """How fast that fades, per m and per s, shape (K, 2)."""
     drift: Array
-    """Relative variance that adhesion gains in 1 s."""
+    """Relative variance that adhesion gains in 1 s, shape (K,)."""
+    grade_m: float
+    """Correlation length of the grade."""
     resistance: Array
     """Of the speed in m/s: c0, c1, c2, N/N."""
     grade_error: float
@@ -127,9 +129,8 @@ def _law(laws: Array, law: int, v: float) -> float:
 
 
 @kernel
-def _mean_ahead(way_m: float, length_m: float) -> tuple[float, float]:
-    """Of what fades over a length: what stays of it in the mean over a way, and what share of its variance is added."""
-    relative = way_m / length_m
+def _mean_ahead(relative: float) -> tuple[float, float]:
+    """What stays in the mean over a way of so many correlation lengths, and what share of its variance is added."""
     kept = -math.expm1(-relative) / relative
     return kept, max(2.0 / relative * (1.0 - kept) - kept**2, 0.0)
 
@@ -159,8 +160,8 @@ def counted_on(
         slowing = GRAVITY * max(u + used.resisting[h] + grade, 0.005)
         way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
         per_mps = 2.0 * slowing / GRAVITY / told  # of the adhesion that a train so much faster needs for the same way
-        rough_kept, rough_added = _mean_ahead(way_m, rule.lengths[0])
-        grade_kept, grade_added = _mean_ahead(way_m, rule.lengths[1])
+        rough_kept, rough_added = _mean_ahead(way_m * rule.fading[k, 0] + time_s * rule.fading[k, 1])
+        grade_kept, grade_added = _mean_ahead(way_m / rule.grade_m)
         by[:] = slope
         by[ROUGH] *= rough_kept
         by[GRADE] = grade_kept

@@ -23,7 +23,7 @@ Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 """A bank as a plain tuple, as the next two are: one with names takes numba 20 times as long to look at."""
-ModelNumbers = tuple[float, Array, Array, Array, Array, Array, Array, Array, Array, Array, float, float, float]
+ModelNumbers = tuple[float, Array, Array, Array, Array, Array, Array, Array, float, Array, Array, float, float, float]
 StepNumbers = tuple[float, float, float, bool, float, float]
 
 GRAVITY = 9.8
@@ -46,8 +46,10 @@ class Model(NamedTuple):
     """Whether it slides, drift, roughness, restlessness, growth of each kind, shape (K, 5); the first one is free."""
     noises: Array
     """White part, least white one, slow part, least slow one, time that lasts, shape (N, 5)."""
-    lengths: Array
-    """Correlation lengths of roughness and grade, m."""
+    fading: Array
+    """How fast the roughness of each kind fades, per m and per s, shape (K, 2)."""
+    grade_m: float
+    """Correlation length of the grade."""
     free: Array
     """Deviation of what is used without brakes, and how long it lasts, s."""
     rates: Array
@@ -147,8 +149,8 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
             bent = _law(model, law[h], slower) / _law(model, law[h], v)
             lasting[MU] = bent * math.exp(model.kinds[k, 4] * dt) if model.kinds[k, 0] > 0.0 else 1.0
             added[MU] = (model.kinds[k, 1] * x[MU]) ** 2 * dt
-        lasting[ROUGH], lasting[GRADE] = math.exp(-way_m / model.lengths[0]), math.exp(-way_m / model.lengths[1])
-        lasting[OFFSET] = math.exp(-dt / n[4])
+        lasting[ROUGH] = math.exp(-way_m * model.fading[k, 0] - dt * model.fading[k, 1])
+        lasting[GRADE], lasting[OFFSET] = math.exp(-way_m / model.grade_m), math.exp(-dt / n[4])
         added[SPEED] = model.kinds[k, 3] ** 2 * dt
         if step.rising:
             added[SPEED] += (model.building_up * GRAVITY * u) ** 2 * dt
