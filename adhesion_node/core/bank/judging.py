@@ -19,7 +19,7 @@ from ..intake.samples import MAX_VARIANCE_M2
 from .branching import branched, closed, opened, pruned, unlikely_kept
 from .kernels import weighing
 from .kinds import HELD, PASSING, SLIDES
-from .layout import MU, POSITION, SPEED, Bank
+from .layout import MU, POSITION, ROUGH, SPEED, Bank
 from .memory import Memory, S, steps
 from .motion import Braking, resistance, use
 from .plausible import Course
@@ -115,5 +115,6 @@ def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
 
 
 def _used(config: Config, bank: Bank, braking: Braking) -> float:
-    """Adhesion that is used, over all hypotheses."""
-    return float(bank.weight @ use(config, bank, braking, resistance(config, bank)).value)
+    """Adhesion that is used but for roughness and swing, over all hypotheses."""
+    used = use(config, bank, braking, resistance(config, bank))
+    return float(bank.weight @ (used.value - used.slope[:, ROUGH] * bank.mean[:, ROUGH]))
