@@ -21,8 +21,11 @@ from scipy.stats import norm
 
 from adhesion_node.core import Config, Measurement, finish, init, step
 from adhesion_node.core.bank.branching import LEAST, MOST, branched, closed, opened, pruned, unlikely_kept
+from adhesion_node.core.bank.gear.brake import BrakeSeen
+from adhesion_node.core.bank.judging import judged
 from adhesion_node.core.bank.kinds import HELD, KINDS, SLIDES
 from adhesion_node.core.bank.layout import MU, ROUGH, SIZE, Bank, joined
+from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.physics.train import Array
@@ -233,3 +236,18 @@ def test_an_unchanged_rail_is_not_told_in_ten_minutes(seed: int, mu: float) -> N
     """25 s of braking out of every 60 s: with the seeds named 0 changes are told."""
     told = changes_of(ride(seed, [(60.0 * n + 30.0, 60.0 * n + 55.0, mu) for n in range(10)], 600.0))
     assert told[-1][1] == 0
+
+
+@pytest.mark.parametrize(("mu", "changes"), [(0.05, 0), (0.035, 1)])
+def test_a_swing_is_no_change_of_the_rail(mu: float, changes: int) -> None:
+    """What is used is 0.04 before the doubt, and 0.06 or 0.042 behind it: by a swing from - 20 to + 20 %, or more."""
+    kind = [each.name for each in KINDS].index("swinging")
+    sure = bank_of([kind], spread=0.0)
+    sure = sure._replace(covariance=1e-6 * sure.covariance, changed_s=np.array([50.0]))
+    before = sure.with_fresh(MU, 0.05, 1e-4).with_fresh(ROUGH, -0.2, 0.01)
+    behind = sure.with_fresh(MU, mu, 1e-4).with_fresh(ROUGH, 0.2, 0.01)
+    brake, braking = BrakeSeen(demanded_pa=FULL_PA), Braking(FULL)
+    memory = Memory(
+        behind, 60 * S, 1.0, brake, braking=braking, seen=100, told_s=30.0, steady=(before, braking), slid=True
+    )
+    assert judged(CONFIG, memory, lambda: Rail(0.05, 0.04, 0.02)).changes == changes
