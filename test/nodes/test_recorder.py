@@ -301,6 +301,10 @@ def test_a_recorder_that_was_not_given_the_processor_still_has_what_came_meanwhi
     recording.close()
 
 
+def _number(status: Any, key: str) -> int:
+    return next(int(pair.value) for pair in status.values if pair.key == key)
+
+
 def test_what_a_stopped_recorder_has_lost_is_told(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
@@ -318,12 +322,14 @@ def test_what_a_stopped_recorder_has_lost_is_told(
             end.publish(stamped(STATE, (number + 2) * S))
         process.send_signal(signal.SIGCONT)
         spin_until(executor, lambda: "lost on the way" in told[-1].message)
+        # of what is written each telling may be one: the rest are states
+        spin_until(executor, lambda: _number(told[-1], "written") > 100 + len(told))
         process.send_signal(signal.SIGINT)
         spin_until(executor, lambda: process.poll() is not None)
         _, err = process.communicate()
     with BagReader(tmp_path / "bag") as reader:
         kept = reader.counts["/adhesion/state"]
-    lost = next(int(pair.value) for pair in told[-1].values if pair.key == "lost")
+    lost = _number(told[-1], "lost")
     assert 100 <= kept < 5001
     assert 1 <= lost <= 5001 - kept
     assert "adhesion/state: messages lost on the way" in err
