@@ -66,8 +66,8 @@ SLIDES_FROM, CLAIMED = 0.5, 0.8
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 UNTOLD = 4.0
-"""Times its odds sliding counts for the way ahead while neither wheels nor slide protection tell of it: as if it were
-as likely as rolling when the brake was applied, so that nothing but what is measured since speaks for the brake."""
+"""Times its odds sliding since the brake was applied counts for the way ahead, while neither wheels nor slide protection
+tell of it: as if it had been as likely as rolling, so that nothing but what is measured since speaks for the brake."""
 
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
 """A change of the rail counts for the way ahead after so long, once it is so probable, or once all that are so young
@@ -183,7 +183,7 @@ def counted_on(
     weight, partial = bank.weight, _is_partial(config, braking)
     speeds = float(weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD
     if not (partial or braking.told):
-        weight = weight * np.where(used.slides, UNTOLD, 1.0)
+        weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
         weight /= weight.sum()
     borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, _whole_brake(config))) if partial else (1.0, 0.0)
     asked = mixture.Asked(float(missed), borne, float(least))
