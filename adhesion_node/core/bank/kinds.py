@@ -90,7 +90,8 @@ class Noise(NamedTuple):
 NOISES = (
     Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
     Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.3),
-    Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.1),
+    Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.05),
+    Noise(0.03, 0.05, 1.0, 1.0, 2000.0, 0.05),
     Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
 )
 LASTS = np.array([noise.lasts_s for noise in NOISES])

@@ -306,8 +306,9 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     foreseen, std = np.where(more, least, foreseen), np.where(more, 1e-6, std)
     middle = np.maximum(foreseen, verdict.LEAST_AHEAD)
     variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
-    # where nothing tells which, sliding is as likely as rolling beforehand
-    odds = np.where(sliding & (not partial) & (braking.told == 0.0), verdict.UNTOLD, 1.0) * bank.weight
+    # where nothing tells which, sliding since the brake was applied is as likely as rolling beforehand
+    since = sliding & np.isneginf(bank.born_s) & (not partial) & (braking.told == 0.0)
+    odds = np.where(since, verdict.UNTOLD, 1.0) * bank.weight
     weight = odds / odds.sum()
     low = np.exp(quantiles(weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
     return speeds, low
