@@ -31,7 +31,7 @@ from .motion import Braking, rolling_use
 if TYPE_CHECKING:
     from ..config import Config
 
-LEAST, MOST = 1e-4, 40
+LEAST, MOST = 1e-4, 44
 """Probability below which a hypothesis ends, and how many there may be."""
 
 WIDE, SPLIT, SPLIT_STD = 0.3, (-1.2, -0.4, 0.4, 1.2), 0.5
@@ -81,7 +81,7 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], law_priors(config)
     for law in range(len(laws)):
         for kind in SLIDING:
-            grows = KINDS[kind].growth > 0.0  # more than any law does, so that none of them matters
+            grows = KINDS[kind].growth != 0.0  # as much as any law does, so that none of them matters
             for off, within in steps:
                 middle = mu * math.exp(off)
                 share = float(law == len(laws) - 1) if grows else springing.law_prior(laws, LEVELS, law, middle)

@@ -43,12 +43,13 @@ class Kind(NamedTuple):
 KINDS = (
     Kind("free", False, 0.0, 0.0, 0.02, 1.0),
     Kind("brake", False, 0.0, 0.0, 0.03, 0.55),
-    Kind("smooth", True, 0.001, 0.0, 0.018, 0.14),
+    Kind("smooth", True, 0.001, 0.0, 0.018, 0.2),
     Kind("swinging", True, 0.001, 0.0, 0.01, 0.12, swings=True),
-    Kind("even", True, 0.006, 0.0, 0.01, 0.16, swings=True),
+    Kind("even", True, 0.006, 0.0, 0.01, 0.12, swings=True),
     Kind("rough", True, 0.005, 0.05, 0.03, 0.1),
-    Kind("drying", True, 0.02, 0.05, 0.05, 0.03, 0.025),
+    Kind("drying", True, 0.02, 0.05, 0.05, 0.04, 0.025),
     Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
+    Kind("failing", True, 0.006, 0.0, 0.01, 0.06, -0.006, swings=True),
 )
 FREE, HELD, PASSING = 0, 1, 7
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)

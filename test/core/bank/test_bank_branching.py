@@ -67,7 +67,7 @@ def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
     priors = {kind: float(bank.weight @ (bank.kind == kind)) for kind in range(1, len(KINDS))}
     total = sum(kind.prior for kind in KINDS[1:])
     assert priors == pytest.approx({kind: KINDS[kind].prior / total for kind in priors})
-    grows = np.array([kind.growth > 0.0 for kind in KINDS])[sliding.kind]
+    grows = np.array([kind.growth != 0.0 for kind in KINDS])[sliding.kind]
     steady = sliding.part(~grows)
     on_slippery, on_wet = np.array([0.81, 0.19 * 0.1, 0.19 * 0.9]), np.array([0.9, 0.1 * 0.55, 0.1 * 0.45])
     for mu in set(steady.mean[:, MU].tolist()):  # the wetter, the less likely a film that gives the same at any speed
