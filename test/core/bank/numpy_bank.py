@@ -87,7 +87,7 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
 
 
 def _swings(kind: Indices) -> Mask:
-    return np.array([KINDS[each].name in {"swinging", "even"} for each in kind])
+    return np.array([KINDS[each].name in {"swinging", "even", "failing"} for each in kind])
 
 
 def _roughness(config: Config, kind: Indices) -> Array:
@@ -174,13 +174,16 @@ def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> l
         children.append(bent.part((sliding.law != law) & (probability > 0.0)))
     steady, passing = sliding.part(sliding.kind != PASSING), sliding.part(sliding.kind == PASSING)
     lasting = [kind for kind in SLIDING if kind != PASSING]
-    for kind in lasting:
+    begun = steady.labelled(PASSING, steady.law, now_s, math.log(elapsed_s / branching.PASSING_S))
+    for kind in SLIDING:
+        if kind == PASSING:
+            children.append(begun._replace(changed_s=np.full(begun.law.size, now_s)))
+            continue
         share = KINDS[kind].prior / sum(KINDS[each].prior for each in lasting)
         passed = passing.labelled(kind, passing.law, now_s, math.log(share * elapsed_s / branching.PASSED_S))
         passed = passed._replace(changed_s=np.full(passed.law.size, now_s))
         children.append(passed.with_fresh(ROUGH, 0.0, _roughness(config, np.array([kind]))[0]))
-    begun = steady.labelled(PASSING, steady.law, now_s, math.log(elapsed_s / branching.PASSING_S))
-    return [*children, begun._replace(changed_s=np.full(begun.law.size, now_s))]
+    return children
 
 
 def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:

@@ -65,7 +65,7 @@ def rate(x: Array, label: tuple[int, int, int], braking: Braking, rotating: floa
     elif KINDS[kind].slides:
         bend = (LAWS[law](v + 1e-4) - LAWS[law](v - 1e-4)) / 2e-4 / LAWS[law](v)
         result[MU] = mu * (bend * -slowing + KINDS[kind].growth)
-    result[ROUGH] = -rough / 0.7 if KINDS[kind].name in {"swinging", "even"} else -rough * v / ROUGHNESS_M
+    result[ROUGH] = -rough / 0.7 if KINDS[kind].name in {"swinging", "even", "failing"} else -rough * v / ROUGHNESS_M
     result[GRADE] = -grade * v / GRADE_M
     result[OFFSET] = -x[OFFSET] / NOISES[noise].lasts_s
     return result

@@ -77,7 +77,7 @@ def check(memory: Memory) -> None:
     assert np.isfinite(bank.mean).all()
     assert np.isfinite(bank.covariance).all()
     assert math.isclose(float(bank.weight.sum()), 1.0, rel_tol=1e-9)
-    assert 0 < bank.log_weight.size <= max(MOST, len(NOISES) * 65)
+    assert 0 < bank.log_weight.size <= max(MOST, len(NOISES) * 69)
     variance = np.diagonal(bank.covariance, axis1=1, axis2=2)
     assert (variance >= 0.0).all()
     assert np.abs(bank.covariance - bank.covariance.transpose(0, 2, 1)).max() <= 1e-6 * (1.0 + variance.max())

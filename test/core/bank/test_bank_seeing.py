@@ -31,7 +31,7 @@ from adhesion_node.core.bank.seeing import (
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.train import Array
 
-BANK = bank_of([0, 1, 2, 5], noises=[0, 1, 2, 3], seed=11)
+BANK = bank_of([0, 1, 2, 5], noises=[0, 1, 3, 4], seed=11)
 CONFIG = Config()
 
 
