@@ -77,7 +77,7 @@ def test_the_derivatives_of_the_peak_are_those_of_finite_differences() -> None:
 def test_the_derivatives_of_many_peaks_are_those_of_each() -> None:
     thetas = np.array([[DRY, 2.0 * DRY, 3.0 * DRY], [4.0 * DRY, 5.0 * DRY, 6.0 * DRY]])
     each = [[peak_jacobian(20.0, theta) for theta in row] for row in thetas]
-    np.testing.assert_allclose(peak_jacobian(20.0, thetas), each, rtol=1e-14)  # numpy 1.26 rounds many otherwise than one
+    np.testing.assert_allclose(peak_jacobian(20.0, thetas), each, rtol=1e-14)  # many may round otherwise than one
 
 
 def test_what_noise_adds_to_the_products_is_what_many_draws_show() -> None:

@@ -66,7 +66,7 @@ SLIDES_FROM, CLAIMED = 0.5, 0.8
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 UNTOLD = 4.0
-"""Times its odds sliding since the brake was applied counts for the way ahead, while neither wheels nor slide protection
+"""Times its odds sliding since the brake was applied counts for the way ahead while neither wheels nor slide protection
 tell of it: as if it had been as likely as rolling, so that nothing but what is measured since speaks for the brake."""
 
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
