@@ -21,7 +21,7 @@ from oracles import specific_resistance
 from adhesion_node.core.bank.branching import closed
 from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.following import followed, met
-from adhesion_node.core.bank.kinds import HELD, KINDS, SLIDES
+from adhesion_node.core.bank.kinds import HELD, KINDS, LASTS, SLIDES
 from adhesion_node.core.bank.layout import BRAKE, MU, POSITION, SIZE, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, moved
@@ -160,6 +160,21 @@ def test_white_positions_are_told_from_wandering_ones() -> None:
         memory = met(CONFIG, each) if memory is None else followed(CONFIG, memory, each, lambda: UNKNOWN)
     assert memory is not None
     assert float(memory.bank.weight @ (memory.bank.noise == 0)) < 0.01
+
+
+def test_a_receiver_that_wanders_slowly_is_known_as_one() -> None:
+    """By 0.2 m in 10 s, of 2 m declared, as recorded ones. Taken for faster, it tells the speed half as surely."""
+    rng = np.random.default_rng(8)
+    times, truth, positions = braked_run(0.05, 8, 35.0, std_m=0.05)
+    wandering = np.cumsum(rng.normal(0.0, 0.02, times.size))
+    memory: Memory | None = None
+    for each in measurements(times, positions + wandering, 2.0):
+        memory = met(CONFIG, each) if memory is None else followed(CONFIG, memory, each, lambda: UNKNOWN)
+    assert memory is not None
+    assert float(memory.bank.weight @ (LASTS[memory.bank.noise] > 1000.0)) > 0.5
+    mean, covariance = memory.bank.moments()
+    assert np.sqrt(covariance[SPEED, SPEED]) < 0.1
+    assert mean[SPEED] == pytest.approx(truth[-1, 1], abs=4.0 * np.sqrt(covariance[SPEED, SPEED]))
 
 
 def test_a_released_brake_leaves_what_was_learnt_of_train_and_sensors() -> None:
