@@ -252,7 +252,7 @@ class Config:
     max_gap_s: float = _intake(2.0, "Longest gap between measurements that a window may bridge", "s", 1e-3, 60.0)
     reset_s: float = _intake(60.0, "Jump of the stamps, either way, that starts the estimation anew", "s", 1.0, 1e6)
     tick_s: float = _intake(
-        0.3,
+        0.25,
         "Without a position for so long, by the stamps, the other sensors are used without one; 0: never",
         "s",
         0.0,

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""How hypotheses come and go: a braking opens and closes, the rail or the limit may have changed, the unlikely end.
+"""How hypotheses come and go: a braking opens, the rail or the limit may have changed, the unlikely end.
 
 Hypotheses are never blended into each other while they differ: a rail that is smooth stays known as smooth. What may
 have changed is a new hypothesis beside the old one (multiple hypotheses, as in tracking), and evidence decides.
@@ -20,12 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..belief.rail import Rail
+from .free import by_noise
 from .kernels import springing, uniting
 from .kernels.springing import Rule
 from .kernels.uniting import Pruning
-from .kinds import FREE, FREE_STD, HELD, KINDS, PASSING, SLIDING, roughness_of
+from .kinds import HELD, KINDS, PASSING, SLIDING, roughness_of
 from .laws import LEVELS, law_priors
-from .layout import MU, ROUGH, Bank, joined
+from .layout import MU, ROUGH, Bank
 from .motion import Braking, rolling_use
 
 if TYPE_CHECKING:
@@ -77,7 +78,7 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     mu = max(rail.mu, LEAST_MU)
     std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
     steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
-    roughness = roughness_of(config)
+    roughness, bank = roughness_of(config), by_noise(bank)
     parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], law_priors(config)
     for law in range(len(laws)):
         for kind in SLIDING:
@@ -93,18 +94,6 @@ def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
     every = bank.part(np.tile(np.arange(count), len(parts)))
     fresh = every.with_fresh(MU, means, stds).with_fresh(ROUGH, 0.0, rough)
     return fresh.labelled(kinds, law_of, -math.inf, priors).normalised()
-
-
-def closed(bank: Bank) -> Bank:
-    """A braking ends: what it taught of train and sensors stays, one hypothesis for each way that positions err."""
-    parts = []
-    for noise in np.unique(bank.noise):
-        part = bank.part(bank.noise == noise)
-        mean, covariance = part.moments()
-        weight = np.array([np.logaddexp.reduce(part.log_weight)])
-        one = Bank(mean[None], covariance[None], weight, *(np.array([each]) for each in (noise, 0, FREE, 0.0, 0.0)))
-        parts.append(one.with_fresh(MU, 0.0, FREE_STD).with_fresh(ROUGH, 0.0, 0.0))
-    return joined(parts).normalised()
 
 
 def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed_s: float) -> Bank:

@@ -19,6 +19,7 @@ import numpy as np
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
 from ..physics.train import Array
+from .free import either
 from .gear.brake import BrakeSeen
 from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
 from .judging import judged
@@ -85,7 +86,7 @@ def met(config: Config, measurement: Measurement) -> Memory:
     }
     for component, variance in variances.items():
         bank.covariance[:, component, component] = variance
-    memory = Memory(bank.normalised(), measurement.t_ns - 1, declared)
+    memory = Memory(either(bank), measurement.t_ns - 1, declared)
     return followed(config, memory, measurement, lambda: Rail(0.0, 1.0, 0.0))
 
 

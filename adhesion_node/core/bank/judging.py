@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2
-from .branching import branched, closed, opened, pruned, unlikely_kept
+from .branching import branched, opened, pruned, unlikely_kept
+from .free import closed, mixed
 from .kernels import weighing
 from .kinds import HELD, PASSING, SLIDES
 from .layout import MU, POSITION, ROUGH, SPEED, Bank
@@ -44,9 +45,8 @@ SETTLING_S = 6.0
 SLID = 0.9
 """Probability from which axles slid."""
 
-FORGOTTEN = 0.02
-"""Least probability of how positions err while no brake is applied: sensors change, and unknown traction looks like an
-error that wanders."""
+FORGOTTEN = 0.002
+"""Least probability of a hypothesis while no brake is applied: sensors change."""
 
 
 def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
@@ -63,7 +63,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if before and not braked:
         return memory._replace(bank=closed(bank), seen=0)
     if not before:  # one hypothesis has nothing beside it that could be forgotten
-        return memory if bank.kind.size == 1 else memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
+        return _coasted(memory)
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):
             return misled(config, memory)
@@ -73,6 +73,14 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
     return _with_changes(config, memory, pruned(bank))
+
+
+def _coasted(memory: Memory) -> Memory:
+    """No brake is applied: ask what traction does."""
+    bank = memory.bank
+    if memory.since_s >= BRANCH_S - 1e-6:
+        bank, memory = mixed(bank, memory.since_s), memory._replace(since_s=0.0)
+    return memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
 
 
 def misled(config: Config, memory: Memory) -> Memory:

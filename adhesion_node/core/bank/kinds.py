@@ -36,12 +36,14 @@ class Kind(NamedTuple):
     """Probability when a braking begins."""
     growth: float = 0.0
     """Of the adhesion at one speed, in 1 s, relative."""
+    free_s: float = 0.0
+    """How long a net deceleration lasts that no brake holds; 0: brake or rail hold it."""
     swings: bool = False
     """Whether what is used swings within `SWING_S`, as slide protection works in turns; else the rail is rough."""
 
 
 KINDS = (
-    Kind("free", False, 0.0, 0.0, 0.02, 1.0),
+    Kind("free", False, 0.0, 0.0, 0.02, 0.5, free_s=5.0),
     Kind("brake", False, 0.0, 0.0, 0.03, 0.55),
     Kind("smooth", True, 0.001, 0.0, 0.018, 0.2),
     Kind("swinging", True, 0.001, 0.0, 0.01, 0.12, swings=True),
@@ -49,15 +51,17 @@ KINDS = (
     Kind("rough", True, 0.005, 0.05, 0.03, 0.1),
     Kind("drying", True, 0.02, 0.05, 0.05, 0.04, 0.025),
     Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
-    Kind("failing", True, 0.006, 0.0, 0.01, 0.06, -0.006, swings=True),
+    Kind("failing", True, 0.006, 0.0, 0.01, 0.08, -0.006, swings=True),
+    Kind("steady", False, 0.0, 0.0, 0.02, 0.5, free_s=7200.0),
 )
-FREE, HELD, PASSING = 0, 1, 7
+FREE, HELD, PASSING, STEADY = 0, 1, 7, 9
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
 
 SLIDES = np.array([kind.slides for kind in KINDS])
 DRIFT = np.array([kind.drift for kind in KINDS])
 ROUGHNESS = np.array([kind.roughness for kind in KINDS])
 GROWTH = np.array([kind.growth for kind in KINDS])
+FREE_S = np.array([kind.free_s for kind in KINDS])
 SWINGS = np.array([kind.swings for kind in KINDS])
 RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
 
@@ -70,8 +74,8 @@ SWING_S = 0.7
 # how fast roughness or swing of each kind fades, per m and per s, shape (K, 2)
 FADING = np.array([(0.0, 1.0 / SWING_S) if kind.swings else (1.0 / ROUGHNESS_M, 0.0) for kind in KINDS])
 
-FREE_STD, FREE_S = 0.06, 5.0
-"""Net deceleration over g of a train that no brake holds, and how long it lasts: traction is unknown."""
+FREE_STD = 0.06
+"""Net deceleration over g of a train that no brake holds: traction is unknown."""
 
 
 class Noise(NamedTuple):
@@ -93,6 +97,7 @@ NOISES = (
     Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.3),
     Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.05),
     Noise(0.03, 0.05, 1.0, 1.0, 2000.0, 0.05),
+    Noise(0.05, 0.05, 1.0, 1.0, 2000.0, 0.03),
     Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
 )
 LASTS = np.array([noise.lasts_s for noise in NOISES])

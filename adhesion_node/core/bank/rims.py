@@ -39,7 +39,7 @@ ROLLS = 0.006
 SLIDES = 0.2
 """Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new."""
 
-UNISON_S = 3.0
+UNISON_S = 1.5
 """For so long, and the brake's build-up, behind the opening all axles may begin to slide as one."""
 
 TRUSTED_NS = 450_000_000

@@ -23,7 +23,9 @@ Labels = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 """A bank as a plain tuple, as the next two are: one with names takes numba 20 times as long to look at."""
-ModelNumbers = tuple[float, Array, Array, Array, Array, Array, Array, Array, float, Array, Array, float, float, float]
+ModelNumbers = tuple[
+    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, float, float, float
+]
 StepNumbers = tuple[float, float, float, bool, float, float]
 
 GRAVITY = 9.8
@@ -43,7 +45,7 @@ class Model(NamedTuple):
     laws: Array
     """floor, gain, offset, scale of each law, shape (L, 4)."""
     kinds: Array
-    """Whether it slides, drift, roughness, restlessness, growth of each kind, shape (K, 5); the first one is free."""
+    """Whether it slides, drift, roughness, restlessness, growth of each kind, shape (K, 5)."""
     noises: Array
     """White part, least white one, slow part, least slow one, time that lasts, shape (N, 5)."""
     fading: Array
@@ -51,7 +53,9 @@ class Model(NamedTuple):
     grade_m: float
     """Correlation length of the grade."""
     free: Array
-    """Deviation of what is used without brakes, and how long it lasts, s."""
+    """How long the net deceleration of each kind lasts that no brake holds, s, shape (K,); 0: brake or rail hold it."""
+    free_std: float
+    """Its standard deviation over g."""
     rates: Array
     """Variances per second of position, brake, bias and radius."""
     grade_error: float
@@ -95,7 +99,7 @@ def _used(
     model: Model, x: Array, kind: int, resisting: float, step: Step
 ) -> tuple[float, bool, float, float, float, float]:
     """u, whether the adhesion limits, and du/d(mu, rho, beta, v)."""
-    if kind == 0:
+    if model.free[kind] > 0.0:
         return x[MU], False, 1.0, 0.0, 0.0, 0.0
     rotating = model.rotating
     needed = (x[BRAKE] * step.applied - rotating * resisting) / (1.0 + rotating)
@@ -133,7 +137,6 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
     means, covariances = np.empty_like(mean), np.empty_like(covariance)
     lasting, added = np.ones(SIZE), np.zeros(SIZE)
     fall, by_fall, by_way = np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
-    free = math.exp(-dt / model.free[1])
     added[POSITION], added[BRAKE] = dt * model.rates[0], dt * model.rates[1]
     added[BIAS], added[RADIUS] = dt * model.rates[2], dt * model.rates[3]
     for h in range(kind.size):
@@ -143,8 +146,9 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         u, _, by_mu, by_rough, by_brake, by_speed = _used(model, x, k, resisting, step)
         slower = v - dt * GRAVITY * (u + resisting + x[GRADE])
         way_m = max(v, 0.1) * dt
-        if k == 0:
-            lasting[MU], added[MU] = free, model.free[0] ** 2 * (1.0 - free**2)
+        if model.free[k] > 0.0:
+            lasting[MU] = math.exp(-dt / model.free[k])
+            added[MU] = model.free_std**2 * (1.0 - lasting[MU] ** 2)
         else:
             bent = _law(model, law[h], slower) / _law(model, law[h], v)
             lasting[MU] = bent * math.exp(model.kinds[k, 4] * dt) if model.kinds[k, 0] > 0.0 else 1.0
