@@ -44,15 +44,21 @@ class Outcome(NamedTuple):
     truth: dict[int, Truth]
     pipeline: Pipeline
 
+    def true(self, t_ns: int) -> Truth:
+        """The truth at a stamp, or at the one nearest to that of an estimate without a position."""
+        return (
+            self.truth[t_ns] if t_ns in self.truth else self.truth[min(self.truth, key=lambda each: abs(each - t_ns))]
+        )
+
     def braking(self) -> list[Estimate]:
         """Estimates of settled, adhesion-limited braking."""
         first = max(truth.speed_mps for truth in self.truth.values())
-        settled = [p.estimate for p in self.predictions if first - self.truth[p.estimate.t_ns].speed_mps > 30 / 3.6]
-        return [e for e in settled if self.truth[e.t_ns].regime == "ADHESION_LIMITED"]
+        settled = [p.estimate for p in self.predictions if first - self.true(p.estimate.t_ns).speed_mps > 30 / 3.6]
+        return [e for e in settled if self.true(e.t_ns).regime == "ADHESION_LIMITED"]
 
     def errors(self) -> Array:
         """Errors of mu while it can be seen."""
-        return np.array([e.mu - self.truth[e.t_ns].mu for e in self.braking()])
+        return np.array([e.mu - self.true(e.t_ns).mu for e in self.braking()])
 
     def by_second(self) -> dict[int, Estimate]:
         """The last estimate of every second."""

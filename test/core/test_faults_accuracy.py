@@ -98,4 +98,4 @@ def test_a_balise_step_is_not_taken_for_low_adhesion() -> None:
         b = same_time.get(p.estimate.t_ns)
         if p.estimate.t_ns > 45 * S and b is not None:
             assert p.estimate.mu - b.mu > -3.0 * max(b.mu_std, p.estimate.mu_std)
-            assert p.estimate.mu_lower <= step.truth[p.estimate.t_ns].mu
+            assert p.estimate.mu_lower <= step.true(p.estimate.t_ns).mu

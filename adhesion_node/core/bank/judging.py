@@ -76,11 +76,11 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
 
 
 def _coasted(memory: Memory) -> Memory:
-    """No brake is applied: ask what traction does."""
-    bank = memory.bank
-    if memory.since_s >= BRANCH_S - 1e-6:
-        bank, memory = mixed(bank, memory.since_s), memory._replace(since_s=0.0)
-    return memory._replace(bank=unlikely_kept(bank, FORGOTTEN))
+    """No brake is applied: nothing is forgotten, and twice a second it is asked whether traction is steady."""
+    memory = memory._replace(bank=unlikely_kept(memory.bank, FORGOTTEN))
+    if memory.since_s < BRANCH_S - 1e-6:
+        return memory
+    return memory._replace(bank=mixed(memory.bank, memory.since_s), since_s=0.0)
 
 
 def misled(config: Config, memory: Memory) -> Memory:

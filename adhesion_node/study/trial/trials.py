@@ -12,13 +12,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Hashable, Iterable
+from bisect import bisect_left
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_node.train.plant import ADHESION_LIMITED
+from sim_node.train.plant import ADHESION_LIMITED, Truth
 
 from ...command.running import Arrays, Running, run_all
 from ...core import Config, Regime
@@ -152,10 +153,23 @@ def _arrays(lane: Lane, result: LaneResult) -> Arrays:
     }
 
 
+def _truth_at(born: Mapping[int, Truth], stamps: Sequence[int], t_ns: int) -> Truth:
+    """The train at a stamp; an estimate without a position may lie between two of the `stamps`, which rise."""
+    if t_ns in born:
+        return born[t_ns]
+    index = min(max(bisect_left(stamps, t_ns), 1), len(stamps) - 1)
+    (early, before), (late, behind) = ((each, born[each]) for each in stamps[index - 1 : index + 1])
+    part = (t_ns - early) / (late - early)
+    names = ("position_m", "speed_mps", "mu")
+    between = {name: (1.0 - part) * getattr(before, name) + part * getattr(behind, name) for name in names}
+    return before._replace(t_ns=before.t_ns + round(part * (behind.t_ns - before.t_ns)), **between)
+
+
 def _rows(lane: Lane, result: LaneResult) -> Rows:
     """Estimates under the brake, an array of `ROW`."""
     born = lane.run.born
-    braked = [(output, born[output.prediction.estimate.t_ns]) for output in result.outputs]
+    stamps = sorted(born)
+    braked = [(output, _truth_at(born, stamps, output.prediction.estimate.t_ns)) for output in result.outputs]
     braked = [(output, truth) for output, truth in braked if truth.pressure_pa > 0.0]
     onset = next((truth.speed_mps for truth in born.values() if truth.pressure_pa > 0.0), 0.0)
     rows = np.array(

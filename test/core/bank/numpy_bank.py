@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, kinds, motion
 from adhesion_node.core.bank.findings import verdict
-from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, PASSING, SLIDES, SLIDING
+from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.laws import SLIPPERY, WET, laws_of
 from adhesion_node.core.bank.layout import (
     BIAS,
@@ -49,7 +49,7 @@ def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> motio
     mean, rotating = bank.mean, config.train.rotating_mass_fraction
     needed = (mean[:, BRAKE] * braking.applied - rotating * resisting) / (1.0 + rotating)
     rail = mean[:, MU] * (1.0 + mean[:, ROUGH])
-    free = bank.kind == FREE
+    free = _lasts_s(bank.kind) > 0.0
     slides = SLIDES[bank.kind] & ((rail < needed) | (braking.told > 0.0))
     sliding = np.where(slides, braking.share, 0.0)
     slope = np.zeros(mean.shape)
@@ -86,6 +86,11 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     return bank._replace(mean=means, covariance=covariance)
 
 
+def _lasts_s(kind: Indices) -> Array:
+    """How long a deceleration lasts that no brake holds; 0 where one does."""
+    return np.array([{"free": 5.0, "steady": 7200.0}.get(KINDS[each].name, 0.0) for each in kind])
+
+
 def _swings(kind: Indices) -> Mask:
     return np.array([KINDS[each].name in {"swinging", "even", "failing"} for each in kind])
 
@@ -101,17 +106,18 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     kind, speed = bank.kind, bank.mean[:, SPEED]
     way_m = np.maximum(speed, 0.1) * dt_s
     by_law = [law(slower) / law(speed) for law, _ in laws_of(config)]
-    free = np.exp(-dt_s / kinds.FREE_S)
+    lasts_s = _lasts_s(kind)
+    free = np.exp(-dt_s / np.where(lasts_s > 0.0, lasts_s, 1.0))
     lasting, noise = np.ones(bank.mean.shape), np.zeros(bank.mean.shape)
     grown = np.choose(bank.law, by_law) * np.exp(kinds.GROWTH[kind] * dt_s)
-    lasting[:, MU] = np.where(kind == FREE, free, np.where(SLIDES[kind], grown, 1.0))
+    lasting[:, MU] = np.where(lasts_s > 0.0, free, np.where(SLIDES[kind], grown, 1.0))
     lasting[:, ROUGH] = np.where(_swings(kind), np.exp(-dt_s / kinds.SWING_S), np.exp(-way_m / kinds.ROUGHNESS_M))
     lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
     lasting[:, OFFSET] = np.exp(-dt_s / kinds.LASTS[bank.noise])
     drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
     noise[:, POSITION] = config.motion.position_noise_rate * dt_s
     noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s
-    noise[:, MU] = np.where(kind == FREE, kinds.FREE_STD**2 * (1.0 - free**2), drift)
+    noise[:, MU] = np.where(lasts_s > 0.0, kinds.FREE_STD**2 * (1.0 - free**2), drift)
     noise[:, ROUGH] = np.square(_roughness(config, kind)) * (1.0 - lasting[:, ROUGH] ** 2)
     noise[:, BRAKE] = config.brake_drift**2 * dt_s
     noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)

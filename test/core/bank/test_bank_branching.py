@@ -20,10 +20,11 @@ from oracles import specific_resistance
 from scipy.stats import norm
 
 from adhesion_node.core import Config, Measurement, finish, init, step
-from adhesion_node.core.bank.branching import LEAST, MOST, branched, closed, opened, pruned, unlikely_kept
+from adhesion_node.core.bank.branching import LEAST, MOST, branched, opened, pruned, unlikely_kept
+from adhesion_node.core.bank.free import closed
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.judging import judged
-from adhesion_node.core.bank.kinds import HELD, KINDS, SLIDES
+from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, SLIDES, SLIDING, STEADY
 from adhesion_node.core.bank.layout import MU, ROUGH, SIZE, Bank, joined
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking
@@ -64,8 +65,8 @@ def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
     below = [float(sliding.weight @ norm.cdf((mu - sliding.mean[:, MU]) / std)) for mu in (rail.lower, rail.mu, 0.0)]
     # parts that are Gaussian in proportion are not quite log-normal together
     assert np.array(below) / sliding.weight.sum() == pytest.approx([0.05, 0.5, 0.0], abs=0.03)
-    priors = {kind: float(bank.weight @ (bank.kind == kind)) for kind in range(1, len(KINDS))}
-    total = sum(kind.prior for kind in KINDS[1:])
+    priors = {kind: float(bank.weight @ (bank.kind == kind)) for kind in (HELD, *SLIDING)}
+    total = sum(KINDS[kind].prior for kind in priors)
     assert priors == pytest.approx({kind: KINDS[kind].prior / total for kind in priors})
     grows = np.array([kind.growth != 0.0 for kind in KINDS])[sliding.kind]
     steady = sliding.part(~grows)
@@ -80,10 +81,12 @@ def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
     assert np.all(bank.born_s == -math.inf)
 
 
-def test_a_braking_closes_to_one_hypothesis_for_each_noise() -> None:
+def test_a_braking_closes_to_two_hypotheses_for_each_noise() -> None:
     bank = opened(CONFIG, bank_of([0, 0], noises=[1, 3]), Rail(0.05, 0.04, 0.02))
     free = closed(bank)
-    assert free.noise.tolist() == [1, 3]
+    assert free.noise.tolist() == [1, 3, 1, 3]
+    assert free.kind.tolist() == [FREE, FREE, STEADY, STEADY]
+    assert free.weight[:2] == pytest.approx(free.weight[2:])
     assert is_normalised(free)
     kept = [index for index in range(bank.mean.shape[1]) if index not in {MU, ROUGH}]
     for row, noise in enumerate(free.noise):

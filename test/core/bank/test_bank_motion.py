@@ -30,6 +30,7 @@ from adhesion_node.core.physics.train import CRH3, Array
 RISE = 0.004
 TRACK = Track((Grade(-1e5, 1e6, RISE * 1.1e6),))
 KIND_OF = {kind.name: index for index, kind in enumerate(KINDS)}
+FREE_S = {KIND_OF["free"]: 5.0, KIND_OF["steady"]: 7200.0}
 LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
 BRAKINGS = [
     pytest.param(Braking(FULL), id="full"),
@@ -56,12 +57,12 @@ def rate(x: Array, label: tuple[int, int, int], braking: Braking, rotating: floa
     r = float(specific_resistance(np.array(v))) + RISE
     held = (brake * braking.applied - rotating * r) / (1.0 + rotating)
     share = braking.share if slides else 0.0
-    used = mu if kind == 0 else share * mu * (1.0 + rough) + (1.0 - share) * held
+    used = mu if kind in FREE_S else share * mu * (1.0 + rough) + (1.0 - share) * held
     slowing = 9.8 * (used + r + grade)
     result = np.zeros(SIZE)
     result[POSITION], result[SPEED] = v, -slowing
-    if kind == 0:
-        result[MU] = -mu / 5.0
+    if kind in FREE_S:
+        result[MU] = -mu / FREE_S[kind]
     elif KINDS[kind].slides:
         bend = (LAWS[law](v + 1e-4) - LAWS[law](v - 1e-4)) / 2e-4 / LAWS[law](v)
         result[MU] = mu * (bend * -slowing + KINDS[kind].growth)
@@ -153,7 +154,7 @@ def test_noise_adds_up_to_the_stated_figures() -> None:
         assert after[index, OFFSET, OFFSET] == pytest.approx(2.0 * 2.0**2 / 30.0, rel=1e-3)
         rough = -(0.025**2) * math.expm1(-2e-3 / 0.7) / 1e-3 if kind.swings else 2.0 * kind.roughness**2 * 40.0 / 100.0
         assert after[index, ROUGH, ROUGH] == pytest.approx(rough, rel=1e-3)
-        mu = 2.0 * 0.06**2 / 5.0 if kind.name == "free" else (kind.drift * 0.05) ** 2
+        mu = 2.0 * 0.06**2 / FREE_S[index] if index in FREE_S else (kind.drift * 0.05) ** 2
         assert after[index, MU, MU] == pytest.approx(mu, rel=1e-3)
 
 

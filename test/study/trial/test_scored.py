@@ -129,6 +129,19 @@ def test_the_error_is_that_of_an_offline_replay() -> None:
     assert found["mean_relative_error_percent"] == pytest.approx(expected)
 
 
+def test_an_estimate_between_two_samples_is_held_against_what_lies_between_them() -> None:
+    """As those without a position may."""
+    run = simulate(World("tunnel_entry"), 3)
+    stamps = sorted(run.born)[-40:]
+    early, late = (np.array([run.born[each][1:4] for each in of]) for of in (stamps[:-1], stamps[1:]))
+    between = [(3 * one + other) // 4 for one, other in zip(stamps[:-1], stamps[1:], strict=True)]
+    estimates = [Estimate(t_ns, 0.08, 0.01, 0.05, Regime.COASTING, 0.0, 0.0, 0.0, 0.0) for t_ns in between]
+    result = LaneResult([Output(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
+    rows = _arrays(Lane(run, 0.0), result)["rows"]
+    got = np.column_stack([rows[name] for name in ("true_position_m", "true_speed_mps", "true_mu")])
+    assert got == pytest.approx(0.75 * early + 0.25 * late)
+
+
 def test_converges_where_the_error_gets_small() -> None:
     speed = np.array([300.0, 290.0, 280.0, 270.0, 260.0])
     assert converged_kmh(Curve(speed, np.array([50.0, 9.0, 6.0, 3.0, 2.0]))) == 270.0
