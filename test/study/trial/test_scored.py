@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -134,7 +135,7 @@ def test_an_estimate_between_two_samples_is_held_against_what_lies_between_them(
     run = simulate(World("tunnel_entry"), 3)
     stamps = sorted(run.born)[-40:]
     early, late = (np.array([run.born[each][1:4] for each in of]) for of in (stamps[:-1], stamps[1:]))
-    between = [(3 * one + other) // 4 for one, other in zip(stamps[:-1], stamps[1:], strict=True)]
+    between = [(3 * one + other) // 4 for one, other in pairwise(stamps)]
     estimates = [Estimate(t_ns, 0.08, 0.01, 0.05, Regime.COASTING, 0.0, 0.0, 0.0, 0.0) for t_ns in between]
     result = LaneResult([Output(Prediction(estimate, None, None), estimate.t_ns * 1e-9) for estimate in estimates])
     rows = _arrays(Lane(run, 0.0), result)["rows"]
