@@ -91,7 +91,7 @@ def _learnt() -> Iterator[tuple[str, ...]]:
     for quantity in QUANTITIES:
         yield f"`{quantity.name}`, `{quantity.name}_std`", quantity.unit, quantity.meaning
     kinds = ", ".join(kind.name for kind in KINDS)
-    yield f"`{KIND}NAME`", "", f"that this limits the motion: {kinds} (of the rail's roughness but the first two)"
+    yield f"`{KIND}NAME`", "", f"that this limits the motion: {kinds}"
     yield f"`{WHEEL}AXLE`", "", "true over expected radius of the wheels of an axle"
 
 
