@@ -19,8 +19,9 @@ from interface_tables import table
 
 import adhesion_node.core.bank as package
 from adhesion_node.core import Config
-from adhesion_node.core.bank import kinds, layout
-from adhesion_node.core.bank.laws import laws_of
+from adhesion_node.core.bank import layout
+from adhesion_node.core.bank.labels import kinds, noises
+from adhesion_node.core.bank.labels.laws import laws_of
 
 COMPONENTS = [
     name for name, value in vars(layout).items() if name.isupper() and isinstance(value, int) and name != "SIZE"
@@ -50,7 +51,7 @@ def _kinds() -> Iterator[Sequence[str]]:
 
 
 def _noises() -> Iterator[Sequence[str]]:
-    for each in kinds.NOISES:
+    for each in noises.NOISES:
         parts = ((each.white, each.least_white_m), (each.slow, each.least_slow_m))
         stds = (
             f"{of:g} × declared" + (f", at least {least:g} m" if least else "") if of else "–" for of, least in parts

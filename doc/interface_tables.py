@@ -15,7 +15,7 @@ from pathlib import Path
 import adhesion_node
 from adhesion_node.core import Outcome
 from adhesion_node.core.bank.findings.learnt import KIND, QUANTITIES, WHEEL
-from adhesion_node.core.bank.kinds import KINDS
+from adhesion_node.core.bank.labels.kinds import KINDS
 from adhesion_node.core.setting import Setting, by_group
 from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.messages.refused import Reason

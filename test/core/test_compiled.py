@@ -24,7 +24,8 @@ import pytest
 
 from adhesion_node.core import compiled
 from adhesion_node.core.bank import kernels as of_bank
-from adhesion_node.core.bank import kinds, layout
+from adhesion_node.core.bank import layout
+from adhesion_node.core.bank.labels import kinds
 from adhesion_node.core.methods import kernels as of_methods
 from adhesion_node.core.methods.kernels import equation
 from adhesion_node.core.physics.train import GRAVITY

@@ -24,8 +24,8 @@ from .free import by_noise
 from .kernels import springing, uniting
 from .kernels.springing import Rule
 from .kernels.uniting import Pruning
-from .kinds import HELD, KINDS, PASSING, SLIDING, roughness_of
-from .laws import LEVELS, law_priors
+from .labels.kinds import HELD, KINDS, PASSING, SLIDING, roughness_of
+from .labels.laws import LEVELS, law_priors
 from .layout import MU, ROUGH, Bank
 from .motion import Braking, rolling_use
 

@@ -24,7 +24,8 @@ from .gear.brake import BrakeSeen
 from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
 from .judging import judged
 from .kernels import weighing
-from .kinds import FREE, FREE_STD, NOISES
+from .labels.kinds import FREE, FREE_STD
+from .labels.noises import NOISES
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCALE, SIZE, SPEED, Bank
 from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import FREE, FREE_STD, STEADY
+from .labels.kinds import FREE, FREE_STD, STEADY
 from .layout import MU, ROUGH, SIZE, Bank, joined
 
 CALMED_S, STIRRED_S = 10.0, 300.0

@@ -19,7 +19,7 @@ from ..intake.samples import MAX_VARIANCE_M2
 from .branching import branched, opened, pruned, unlikely_kept
 from .free import closed, mixed
 from .kernels import weighing
-from .kinds import HELD, PASSING, SLIDES
+from .labels.kinds import HELD, PASSING, SLIDES
 from .layout import MU, POSITION, ROUGH, SPEED, Bank
 from .memory import Memory, S, steps
 from .motion import Braking, resistance, use

@@ -25,11 +25,11 @@ import numpy as np
 
 from ..physics.train import Array
 from ..setting import once
-from . import kinds
 from .kernels import moving
 from .kernels.weighing import variances
-from .kinds import SLIDES
-from .laws import laws_of
+from .labels import kinds, noises
+from .labels.kinds import SLIDES
+from .labels.laws import laws_of
 from .layout import BRAKE, POSITION, SPEED, Bank, Mask
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def model_of(config: Config) -> moving.Model:
         kinds=np.column_stack(
             (SLIDES.astype(np.float64), kinds.DRIFT, kinds.roughness_of(config), kinds.RESTLESSNESS, kinds.GROWTH)
         ),
-        noises=np.column_stack((kinds.WHITE, kinds.SLOW, kinds.LASTS)),
+        noises=np.column_stack((noises.WHITE, noises.SLOW, noises.LASTS)),
         fading=kinds.FADING,
         grade_m=kinds.GRADE_M,
         free=kinds.FREE_S,
@@ -172,9 +172,9 @@ def white_variance(bank: Bank, declared_m: float) -> Array:
 @lru_cache(maxsize=64)  # a receiver mostly declares the same
 def white_variances(declared_m: float) -> Array:
     """The same by the label `noise`, shape (N,)."""
-    return np.asarray(np.square(np.maximum(kinds.WHITE[:, 0] * declared_m, kinds.WHITE[:, 1])))
+    return np.asarray(np.square(np.maximum(noises.WHITE[:, 0] * declared_m, noises.WHITE[:, 1])))
 
 
 def slow_variance(bank: Bank, declared_m: float) -> Array:
     """Variance of their slow part."""
-    return np.asarray(np.square(np.maximum(kinds.SLOW[:, 0] * declared_m, kinds.SLOW[:, 1]))[bank.noise])
+    return np.asarray(np.square(np.maximum(noises.SLOW[:, 0] * declared_m, noises.SLOW[:, 1]))[bank.noise])

@@ -19,8 +19,8 @@ import numpy as np
 
 from ..physics.train import GRAVITY
 from ..quick import quick
-from . import kinds
 from .kernels import parabola
+from .labels import noises
 from .layout import SPEED, Bank
 from .motion import white_variance
 
@@ -122,7 +122,7 @@ def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)  # a receiver mostly declares the same
 def _wandering(declared_m: float) -> tuple[float, ...]:
-    return tuple(max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in kinds.NOISES)
+    return tuple(max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in noises.NOISES)
 
 
 def _error(white: float, slow: float, span_s: float, count: int) -> float:

@@ -18,7 +18,7 @@ from scipy.special import ndtr
 
 from ..physics.train import GRAVITY, Array
 from .kernels import weighing
-from .kinds import SLIDES
+from .labels.kinds import SLIDES
 from .layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSITION, ROUGH, SCALE, SPEED, Bank
 from .motion import BUILDING_UP, Braking, rolling_use, use, white_variance
 

@@ -16,7 +16,7 @@ from typing import Any
 
 from ...core import Prediction
 from ...core.bank.findings.learnt import KIND, QUANTITIES, learnt
-from ...core.bank.kinds import KINDS
+from ...core.bank.labels.kinds import KINDS
 from ...core.physics.braking import BrakingCurve
 from ..pipeline import Pipeline
 

@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from .cases import AIDED, UNSOUND, Case
-from .information import soonest_s
+from .possible.information import soonest_s
 from .score import FOUND_SHARE
 
 

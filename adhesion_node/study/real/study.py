@@ -26,7 +26,7 @@ from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cases import Case, chosen
 from .goals import goals, missed, soonest
-from .least import least
+from .possible.least import least
 from .score import score
 from .trials import found
 

@@ -16,10 +16,11 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.special import ndtr
 
-from adhesion_node.core.bank import branching, kinds, motion
+from adhesion_node.core.bank import branching, motion
 from adhesion_node.core.bank.findings import verdict
-from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING, SLIDES, SLIDING
-from adhesion_node.core.bank.laws import SLIPPERY, WET, laws_of
+from adhesion_node.core.bank.labels import kinds, noises
+from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING, SLIDES, SLIDING
+from adhesion_node.core.bank.labels.laws import SLIPPERY, WET, laws_of
 from adhesion_node.core.bank.layout import (
     BIAS,
     BRAKE,
@@ -113,7 +114,7 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     lasting[:, MU] = np.where(lasts_s > 0.0, free, np.where(SLIDES[kind], grown, 1.0))
     lasting[:, ROUGH] = np.where(_swings(kind), np.exp(-dt_s / kinds.SWING_S), np.exp(-way_m / kinds.ROUGHNESS_M))
     lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
-    lasting[:, OFFSET] = np.exp(-dt_s / kinds.LASTS[bank.noise])
+    lasting[:, OFFSET] = np.exp(-dt_s / noises.LASTS[bank.noise])
     drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
     noise[:, POSITION] = config.motion.position_noise_rate * dt_s
     noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s

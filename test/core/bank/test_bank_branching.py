@@ -24,7 +24,7 @@ from adhesion_node.core.bank.branching import LEAST, MOST, branched, opened, pru
 from adhesion_node.core.bank.free import closed
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.judging import judged
-from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, SLIDES, SLIDING, STEADY
+from adhesion_node.core.bank.labels.kinds import FREE, HELD, KINDS, SLIDES, SLIDING, STEADY
 from adhesion_node.core.bank.layout import MU, ROUGH, SIZE, Bank, joined
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking

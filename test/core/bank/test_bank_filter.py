@@ -21,7 +21,8 @@ from oracles import specific_resistance
 from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.free import closed
-from adhesion_node.core.bank.kinds import FREE, HELD, KINDS, LASTS, SLIDES, STEADY
+from adhesion_node.core.bank.labels.kinds import FREE, HELD, KINDS, SLIDES, STEADY
+from adhesion_node.core.bank.labels.noises import LASTS
 from adhesion_node.core.bank.layout import BRAKE, MU, POSITION, SIZE, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, moved

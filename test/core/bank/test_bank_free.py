@@ -18,7 +18,7 @@ from oracles import specific_resistance
 
 from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.free import CALMED_S, STIRRED_S, by_noise, either, mixed
-from adhesion_node.core.bank.kinds import FREE, STEADY
+from adhesion_node.core.bank.labels.kinds import FREE, STEADY
 from adhesion_node.core.bank.layout import MU, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail

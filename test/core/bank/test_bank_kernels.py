@@ -24,7 +24,8 @@ from adhesion_node.core.bank import branching, kernels, motion, seeing
 from adhesion_node.core.bank.findings import verdict
 from adhesion_node.core.bank.findings.verdict import quantiles
 from adhesion_node.core.bank.kernels import parabola, weighing
-from adhesion_node.core.bank.kinds import HELD, KINDS, NOISES, PASSING, SLIDES
+from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING, SLIDES
+from adhesion_node.core.bank.labels.noises import NOISES
 from adhesion_node.core.bank.layout import Bank
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail

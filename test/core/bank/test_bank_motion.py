@@ -20,7 +20,8 @@ from banks import FULL, bank_of
 from oracles import specific_resistance
 from scipy.integrate import solve_ivp
 
-from adhesion_node.core.bank.kinds import GRADE_M, KINDS, NOISES, ROUGHNESS_M
+from adhesion_node.core.bank.labels.kinds import GRADE_M, KINDS, ROUGHNESS_M
+from adhesion_node.core.bank.labels.noises import NOISES
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SIZE, SPEED
 from adhesion_node.core.bank.motion import Braking, moved, use
 from adhesion_node.core.config import Config

@@ -22,7 +22,7 @@ from adhesion_node.core import Config, Measurement, Outcome, finish, init, step
 from adhesion_node.core.bank.branching import MOST
 from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.following import followed, met
-from adhesion_node.core.bank.kinds import NOISES
+from adhesion_node.core.bank.labels.noises import NOISES
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.intake.samples import ImuSample, PressureSample, SpeedSample, WheelSample

@@ -25,7 +25,7 @@ from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.gear.wheels import WheelsSeen
 from adhesion_node.core.bank.kernels import mixture as mixtures
 from adhesion_node.core.bank.kernels import weighing
-from adhesion_node.core.bank.kinds import HELD, KINDS, PASSING
+from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, resistance, use

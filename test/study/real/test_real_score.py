@@ -17,7 +17,7 @@ import pytest
 
 from adhesion_node.study.real.cases import CASES
 from adhesion_node.study.real.goals import goals, missed
-from adhesion_node.study.real.information import soonest_s
+from adhesion_node.study.real.possible.information import soonest_s
 from adhesion_node.study.real.score import FIGURES, of_run, score
 from adhesion_node.study.real.trials import BORDER, ROW, RUN, Found
 from adhesion_node.study.trial.trials import DROP

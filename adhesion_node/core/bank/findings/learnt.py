@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 from ...physics.train import GRAVITY
-from ..kinds import KINDS
+from ..labels.kinds import KINDS
 from ..layout import BIAS, BRAKE, GRADE, OFFSET, PITCH, RADIUS, SCALE
 from ..memory import Memory
 

@@ -19,10 +19,10 @@ from ...belief.rail import Rail
 from ...belief.regime import Regime
 from ...physics.train import Array
 from ...setting import once
-from .. import kinds
 from ..following import SPEED_ERROR_MPS
 from ..gear.wheels import BRAKE_BELOW
 from ..kernels import mixture, weighing
+from ..labels import kinds
 from ..layout import SPEED, Bank
 from ..memory import Memory, S
 from ..motion import Braking, Use, model_of, resistance, use

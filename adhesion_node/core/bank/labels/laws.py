@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..physics.adhesion import SpeedLaw
-from ..physics.train import Array
-from ..setting import once
+from ...physics.adhesion import SpeedLaw
+from ...physics.train import Array
+from ...setting import once
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 PART, PART_AT_MPS = 1 / 3, 30.0
 """Part of the law's dependence on speed that another law has, as slide protection levels out what it uses, and the

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""What may limit the motion, how smooth the rail may be, and how positions may err: the labels of hypotheses."""
+"""What may limit the motion, and how smooth the rail may be."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.train import Array
+from ...physics.train import Array
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 
 class Kind(NamedTuple):
@@ -76,33 +76,6 @@ FADING = np.array([(0.0, 1.0 / SWING_S) if kind.swings else (1.0 / ROUGHNESS_M, 
 
 FREE_STD = 0.06
 """Net deceleration over g of a train that no brake holds: traction is unknown."""
-
-
-class Noise(NamedTuple):
-    """How measured positions err: a white part and a slow one, by the standard deviation that they declare."""
-
-    white: float
-    """White part over the declared one."""
-    least_white_m: float
-    slow: float
-    """Slow part over the declared one."""
-    least_slow_m: float
-    lasts_s: float
-    """Correlation time of the slow part."""
-    prior: float
-
-
-NOISES = (
-    Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
-    Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.3),
-    Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.05),
-    Noise(0.03, 0.05, 1.0, 1.0, 2000.0, 0.05),
-    Noise(0.05, 0.05, 1.0, 1.0, 2000.0, 0.03),
-    Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
-)
-LASTS = np.array([noise.lasts_s for noise in NOISES])
-WHITE = np.array([(noise.white, noise.least_white_m) for noise in NOISES])
-SLOW = np.array([(noise.slow, noise.least_slow_m) for noise in NOISES])
 
 
 def roughness_of(config: Config) -> Array:

@@ -18,12 +18,12 @@ from scipy.linalg import block_diag
 
 from sim_node.real.plant.journey import PERIOD_S, Journey
 
-from ...core.physics.train import Array
-from ...run.results.score import CONVERGED_AFTER_MPS
-from .cases import Case
-from .score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M
-from .trials import SLOWEST_MPS
-from .truth import Border, borders, slid
+from ....core.physics.train import Array
+from ....run.results.score import CONVERGED_AFTER_MPS
+from ..cases import Case
+from ..score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M
+from ..trials import SLOWEST_MPS
+from ..truth import Border, borders, slid
 
 SEEDS = (5000, 5001, 5002, 5003)
 """Of the journeys."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from adhesion_node.study.real.information import BEFORE_S, _information, deceleration_std, soonest_s
+from adhesion_node.study.real.possible.information import BEFORE_S, _information, deceleration_std, soonest_s
 from sim_node.real.sensors.fitted import Mounted
 from sim_node.real.sensors.position import Gnss
 from sim_node.real.sensors.timing import Timing

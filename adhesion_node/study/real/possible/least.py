@@ -24,12 +24,12 @@ from sim_node.real.sensors.fitted import FITTED, Mounted
 from sim_node.real.sensors.timing import Timing
 from sim_node.real.sensors.wheels import Wheels
 
-from ...core.physics.train import Array
-from .cases import Case
+from ....core.physics.train import Array
+from ..cases import Case
+from ..truth import USED_S
 from .courses import STEP_S, Course, autocovariance_of, courses_of
 from .excess import excess_of
 from .knowledge import HONEST, std_of
-from .truth import USED_S
 
 OF_STD = float(np.sqrt(2.0 / np.pi))
 """Mean absolute error of a Gaussian over its standard deviation."""

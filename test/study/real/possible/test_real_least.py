@@ -15,10 +15,10 @@ import pytest
 
 from adhesion_node.core.physics.train import GRAVITY, Array
 from adhesion_node.study.real.cases import chosen
-from adhesion_node.study.real.courses import STEP_S, Course, on_the_mean
-from adhesion_node.study.real.excess import on_another_rail
-from adhesion_node.study.real.knowledge import FACTOR_STD, FAR_M, FAST_MPS, PITCH_STD, POWER_STD, apart, std_of
-from adhesion_node.study.real.least import least
+from adhesion_node.study.real.possible.courses import STEP_S, Course, on_the_mean
+from adhesion_node.study.real.possible.excess import on_another_rail
+from adhesion_node.study.real.possible.knowledge import FACTOR_STD, FAR_M, FAST_MPS, PITCH_STD, POWER_STD, apart, std_of
+from adhesion_node.study.real.possible.least import least
 from sim_node.real.sensors.fitted import FITTED, Mounted
 from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss

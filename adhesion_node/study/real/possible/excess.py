@@ -28,7 +28,7 @@ from scipy.stats import norm
 
 from sim_node.real.sensors.fitted import Mounted
 
-from ...core.physics.train import GRAVITY, Array
+from ....core.physics.train import GRAVITY, Array
 from .courses import STEP_S, Course, remaining_m
 from .knowledge import apart, std_of
 

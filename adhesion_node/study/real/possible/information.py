@@ -25,7 +25,7 @@ from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
 from sim_node.real.sensors.wheels import Wheels
 
-from ...core.physics.train import GRAVITY, Array
+from ....core.physics.train import GRAVITY, Array
 
 BEFORE_S = 10.0
 """What is used of the time before the step; more of it changes the second decimal."""

@@ -24,9 +24,9 @@ from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
 
-from ...core.physics.train import GRAVITY, Array
+from ....core.physics.train import GRAVITY, Array
+from ..trials import SLOWEST_MPS
 from .courses import STEP_S, Course
-from .trials import SLOWEST_MPS
 
 FACTOR_STD, FAR_M, FAST_MPS = 0.5, 1e3, 50.0
 """What is known beforehand of a factor, and of place and speed."""

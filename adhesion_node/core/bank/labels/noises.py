@@ -1,0 +1,40 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""How measured positions err, as a hypothesis says it: white, slowly, or both."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Noise(NamedTuple):
+    """How measured positions err: a white part and a slow one, by the standard deviation that they declare."""
+
+    white: float
+    """White part over the declared one."""
+    least_white_m: float
+    slow: float
+    """Slow part over the declared one."""
+    least_slow_m: float
+    lasts_s: float
+    """Correlation time of the slow part."""
+    prior: float
+
+
+NOISES = (
+    Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
+    Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.3),
+    Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.05),
+    Noise(0.03, 0.05, 1.0, 1.0, 2000.0, 0.05),
+    Noise(0.05, 0.05, 1.0, 1.0, 2000.0, 0.03),
+    Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
+)
+LASTS = np.array([noise.lasts_s for noise in NOISES])
+WHITE = np.array([(noise.white, noise.least_white_m) for noise in NOISES])
+SLOW = np.array([(noise.slow, noise.least_slow_m) for noise in NOISES])
