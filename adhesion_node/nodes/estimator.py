@@ -40,7 +40,10 @@ EXAMPLES = (
 )
 
 UNMEASURED = "no brake pressure: a full brake is assumed"
-UNBRAKED = "no brake pressure: mu cannot be told; publish brake_pressure or brake_demand"
+UNBRAKED = (
+    "no brake pressure: mu is what slows the train, whether the adhesion limits is not told; publish brake_pressure"
+    " or brake_demand"
+)
 
 
 class Estimator(EstimatingNode[Pipeline]):

@@ -271,7 +271,7 @@ def test_a_missing_brake_pressure_is_said(line: Line) -> None:
     line.hear_all()
     (status,) = line.heard[topics.DIAGNOSTICS][-1].status
     assert status.level == DiagnosticStatus.WARN
-    assert status.message.startswith("no brake pressure: mu cannot be told")
+    assert status.message.startswith("no brake pressure: mu is what slows the train")
 
 
 def test_a_combination_out_of_range_is_refused_at_start(context: Context) -> None:

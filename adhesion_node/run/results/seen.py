@@ -133,7 +133,7 @@ class Seen:
         if self.too_fast is not None:
             yield self.too_fast
         if self.most_pa is None:
-            yield "no brake pressure and no demand came: without them mu cannot be told"
+            yield "no brake pressure and no demand came: without them it is not told whether the adhesion limits"
         elif self.most_pa < BRAKED_PA:
             yield f"the brake pressure is {self.most_pa:.3g} Pa at most: is its unit right, was there a braking?"
         if self._runs_on:

@@ -43,6 +43,8 @@ from adhesion_node.wire.topics import CLOCK, POSITION
 
 S = 10**9
 SIMULATED = ("--ros-args", "-p", "use_sim_time:=true")
+RELIABLE = ("--ros-args", "-p", f"qos_overrides./{POSITION.name}.subscription.reliability:=reliable")
+"""By default the recorder listens best effort, and a busy machine may lose of it what is large."""
 
 
 def assert_complete(bag: Path, messages: int) -> None:
@@ -141,7 +143,7 @@ def test_a_full_disk_ends_the_recorder_with_a_complete_recording(
     texts = incompressible(np.random.default_rng(1))
     talker = Talker(Node("talker", context=context), clock_stands=bool(options), noise=texts)
     executor.add_node(talker.node)
-    with recording_process(tmp_path / "bag", *options) as process:
+    with recording_process(tmp_path / "bag", *options, *RELIABLE) as process:
         resource.prlimit(process.pid, resource.RLIMIT_FSIZE, (10**6, 10**6))
         spin_until(executor, lambda: process.poll() is not None, 30.0)
         out, err = process.communicate()
