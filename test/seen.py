@@ -26,6 +26,9 @@ LEAST_CONTRAST, LEAST_OF_LARGE, LARGE_PX, LARGE_BOLD_PX = 4.5, 3.0, 24.0, 18.66
 OVERLAP_PX = 2.0
 """Lines of text may touch by so much."""
 
+TRIES = 10
+"""Photographs at most, until a page is not drawn meanwhile."""
+
 TEXTS = """() => {
   const found = [], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   while (walker.nextNode()) {
@@ -93,11 +96,16 @@ class Seen(NamedTuple):
 
 
 def look(page: Any) -> Seen:
-    """Photograph a page as a whole. Its texts and its pixels are of one moment, unless it is drawn in between."""
-    texts = tuple(Text(**each) for each in page.evaluate(TEXTS))
-    drawn = Image.open(BytesIO(page.screenshot(full_page=True, animations="disabled", caret="hide")))
+    """Photograph a page as a whole. Where it is drawn meanwhile, again: its texts and pixels are of one moment."""
+    before = page.evaluate(TEXTS)
+    for _ in range(TRIES):
+        photograph = page.screenshot(full_page=True, animations="disabled", caret="hide")
+        texts, before = before, page.evaluate(TEXTS)
+        if texts == before:
+            break
     width, scale = page.evaluate("[innerWidth, devicePixelRatio]")
-    return Seen(np.asarray(drawn.convert("RGB")), scale, width, texts)
+    drawn = np.asarray(Image.open(BytesIO(photograph)).convert("RGB"))
+    return Seen(drawn, scale, width, tuple(Text(**each) for each in texts))
 
 
 def luminance(colours: Any) -> Any:
