@@ -134,7 +134,7 @@ class Line:
         """Another time on /clock for 2 s, between those of the simulator: some judgements are to fall into it."""
         from adhesion_node.nodes.ros.types import new
 
-        stamps = self.sent[topics.STATE.name]
+        stamps = self.sent[topics.ATP_STATUS.name]  # heard before all else; the estimator may yet be to be found
         at_ns = max(stamps[-1][1] + round(by_s * 1e9), 0)
         for _ in range(100):
             self.clock.publish(topics.CLOCK.build(new, at_ns))
