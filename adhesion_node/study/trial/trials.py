@@ -120,15 +120,15 @@ class Results(NamedTuple):
 
 
 def grouped(wanted: Iterable[tuple[Key, Trials]], where: Running) -> dict[Key, Results]:
-    """Run what the cache lacks, and put together what has the same key. Raises ValueError without runs.
+    """Run what the cache lacks, and put together what has the same key, as given. Raises ValueError without runs.
 
     What is of the same seeds is run one after the other, so that a worker simulates them once for all estimators.
     """
     tasks = [(key, task) for key, trials in wanted for task in trials.tasks()]
+    parts: dict[Key, list[Arrays]] = {key: [] for key, _ in tasks}
     tasks.sort(key=lambda one: (one[1].first_seed, -one[1].weight))
-    parts: dict[Key, list[Arrays]] = {}
     for (key, _), found in zip(tasks, run_all([task for _, task in tasks], where, as_given=True), strict=True):
-        parts.setdefault(key, []).append(found)
+        parts[key].append(found)
     return {
         key: Results(*(np.concatenate([part[name] for part in some]) for name in Results._fields))
         for key, some in parts.items()

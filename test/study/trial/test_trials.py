@@ -59,13 +59,15 @@ def test_what_is_of_the_same_seeds_is_run_one_after_the_other(monkeypatch: pytes
         return [{name: np.full(1, task.first_seed) for name in Results._fields} for task in tasks]
 
     monkeypatch.setattr("adhesion_node.study.trial.trials.run_all", noted)
-    wanted = [(name, QUICK._replace(seeds=60)) for name in ("one", "other")]
+    both = QUICK._replace(seeds=60)
+    wanted = [("light", both._replace(estimator=Estimator(way="ekf"))), ("heavy", both)]
     found = grouped(wanted, Running(Path()))
     assert [task.first_seed for task in given] == [1000, 1000, 1025, 1025, 1050, 1050]
-    assert {name: some.seconds.tolist() for name, some in found.items()} == {
-        "one": [1000, 1025, 1050],
-        "other": [1000, 1025, 1050],
-    }
+    assert [task.estimator.way for task in given] == ["core", "ekf"] * 3, "the longer one first"
+    assert [(name, some.seconds.tolist()) for name, some in found.items()] == [
+        ("light", [1000, 1025, 1050]),
+        ("heavy", [1000, 1025, 1050]),
+    ]
 
 
 def test_trials_come_back_from_the_cache_whole(tmp_path: Path) -> None:
