@@ -44,7 +44,7 @@ from ..live.__main__ import address_options
 from ..live.node import Live
 from ..report.drawn.picture import draw
 from ..report.drawn.table import table
-from ..report.found.regimes import Band
+from ..report.found.regimes import IN_WORDS, Band
 from ..report.read.gathered import read_status
 from ..report.read.recorded import read_run
 from ..report.read.run import Run
@@ -95,12 +95,12 @@ class _Progress:
         """Print the estimate if a line is due; True: the run goes on."""
         if not at_s:
             self.started_s = time.monotonic()
-            _say(f"{'time':>7} {'speed':>10} {'mu':>7} {'at least':>9}  regime")
+            _say(f"{'time':>7} {'speed':>10} {'mu':>7} {'at least':>9}  what limits")
         if estimate is not None and estimate.t_ns >= self._due_ns:
             self._due_ns = estimate.t_ns + round(SHOWN_EVERY_S * 1e9)
             _say(
                 f"{estimate.t_ns * 1e-9:5.0f} s {estimate.speed_mps / KMH:5.0f} km/h {estimate.mu:7.4f} "
-                f"{estimate.mu_lower:9.4f}  {estimate.regime.name}"
+                f"{estimate.mu_lower:9.4f}  {IN_WORDS[estimate.regime.name]}"
             )
         return True
 
@@ -233,7 +233,7 @@ def _said(result: dict[str, Any]) -> Iterator[str]:
     if "told_after_s" in result:
         yield f"adhesion limits from {result['limited_from_s']:.1f} s on, told {result['told_after_s']:.1f} s later"
     if "ms_per_window_p50" in result:
-        yield f"a full window takes {result['ms_per_window_p50']:.0f} ms (median of {result['windows']} windows)"
+        yield f"an estimate takes {result['ms_per_window_p50']:.1f} ms (median of {result['windows']})"
     same = "gives the same numbers to the last bit" if result["live_equals_offline"] else "GIVES OTHER NUMBERS"
     yield f"an offline replay of the recording {same} (digest {result['digest'][:16]}...)"
     yield f"ATP monitor: {result['atp']}"

@@ -18,7 +18,7 @@ from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
 from ...core.physics.train import CRH3, KMH, Train
-from ..found.regimes import Band, bands
+from ..found.regimes import IN_WORDS, Band, bands
 from ..read.run import Run
 from .charts import charts
 from .thinning import evenly, peaks, with_gaps
@@ -82,10 +82,12 @@ def draw(
     for axis in (*axes, last):
         axis.grid(alpha=0.3)
         axis.legend(loc="best", fontsize="small")
-    names = [regime.replace("_", "-").lower() for regime in SHADES]
+    names = [IN_WORDS[regime] for regime in SHADES]
     told, true = ([Patch(color=shades[regime]) for regime in SHADES] for shades in (SHADES, TRUE_SHADES))
     patches = list(zip(told, true, strict=True)) if truth else told
-    meaning = "what limits the motion" + (": as the estimator said, and in truth (the strip above)" if truth else "")
+    meaning = "what limits the motion" + (
+        ": as the estimator said, and in truth (the strip above, grey while it coasts)" if truth else ""
+    )
     foot.legend(patches, names, loc="center", ncols=len(names), title=meaning, handler_map={tuple: HandlerTuple(None)})
     for path in paths:
         figure.savefig(path, dpi=110)
