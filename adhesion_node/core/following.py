@@ -14,10 +14,13 @@ from .banked import follow_banked, last_banked
 from .config import Config
 from .estimate import Estimate, blind_estimate
 from .intake.outcome import Event, Outcome
-from .intake.plausibility import in_mps, is_kmh
+from .intake.plausibility import KMH_PER_MPS, in_mps, is_kmh
 from .intake.samples import Measurement
 from .state import State
 from .windowed import follow_windowed, last_window
+
+SURE_SIGMA = 3.0
+"""Standard deviations by which a speed in km/h is surely not the train's."""
 
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
@@ -32,7 +35,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     pace = state.pace.after(measurement)
     refused: tuple[Event, ...] = ()
     if measurement.speeds or measurement.speed_mps is not None:
-        measurement, refused = in_mps(measurement, (pace.speed_mps, math.nan if seen is None else seen.speed_mps))
+        measurement, refused = in_mps(measurement, (pace.speed_mps, _surely(seen)))
     state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace)
     if refused:
         state = state.told(*refused)
@@ -47,6 +50,12 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
 def last_estimate(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """What is still to be said at the end of a time or of the data."""
     return last_banked(config, state) if state.method is None else last_window(config, state)
+
+
+def _surely(seen: Estimate | None) -> float:
+    """The speed of the train where it is known well enough to tell one in km/h from one that is right; else NaN."""
+    wide = seen is None or SURE_SIGMA * seen.speed_std_mps > (KMH_PER_MPS - 1.0) * abs(seen.speed_mps)
+    return math.nan if seen is None or wide else seen.speed_mps
 
 
 def _unseen(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:

@@ -22,9 +22,12 @@ from .engine import EstimatorPipeline, Verbs
 BACK_MPS, BACK_M = 3.0, 10.0
 """A train that runs back faster and further than this does not roll back: its positions fall along the run."""
 
+SURE_SIGMA = 2.0
+"""Standard deviations by which it surely does: one that nothing is heard of may be foreseen to run back."""
+
 BACKWARDS = (
     "positions fall while the train runs: set direction to what the chainage does along the run, up where it rises, "
-    "down where it falls; or change their sign"
+    "down where it falls; or change their sign, or that of a speed, which counts forward along the run"
 )
 
 
@@ -68,7 +71,7 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         return self.last is not None and self._back_m(self.last) > BACK_M
 
     def _note_way(self, estimate: Estimate) -> None:
-        if estimate.speed_mps > -BACK_MPS:
+        if estimate.speed_mps + SURE_SIGMA * estimate.speed_std_mps > -BACK_MPS:
             self._back_from_m = None
         elif self._back_from_m is None or estimate.position_m > self._back_from_m:
             self._back_from_m = estimate.position_m

@@ -148,6 +148,8 @@ def _speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
     course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
     ratio = float((np.abs(course) * speed).sum() / (speed * speed).sum())
     yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
+    if course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
+        yield "the speed is below 0 while the positions rise: change its sign, it counts forward along the run"
     told = f"the positions move at {ratio:.3g} times the speed"
     for (place, place_m), (pace, pace_mps) in product(POSITION_UNITS.items(), SPEED_UNITS.items()):
         other = pace_mps / SPEED_UNITS[form.speed_unit] / (place_m / POSITION_UNITS[form.position_unit])

@@ -30,7 +30,10 @@ ZONED = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
 
 EMPTY = "every row needs a time and something measured"
 
-NO_NUMBER = "write a finite number with a decimal point, without its unit; or is the --decimal another?"
+NO_NUMBER = (
+    "write a finite number with a decimal point, without its unit, nothing where nothing was measured; "
+    "or is the --decimal another?"
+)
 
 Flags = NDArray[np.bool_]
 

@@ -111,7 +111,8 @@ def split(text: str, delimiter: str) -> list[str]:
 
     The standard library's reader: of a bad row pandas tells neither the line nor, where cells are missing, that it is.
     """
-    return [cell.strip() for cell in next(csv.reader([text], delimiter=delimiter, strict=True), [])]
+    cells = next(csv.reader([text], delimiter=delimiter, strict=True, skipinitialspace=True), [])
+    return [cell.strip() for cell in cells]
 
 
 def _cells(text: str, delimiter: str) -> list[str]:

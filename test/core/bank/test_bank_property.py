@@ -96,7 +96,8 @@ def probe(index: int, measurements: list[Measurement]) -> None:
         findings = found(config, memory, RAIL, RAIL)
         assert 0.0 <= findings.rail.lower <= findings.rail.mu < math.inf
         assert 0.0 < findings.rail.std < math.inf
-        assert all(0.0 <= each < math.inf for each in findings.ahead.mu)
+        slowing = config.train.specific_resistance(np.array(findings.ahead.speed_mps)) + findings.ahead.mu
+        assert ((slowing >= -1e-15) & np.isfinite(slowing)).all()
 
 
 @given(st.integers(0, len(CONFIGS) - 1), stops)

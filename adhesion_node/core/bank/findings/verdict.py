@@ -69,6 +69,9 @@ UNTOLD = 4.0
 """Times its odds sliding since the brake was applied counts for the way ahead while neither wheels nor slide protection
 tell of it: as if it had been as likely as rolling, so that nothing but what is measured since speaks for the brake."""
 
+LOST, LOST_MPS, STANDS_MPS = 1.5, 5.0, 0.1
+"""A speed is lost where the train may be so many times as fast as told, and by so much; told is the third at least."""
+
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
 """A change of the rail counts for the way ahead after so long, once it is so probable, or once all that are so young
 prevail; before its border is passed, if all that say so are so probable together."""
@@ -85,9 +88,9 @@ class Ahead(NamedTuple):
         """Adhesion at speeds, element by element."""
         return np.asarray(np.interp(speed_mps, self.speed_mps, self.mu))
 
-    def at_least(self, mu: float) -> Ahead:
-        """No less than this."""
-        return self._replace(mu=tuple(max(each, mu) for each in self.mu))
+    def at_least(self, other: Ahead) -> Ahead:
+        """No less than another one of the same speeds."""
+        return self._replace(mu=tuple(map(max, self.mu, other.mu)))
 
 
 def constant(mu: float) -> Ahead:
@@ -111,7 +114,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if memory.misled:
         return Findings(Regime.COASTING, nothing, constant(nothing.lower), nothing)
     if not memory.braked and memory.brake.known:
-        return Findings(Regime.COASTING, before, constant(before.lower), before)
+        return Findings(Regime.COASTING, before, _for_the_fastest(config, bank, before.lower)[0], before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
@@ -120,7 +123,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         free = before
         if rail.mu > SLOWING:
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
-        return Findings(Regime.COASTING, free, constant(before.lower), free)
+        return Findings(Regime.COASTING, free, _for_the_fastest(config, bank, before.lower)[0], free)
     missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
     ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known, used)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
@@ -130,11 +133,31 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         regime = _regime(config, memory, slides, rail.mu)
         rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
         least = least if _is_partial(config, memory.braking) and rolls else 0.0
-    ahead = ahead.at_least(min(least, _whole_brake(config)))
+    floor, is_lost = _for_the_fastest(config, bank, min(least, _whole_brake(config)))
     lower = max(rail.lower, least)
+    ahead = _for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
     return Findings(regime, rail, ahead, known)
+
+
+def _for_the_fastest(config: Config, bank: Bank, mu: float) -> tuple[Ahead, bool]:
+    """Adhesion that stops the fastest train there may be, told as the slower one needs it for the same way, v^2 / 2a.
+
+    And whether the speed is lost: what is counted on ahead holds for errors that are small beside it.
+    """
+    speeds = _speeds_ahead(bank)
+    std, missed = np.sqrt(bank.covariance[:, SPEED, SPEED]), KNOWN_SHARE * (1.0 - config.curve_confidence)
+    fastest = float(quantiles(bank.weight, bank.mean[:, SPEED], std, (1.0 - missed,)).item())
+    told = max(abs(float(bank.weight @ bank.mean[:, SPEED])), STANDS_MPS)
+    share, resisting = (told / max(fastest, told)) ** 2, config.train.specific_resistance(speeds)
+    is_lost = fastest > LOST * told and fastest - told > LOST_MPS
+    return Ahead(tuple(speeds.tolist()), tuple(((mu + resisting) * share - resisting).tolist())), is_lost
+
+
+def _speeds_ahead(bank: Bank) -> Array:
+    """From 0 to the present speed."""
+    return np.asarray(float(bank.weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD)
 
 
 def _is_partial(config: Config, braking: Braking) -> bool:
@@ -181,7 +204,7 @@ def counted_on(
     """
     used = use(config, bank, braking, resistance(config, bank)) if used is None else used
     weight, partial = bank.weight, _is_partial(config, braking)
-    speeds = float(weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD
+    speeds = _speeds_ahead(bank)
     if not (partial or braking.told):
         weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
         weight /= weight.sum()
