@@ -195,4 +195,4 @@ def test_a_brake_that_builds_up_takes_nothing_from_what_was_known(before: list[t
     _, estimates = drive(BANK, ride([*before, *ramp]))
     known, *building_up = [min(each.ahead.mu) for each in estimates if each.ahead is not None][-5:]
     assert len(building_up) == 4
-    assert min(building_up) >= 0.96 * known, "the speed is less sure meanwhile"
+    assert min(building_up) >= 0.96 * known, "but for the error of the speed"

@@ -114,7 +114,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if memory.misled:
         return Findings(Regime.COASTING, nothing, constant(nothing.lower), nothing)
     if not memory.braked and memory.brake.known:
-        return Findings(Regime.COASTING, before, _for_the_fastest(config, bank, before.lower)[0], before)
+        return Findings(Regime.COASTING, before, _unfelt(config, bank, before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
@@ -123,7 +123,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         free = before
         if rail.mu > SLOWING:
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
-        return Findings(Regime.COASTING, free, _for_the_fastest(config, bank, before.lower)[0], free)
+        return Findings(Regime.COASTING, free, _unfelt(config, bank, before.lower), free)
     missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
     ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known, used)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
@@ -139,6 +139,12 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
     return Findings(regime, rail, ahead, known)
+
+
+def _unfelt(config: Config, bank: Bank, lower: float) -> Ahead:
+    """A bound of any speed: who brakes by it leaves room for the error of the speed, but not for one that is lost."""
+    floor, is_lost = _for_the_fastest(config, bank, lower)
+    return floor if is_lost else constant(lower)
 
 
 def _for_the_fastest(config: Config, bank: Bank, mu: float) -> tuple[Ahead, bool]:
