@@ -9,13 +9,14 @@
 """The estimator where positions are few, fail to come for a while, or never come."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
 from oracles import ride, specific_resistance
+from scipy.integrate import cumulative_trapezoid
 
 from adhesion_node.core import (
     Config,
@@ -100,6 +101,48 @@ def test_a_doppler_speed_alone_is_enough_to_run(method: str) -> None:
     assert late.mu == pytest.approx(MU, rel=0.1)
     assert late.speed_mps == pytest.approx(true_speeds()[250], abs=0.3)
     assert pipeline.dropped == {}
+
+
+def ways_m(speeds: Sequence[float], mu: float) -> list[float]:
+    """From speeds to a standstill on adhesion `mu`, by steps of the speed."""
+    fine = np.linspace(0.0, max(speeds), 4000)
+    way = cumulative_trapezoid(fine / (G * (mu + specific_resistance(fine))), fine, initial=0.0)
+    return [float(each) for each in np.interp(speeds, fine, way)]
+
+
+@pytest.mark.parametrize("placed", [False, True])
+def test_a_speed_that_is_lost_makes_the_curve_longer_and_no_right_speed_one_in_kmh(placed: bool) -> None:
+    """Axles under the brake tell nothing, positions come no more: from 45 m/s on 0.03 it is soon told as 14 m/s."""
+    mu, run = 0.03, ride([(20.0, 0.0), (60.0, 410e3)], mu=0.03, speed_mps=45.0)
+    speeds = [45.0]
+    for m in run[:-1]:
+        slowing = G * (mu + float(specific_resistance(np.array(speeds[-1])))) if m.brake_pressure_pa else 0.0
+        speeds.append(speeds[-1] - 0.1 * slowing)
+    samples = list[Sample]()
+    for m, speed in zip(run, speeds, strict=True):
+        samples += [PressureSample(m.t_ns, m.brake_pressure_pa or 0.0), SpeedSample(m.t_ns, speed)]
+        samples += [PositionSample(*m[:3])] if placed and m.t_ns < 19 * S else []
+    pipeline, predictions = replayed(Config(), samples)
+    assert_finite(predictions)
+    assert pipeline.dropped == {}
+    braked = [each for each in predictions if each.estimate.t_ns > 22 * S]
+    ways = ways_m([speeds[each.estimate.t_ns // (S // 10)] for each in braked], mu)
+    assert len(braked) > 100
+    assert min(each.estimate.speed_mps / speeds[each.estimate.t_ns // (S // 10)] for each in braked) < 0.6, "it is lost"
+    assert all(each.safe is None or each.safe.distance_m[-1] >= way for each, way in zip(braked, ways, strict=True))
+
+
+def test_a_train_of_which_nothing_is_heard_does_not_run_back() -> None:
+    """Positions end where it slows below 2 m/s, as under a roof; it stands, the brake applied."""
+    phases: list[tuple[float, float | None]] = [(20.0, 0.0), (150.0, 410e3)]
+    samples = list[Sample]()
+    run, true_way = (ride(phases, mu=0.07, speed_mps=45.0, sigma_m=sigma_m) for sigma_m in (0.5, 1e-9))
+    for m, place, later in zip(run, true_way, true_way[1:], strict=False):
+        samples += [PressureSample(m.t_ns, m.brake_pressure_pa or 0.0)]
+        samples += [PositionSample(*m[:3])] if later.position_m - place.position_m > 0.2 else []
+    pipeline, predictions = replayed(Config(), samples)
+    assert len(predictions) > 200
+    assert pipeline.back_m == 0.0
 
 
 @pytest.mark.parametrize("far_m", [0.0, 400_000.0])

@@ -56,6 +56,11 @@ WRITTEN: list[tuple[str, Callable[[pd.DataFrame], str | bytes], str]] = [
     ("bars", lambda rows: text(rows, "|"), "delimiter '|'"),
     ("decimal comma", lambda rows: text(rows, ";", ","), "delimiter ';', decimal ','"),
     ("quoted comma", lambda rows: rows.to_csv(index=False, decimal=",", quoting=csv.QUOTE_ALL), "decimal ','"),
+    (
+        "blanks before quotes",
+        lambda rows: rows.to_csv(index=False, quoting=csv.QUOTE_ALL).replace(',"', ', "'),
+        "delimiter ','",
+    ),
     ("latin-1", lambda rows: text(rows, head="Zug: Tür geöffnet\n").encode("latin-1"), "cp1252"),
     ("utf-16", lambda rows: text(rows, ";").encode("utf-16"), "utf-16"),
     ("a mark", lambda rows: text(rows).encode("utf-8-sig"), "utf-8-sig"),

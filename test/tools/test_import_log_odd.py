@@ -111,6 +111,13 @@ def test_what_is_odd_is_said_with_the_option_that_cures_it(
     assert importing(log, *cure) == 0, importing.errors
 
 
+def test_a_speed_against_the_positions_is_said(importing: Import) -> None:
+    """Positions of a falling chainage are turned, speeds are not: they count forward along the run."""
+    assert importing(text(ride().assign(speed=-ride().speed))) == 1
+    (said,) = importing.errors
+    assert "the speed is below 0 while the positions rise: change its sign" in said
+
+
 def test_a_column_without_any_value_is_said(importing: Import) -> None:
     assert importing(text(ride().assign(brake_pressure="", position=np.nan))) == 1
     assert importing.errors == [
