@@ -29,6 +29,10 @@ from .process import Process
 WATCHED = (topics.STATE, topics.ATP_STATUS)
 """Reliable topics, of which a recording must hold all that was sent."""
 
+CLOCKED_NS = 10**9
+"""Stamps above tell messages apart: our own floods have none, and a program's first ones, before it has a clock, have
+the same ones in each of its lives."""
+
 SIMULATED = ("--ros-args", "-p", "use_sim_time:=true")
 FAR = ("-p", "target_position_m:=1000000.0", "-p", "target_speed_kmh:=0.0")
 
@@ -73,7 +77,7 @@ class Line:
     def _receiver(self, topic: Topic) -> Callable[..., None]:
         def receive(message: Any, info: Mapping[str, int]) -> None:
             now_s = time.time()
-            if stamp := stamp_ns(message.header):  # those of our own floods have none
+            if (stamp := stamp_ns(message.header)) > CLOCKED_NS:
                 self.sent[topic.name].append((info["source_timestamp"] / 1e9, stamp))
             if topic is topics.ATP_STATUS:
                 (status,) = message.status
