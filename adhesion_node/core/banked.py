@@ -75,8 +75,11 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
             return _accepted(config, anew, measurement, bank.met(config, measurement))
         state = state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail))
         return _accepted(config, state, blind, bank.followed(config, memory, blind, rail))
-    memory = bank.followed(config, memory, measurement, rail, off)
-    return _accepted(config, state, measurement, memory, stepping)
+    followed = bank.followed(config, memory, measurement, rail, off)
+    if measurement.imu or state.proving.since:
+        followed, proving = state.proving.after(config, memory, followed, measurement, rail)
+        state = state._replace(proving=proving)
+    return _accepted(config, state, measurement, followed, stepping)
 
 
 def _anew(state: State, event: Event) -> State:
@@ -91,6 +94,7 @@ def _accepted(
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
     placed, seen = measurement.has_position, state.seen
+    state = state.told(*memory.left_out)
     state = state._replace(
         stepping=state.stepping if stepping is None else stepping,
         counts=counted(state.counts, ACCEPTED if placed else TICK),

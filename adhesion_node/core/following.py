@@ -10,6 +10,7 @@
 
 import math
 
+from .bank.steps import Stepping
 from .banked import follow_banked, last_banked
 from .config import Config
 from .estimate import Estimate, blind_estimate
@@ -29,7 +30,10 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     if placed:
         repeated = state.repeated.after(measurement, state.sure)
         if repeated.is_stuck(measurement):
-            return _unseen(config, state, measurement)
+            state = _stuck(state, measurement)
+            if not _is_moved(config, state, measurement):
+                return _unseen(config, state, measurement)
+            measurement, placed = measurement._replace(variance_m2=math.inf), False
     else:
         repeated = state.repeated
     pace = state.pace.after(measurement)
@@ -58,9 +62,21 @@ def _surely(seen: Estimate | None) -> float:
     return math.nan if seen is None or wide else seen.speed_mps
 
 
+def _stuck(state: State, measurement: Measurement) -> State:
+    """The position is stuck: nothing of what it has said since it was so for the first time is believed."""
+    event, before = Event(Outcome.STUCK, f"position x = {measurement.position_m:.12g}"), state.repeated.before
+    if not state.stuck and before is not None and before.memory is not None:
+        state = state._replace(memory=before.memory, stepping=Stepping(stepped_m=state.stepping.stepped_m))
+    return state._replace(unseen=state.unseen + 1).told(event)
+
+
+def _is_moved(config: Config, state: State, measurement: Measurement) -> bool:
+    """Whether another sensor tells how the train moves, also under the brake."""
+    speeds = bool(measurement.speeds) or measurement.speed_mps is not None
+    return state.memory is not None and (bool(measurement.imu) or (speeds and config.speed_source != "axle"))
+
+
 def _unseen(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
-    """The position is stuck: as often as there are estimates, say what holds without it."""
-    before, due = state.repeated.before, state.unseen % config.step == 0
-    event = Event(Outcome.STUCK, f"position x = {measurement.position_m:.12g}")
-    state = state._replace(unseen=state.unseen + 1).told(event)
+    """As often as there are estimates, say what holds without a position."""
+    before, due = state.repeated.before, state.unseen % config.step == 1 % config.step
     return state, blind_estimate(config, before.estimate, measurement.t_ns) if due and before else None

@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 from .bank.layout import POSITION, SPEED
 from .bank.memory import Memory
+from .bank.proving import Proving
 from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge
@@ -73,6 +74,7 @@ class State(NamedTuple):
     """The bank's, where that identifies the adhesion."""
     stepping: Stepping = Stepping()
     """Whether the positions have stepped, where the bank follows them."""
+    proving: Proving = Proving()
     knowledge: Knowledge = Knowledge()
     outliers: int = 0
     """Outliers in a row."""

@@ -67,7 +67,10 @@ def _set_up(values: Mapping[str, Any]) -> SetUp[Pipeline]:
 def _findings(pipeline: Pipeline) -> list[Finding]:
     """Return what is wrong, and in which regime the train is."""
     if pipeline.state.stuck:
-        return [Finding(Severity.ERROR, f"position: {Outcome.STUCK.value}; mu is withheld, the curve on the low law")]
+        withheld = (
+            "; mu is withheld, the curve on the low law" if pipeline.last is None or pipeline.last.withheld else ""
+        )
+        return [Finding(Severity.ERROR, f"position: {Outcome.STUCK.value}{withheld}")]
     if pipeline.last is None:
         return [Finding(Severity.WARN, "no estimate yet")]
     found = [Finding(Severity.OK, pipeline.last.regime.value)]

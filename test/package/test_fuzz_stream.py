@@ -153,7 +153,8 @@ class Watched:
     def _note(self) -> None:
         """Count the positions among what was not used."""
         for event in self.pipeline.events:
-            of_positions = event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.SLIDING, Outcome.STUCK)
+            stuck = event.outcome is Outcome.STUCK and event.detail.startswith("position")
+            of_positions = stuck or event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.SLIDING)
             self.refused_positions += of_positions or event.detail.startswith("PositionSample")
 
     def _check(self, predictions: list[Prediction]) -> None:

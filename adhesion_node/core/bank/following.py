@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..belief.rail import Rail
+from ..intake.outcome import Event, Outcome
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
 from ..physics.train import Array
 from .free import either
@@ -107,6 +108,7 @@ def followed(
     if measurement.brake_pressure_pa is None and demand_pa is None:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
+    memory = memory._replace(left_out=()) if memory.left_out else memory
     for until_ns in steps(before_ns, measurement.t_ns, speeds):
         ahead = predicted.bank if predicted is not None and until_ns == measurement.t_ns else None
         bank = memory.bank_at(config, until_ns) if ahead is None or memory is not start else ahead
@@ -119,15 +121,14 @@ def followed(
             since_s=memory.since_s + (until_ns - memory.t_ns) / S,
             brake=brake,
             braking=_braking(config, memory, brake, until_ns),
+            repeating=memory.repeating.slowed(memory.bank, bank) if memory.braked else memory.repeating,
         )
         if imu:
             felt = [each for each in imu if since_ns < each.t_ns <= until_ns]
-            memory = _felt(config, memory, felt, braking) if felt else memory
+            memory = _felt(config, memory, felt, braking, (until_ns - since_ns) / S) if felt else memory
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
-                variance = config.speed_std_mps**2 if speed.variance is None else speed.variance
-                seen = speed_seen(memory.bank, speed.speed_mps, variance + SPEED_ERROR_MPS**2)
-                memory = memory.told(seen, fixes=2)
+                memory = _with_speed(config, memory, speed)
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
     return judged(config, with_wheels(config, memory, measurement), rail)
@@ -141,11 +142,25 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
     return foreseen(config, *before, measurement.position_m, math.sqrt(measurement.variance_m2))
 
 
-def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Braking) -> Memory:
-    """Take in the mean of some accelerations, felt while the brake worked so."""
+def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
+    """Take in a speed, unless it repeats itself while the train must have slowed."""
+    variance = (config.speed_std_mps**2 if sample.variance is None else sample.variance) + SPEED_ERROR_MPS**2
+    repeating = memory.repeating.after(sample.speed_mps)
+    memory = memory._replace(repeating=repeating)
+    if repeating.is_stuck(variance):
+        return memory.leaving_out(Event(Outcome.STUCK, f"speed x = {sample.speed_mps:.6g}"))
+    return memory.told(speed_seen(memory.bank, sample.speed_mps, variance), fixes=2)
+
+
+def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Braking, elapsed_s: float) -> Memory:
+    """Take in the mean of some accelerations, felt in so long while the brake worked so."""
     mean = sum(each.acceleration_mps2 for each in felt) / len(felt)
     variances = [config.imu_std_mps2**2 if each.variance is None else each.variance for each in felt]
     variance = sum(variances) / len(felt) ** 2
+    if memory.braked or memory.misled:
+        memory = memory._replace(pointing=memory.pointing.after(mean, variance, elapsed_s))
+    if memory.pointing.forward is False:
+        return memory.leaving_out(Event(Outcome.TURNED, f"acceleration x = {mean:.3g}"))
     return memory.told(acceleration_seen(config, memory.bank, mean, variance, braking))
 
 

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..belief.rail import Rail
+from ..intake.outcome import Event
 from ..intake.samples import MAX_VARIANCE_M2, SpeedSample
 from ..quick import quick
 from .gear.brake import BrakeSeen
@@ -24,6 +25,7 @@ from .layout import POSITION, Bank
 from .motion import Braking, moved
 from .plausible import Course
 from .seeing import Observation, corrected
+from .trust import Pointing, Repeating
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -66,6 +68,10 @@ class Memory(NamedTuple):
     """Whether the positions are those of a sliding wheel: they are left out until the brake is released."""
     seen: int = 0
     """Measurements of the present braking; 0 while there is none."""
+    repeating: Repeating = Repeating()
+    pointing: Pointing = Pointing()
+    left_out: tuple[Event, ...] = ()
+    """Of the newest measurement, with the reason."""
     fixes: int = 0
     """Positions taken in; a speed counts as two, as it takes two positions to tell one."""
     log_likelihood: float = 0.0
@@ -90,6 +96,10 @@ class Memory(NamedTuple):
             fixes=self.fixes + fixes,
             log_likelihood=self.log_likelihood + total - HALF_LOG_2PI,
         )
+
+    def leaving_out(self, event: Event) -> Memory:
+        """Leave a sample out that is not to be believed."""
+        return self._replace(left_out=(*self.left_out, event))
 
     def is_pressed(self, config: Config) -> bool:
         """Whether a brake is applied."""

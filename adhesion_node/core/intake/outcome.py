@@ -47,6 +47,10 @@ class Outcome(Enum):
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
         "take them from an axle without a brake, or from satellites"
     )
+    TURNED = (
+        "the accelerometer feels the brake push the train forward: left out until a braking says otherwise; "
+        "x is to point forward along the track, level"
+    )
     OUTLIER = "further from the prediction than gate_sigma: dropped"
     UNPAIRED = "no speed or force of its time: dropped; is that sensor alive, its clock right?"
     SLOW = "slower than min_speed_mps: the creep is not formed"
