@@ -105,8 +105,8 @@ def test_what_every_ros_node_understands_may_stand_in_the_file(
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", "not a readable ROS parameter file"),
-        ("a: [1", "not a readable ROS parameter file"),
+        ("", "not a readable ROS parameter file: it is to hold, one in the other, NODE: ros__parameters: NAME: VALUE"),
+        ("a: [1", "not a readable ROS parameter file: line 1: "),
         ("5", "not a readable ROS parameter file"),
         ("estimator:\n  window: 40\n", "not a readable ROS parameter file"),
         ("simulator:\n  ros__parameters:\n    seed: 1\n", "has simulator: name the node 'estimator' or '/**'"),

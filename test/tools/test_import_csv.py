@@ -216,6 +216,27 @@ def test_every_kind_of_fault_is_named_and_counted(importing: Import, row: str, r
     assert [t_ns for t_ns, _, _ in importing.positions()] == [10**9, 3 * 10**9]
 
 
+@pytest.mark.parametrize(("times", "line", "behind"), [((1, 2, 999, 3, 4, 5), 4, 3), ((999, 1, 2, 3, 4, 5), 2, 1)])
+def test_one_stamp_that_is_too_high_costs_its_row_alone(
+    importing: Import, times: tuple[int, ...], line: int, behind: int
+) -> None:
+    assert importing("time,position\n" + "".join(f"{time},{time}\n" for time in times)) == 1
+    assert importing.errors == [
+        f"FILE:{line}: time = 999 s: time must rise, the row behind it has {behind} s: its stamp is too high"
+    ]
+    assert [t_ns // 10**9 for t_ns, _, _ in importing.positions()] == [1, 2, 3, 4, 5]
+
+
+@pytest.mark.parametrize(
+    ("shift", "cure"),
+    [(0, "rows are there twice: drop them"), (1, "rows share a time: log it with the fraction of the second")],
+)
+def test_rows_that_are_there_twice_are_told_apart_from_coarse_times(importing: Import, shift: int, cure: str) -> None:
+    rows = "".join(f"{second},{10 * second + part * shift}\n" for second in range(20) for part in range(2))
+    assert importing(f"time,position\n{rows}") == 1
+    assert importing.errors[0].endswith(f"the last good row has 0 s: {cure}")
+
+
 def test_a_wrong_iso_time_is_named(importing: Import) -> None:
     text = "time,position\n2024-01-01T00:00:00Z,1\nyesterday,1\n2024-02-30T00:00:00Z,1\n"
     assert importing(text, "--time-unit", "iso") == 1

@@ -16,9 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
+from ...core.physics.train import Array
 from .cells import is_clock
 from .format import PRESSURE_UNITS, Format
-from .rows import Columns, measured, open_log
+from .rows import Columns, Flags, measured, open_log
 from .text import Refusal
 
 DAY_NS = 86_400 * 10**9
@@ -91,23 +92,54 @@ def _in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]
 
 def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
     """The rows whose time is later than that of all before, and why not the others."""
+    ahead = _ahead(rows["t_ns"].to_numpy())
+    refused = [
+        _out_of_time(
+            rows, i, source, f"the row behind it has {moment(rows['t_ns'].iloc[i + 1])}: its stamp is too high"
+        )
+        for i in np.flatnonzero(ahead).tolist()
+    ]
+    rows = rows[~ahead]
     t_ns = rows["t_ns"].to_numpy()
     reached = np.maximum.accumulate(t_ns)
     late = np.append(False, t_ns[1:] <= reached[:-1]) if len(t_ns) else np.zeros(0, dtype=bool)
-    falls = int(np.count_nonzero(np.diff(t_ns) < 0))
-    cure = "drop repeated rows, or sort the log: --sort"
-    if falls < 3 and late.sum() > 10 * max(falls, 1):
-        cure = SET_BACK if falls else "rows share a time: log it with the fraction of the second"
-    refused = [
-        Refusal(
-            line := int(rows.index[i]),
-            "time_not_rising",
-            f"{source}:{line}: time = {moment(t_ns[i])}: time must rise, the last good row has "
-            f"{moment(reached[i - 1])}: {cure}",
-        )
-        for i in np.flatnonzero(late)
+    cure = _cure(rows, late)
+    refused += [
+        _out_of_time(rows, i, source, f"the last good row has {moment(reached[i - 1])}: {cure}")
+        for i in np.flatnonzero(late).tolist()
     ]
     return rows[~late], refused
+
+
+def _ahead(t_ns: Array) -> Flags:
+    """Rows without which all times rise, that make at least the next two late: a stamp is wrong, not the clock."""
+    ahead = np.zeros(len(t_ns), dtype=bool)
+    if len(t_ns) > 3:
+        before = np.append(np.iinfo(np.int64).min, t_ns[:-3])
+        this, behind, further = t_ns[:-2], t_ns[1:-1], t_ns[2:]
+        ahead[:-2] = (before < behind) & (behind < further) & (further <= this)
+    return ahead & bool((np.diff(t_ns[~ahead]) >= 0).all())
+
+
+def _cure(rows: pd.DataFrame, late: Flags) -> str:
+    """What to do about rows whose time does not rise."""
+    falls = int(np.count_nonzero(np.diff(rows["t_ns"]) < 0))
+    if falls < 3 and late.sum() > 10 * max(falls, 1):
+        if falls:
+            return SET_BACK
+        repeated = bool(rows.duplicated()[late].all())
+        return (
+            "rows are there twice: drop them"
+            if repeated
+            else "rows share a time: log it with the fraction of the second"
+        )
+    return "drop repeated rows, or sort the log: --sort"
+
+
+def _out_of_time(rows: pd.DataFrame, index: int, source: str, why: str) -> Refusal:
+    line = int(rows.index[index])
+    told = f"{source}:{line}: time = {moment(rows['t_ns'].iloc[index])}: time must rise, {why}"
+    return Refusal(line, "time_not_rising", told)
 
 
 def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, str]:

@@ -121,7 +121,18 @@ def sections(path: str) -> list[Section]:
     try:
         return list(_named(load(path), ""))
     except (OSError, ValueError, yaml.YAMLError, AttributeError, LookupError, TypeError, RecursionError) as error:
-        raise ValueError(f"params = {path}: not a readable ROS parameter file ({type(error).__name__})") from error
+        raise ValueError(f"params = {path}: not a readable ROS parameter file: {_why(error)}") from error
+
+
+def _why(error: Exception) -> str:
+    if isinstance(error, OSError):
+        return f"{error.strerror}: name a file"
+    mark = getattr(error, "problem_mark", None)
+    if mark is not None:
+        return f"line {mark.line + 1}: {getattr(error, 'problem', error)}"
+    if isinstance(error, AttributeError | LookupError | TypeError):
+        return "it is to hold, one in the other, NODE: ros__parameters: NAME: VALUE"
+    return type(error).__name__
 
 
 def is_for(section: str, node: str) -> bool:
