@@ -24,6 +24,14 @@ Item = TypeVar("Item")
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 """Exit codes of every tool."""
 
+REMEDIES: Mapping[type[OSError], str] = {
+    FileExistsError: ": it is a file; name a folder, or one that is to be made",
+    NotADirectoryError: ": a part of it is a file; name a folder, or one that is to be made",
+    IsADirectoryError: ": it is a folder; name a file",
+    PermissionError: ": name one that you may write, or read",
+}
+"""What to do where the system refuses."""
+
 PROGRESS_S = 1.0
 """Time between two signs of life."""
 
@@ -117,7 +125,8 @@ def run_tool(
     except ValueError as error:
         return _complain(parser, str(error), BAD_INPUT)
     except OSError as error:
-        return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}", FAILED)
+        remedy = REMEDIES.get(type(error), "")
+        return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}", FAILED)
     except KeyboardInterrupt:
         return _complain(parser, "interrupted", FAILED)
 
