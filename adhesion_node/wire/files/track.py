@@ -113,7 +113,10 @@ def _checked(where: str, *values: Any) -> Point:
     if not all(map(math.isfinite, (lat, lon, height_m or 0.0))):
         raise ValueError(f"{where}: {values}: not finite")
     if abs(lat) > 90 or abs(lon) > 180:
-        raise ValueError(
-            f"{where}: latitude {lat:g} is not within +-90 or longitude {lon:g} not within +-180: are they exchanged?"
+        why = (
+            "are they exchanged?"
+            if max(abs(lat), abs(lon)) <= 180
+            else "are they in m? Give degrees, WGS84 (EPSG:4326)"
         )
+        raise ValueError(f"{where}: latitude {lat:g} is not within +-90 or longitude {lon:g} not within +-180: {why}")
     return Point(lat, lon, height_m)

@@ -82,6 +82,7 @@ BAD = {
     "flat": ("a.json", json.dumps(line_string([8.0, 47.0])), r"coordinates\[0\] = 8.0: give GeoJSON"),
     "no list": ("a.json", json.dumps(line_string(7)), r"track_line = .*a\.json: "),
     "text": ("a.json", json.dumps(line_string([["x", 1], [2, 3]])), r"coordinates\[0\] = .*: not numbers"),
+    "metres": ("a.json", json.dumps(line_string([[1.4e6, 6.9e6], [1.4e6, 6.91e6]])), r"in m\? Give degrees, WGS84"),
     "exchanged": ("a.json", json.dumps(line_string([[8, 147], [8, 148]])), r"latitude 147 is not .*are they exchanged"),
     "some heights": (
         "a.json",
