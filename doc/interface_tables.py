@@ -14,7 +14,7 @@ from pathlib import Path
 
 import adhesion_node
 from adhesion_node.core import Outcome
-from adhesion_node.core.bank.findings.learnt import KIND, QUANTITIES, WHEEL
+from adhesion_node.core.bank.findings.learnt import KIND, QUANTITIES, SCATTERS, WHEEL
 from adhesion_node.core.bank.labels.kinds import KINDS
 from adhesion_node.core.setting import Setting, by_group
 from adhesion_node.tools.defaults import all_settings
@@ -90,6 +90,8 @@ def _learnt() -> Iterator[tuple[str, ...]]:
     """Yield what the bank learns of train and sensors."""
     for quantity in QUANTITIES:
         yield f"`{quantity.name}`, `{quantity.name}_std`", quantity.unit, quantity.meaning
+    for name, unit, meaning in SCATTERS:
+        yield f"`{name}`", unit, meaning
     kinds = ", ".join(kind.name for kind in KINDS)
     yield f"`{KIND}NAME`", "", f"that this limits the motion: {kinds}"
     yield f"`{WHEEL}AXLE`", "", "true over expected radius of the wheels of an axle"

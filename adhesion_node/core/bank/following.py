@@ -31,7 +31,7 @@ from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCA
 from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
-from .seeing import CLIPPED, acceleration_seen, speed_seen
+from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -144,9 +144,12 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
 
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
     """Take in a speed, unless it repeats itself while the train must have slowed."""
-    variance = (config.speed_std_mps**2 if sample.variance is None else sample.variance) + SPEED_ERROR_MPS**2
-    repeating = memory.repeating.after(sample.speed_mps)
-    memory = memory._replace(repeating=repeating)
+    told = config.speed_std_mps**2 if sample.variance is None else sample.variance
+    repeating, scatter = memory.repeating.after(sample.speed_mps), memory.speeds.after(*sample[:2], told)
+    memory, variance = (
+        memory._replace(repeating=repeating, speeds=scatter),
+        scatter.variance_of(told) + SPEED_ERROR_MPS**2,
+    )
     if repeating.is_stuck(variance):
         return memory.leaving_out(Event(Outcome.STUCK, f"speed x = {sample.speed_mps:.6g}"))
     return memory.told(speed_seen(memory.bank, sample.speed_mps, variance), fixes=2)
@@ -156,7 +159,10 @@ def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Br
     """Take in the mean of some accelerations, felt in so long while the brake worked so."""
     mean = sum(each.acceleration_mps2 for each in felt) / len(felt)
     variances = [config.imu_std_mps2**2 if each.variance is None else each.variance for each in felt]
-    variance = sum(variances) / len(felt) ** 2
+    told = sum(variances) / len(felt) ** 2
+    swing = (SWINGING * config.ripple * mean) ** 2 if memory.is_pressed(config) else None
+    shaking = memory.shaking.after(felt[-1].t_ns, mean, told, elapsed_s, swing)
+    memory, variance = memory._replace(shaking=shaking), shaking.variance_of(told, elapsed_s)
     if memory.braked or memory.misled:
         memory = memory._replace(pointing=memory.pointing.after(mean, variance, elapsed_s))
     if memory.pointing.forward is False:

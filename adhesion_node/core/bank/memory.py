@@ -24,6 +24,7 @@ from .kernels import weighing
 from .layout import POSITION, Bank
 from .motion import Braking, moved
 from .plausible import Course
+from .scatter import Scatter, Shaking
 from .seeing import Observation, corrected
 from .trust import Pointing, Repeating
 
@@ -70,6 +71,8 @@ class Memory(NamedTuple):
     """Measurements of the present braking; 0 while there is none."""
     repeating: Repeating = Repeating()
     pointing: Pointing = Pointing()
+    speeds: Scatter = Scatter()
+    shaking: Shaking = Shaking()
     left_out: tuple[Event, ...] = ()
     """Of the newest measurement, with the reason."""
     fixes: int = 0

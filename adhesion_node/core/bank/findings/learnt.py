@@ -40,17 +40,26 @@ QUANTITIES = (
     Quantity("acceleration_pitch", PITCH, "", "what the accelerometer feels too much, over the deceleration"),
 )
 
+SCATTERS = (
+    ("speed_scatter", "m/s", "standard deviation by which measured speeds scatter"),
+    ("acceleration_scatter", "m/s^2", "the same of the accelerometer, of its means over a step of time"),
+)
+"""Name, unit and meaning; told once they are known. They count where a sensor tells much less."""
+
 KIND, WHEEL = "probability.", "wheel_radius."
 """Beginnings of the names of the kinds' probabilities, and of the axles' true over expected radii."""
 
 
 def learnt(memory: Memory) -> dict[str, float]:
-    """Every quantity with its standard deviation as NAME_std, the kinds' probabilities, the radii that are known."""
+    """Every quantity with its standard deviation as NAME_std, the kinds' probabilities, what of sensors is known."""
     mean, covariance = memory.bank.moments()
     found = dict[str, float]()
     for name, component, _, _, factor in QUANTITIES:
         found[name] = factor * float(mean[component])
         found[f"{name}_std"] = factor * math.sqrt(max(float(covariance[component, component]), 0.0))
+    for (name, *_), scatter in zip(SCATTERS, (memory.speeds, memory.shaking.quick), strict=True):
+        if scatter.is_known:
+            found[name] = math.sqrt(max(scatter.variance, 0.0))
     weight = memory.bank.weight
     found |= {f"{KIND}{kind.name}": float(weight[memory.bank.kind == k].sum()) for k, kind in enumerate(KINDS)}
     return found | {f"{WHEEL}{axle}": own / (1.0 + mean[RADIUS]) for axle, own in enumerate(memory.wheels.radius)}
