@@ -146,10 +146,8 @@ def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
     """Take in a speed, unless it repeats itself while the train must have slowed."""
     told = config.speed_std_mps**2 if sample.variance is None else sample.variance
     repeating, scatter = memory.repeating.after(sample.speed_mps), memory.speeds.after(*sample[:2], told)
-    memory, variance = (
-        memory._replace(repeating=repeating, speeds=scatter),
-        scatter.variance_of(told) + SPEED_ERROR_MPS**2,
-    )
+    memory = memory._replace(repeating=repeating, speeds=scatter)
+    variance = scatter.variance_of(told) + SPEED_ERROR_MPS**2
     if repeating.is_stuck(variance):
         return memory.leaving_out(Event(Outcome.STUCK, f"speed x = {sample.speed_mps:.6g}"))
     return memory.told(speed_seen(memory.bank, sample.speed_mps, variance), fixes=2)
