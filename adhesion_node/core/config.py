@@ -213,7 +213,7 @@ class Config:
     )
     speed_scale_std: float = _unsure(0.005, "Standard deviation of the scale of measured speeds", "", 0.0, 0.5)
     grade_std: float = _unsure(
-        0.005, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
+        0.008, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )
     profile_std: float = _unsure(
         0.0004, "The same where the track profile has sections: what it leaves open of the grade", "", 0.0, 0.1

@@ -87,8 +87,10 @@ def test_outliers_are_flagged() -> None:
 @pytest.mark.parametrize(("fault", "shift"), [("grade", -0.005), ("mass", 0.0)])
 def test_an_unknown_grade_or_mass_shifts_mu_by_what_it_must(fault: str, shift: float) -> None:
     """Downhill 5 permille takes 0.005 off; the mass cancels for as long as the rail limits, and is known to."""
-    faulty, clean = (outcome(each, knows_law=True).errors().mean() for each in (fault, "none"))
-    assert faulty - clean == pytest.approx(shift, abs=0.001)
+    faulty, clean = ({e.t_ns: e.mu for e in outcome(each, knows_law=True).braking()} for each in (fault, "none"))
+    shifts = [faulty[t_ns] - clean[t_ns] for t_ns in faulty.keys() & clean.keys()]
+    assert len(shifts) > 50
+    assert np.mean(shifts) == pytest.approx(shift, abs=0.001)
 
 
 def test_a_balise_step_is_not_taken_for_low_adhesion() -> None:

@@ -148,7 +148,7 @@ def model_of(config: Config) -> moving.Model:
         ),
         noises=np.column_stack((noises.WHITE, noises.SLOW, noises.LASTS)),
         fading=kinds.FADING,
-        grade_m=kinds.GRADE_M,
+        grade_m=kinds.grade_m_of(config),
         free=kinds.FREE_S,
         free_std=kinds.FREE_STD,
         rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2, RADIUS_DRIFT**2]),

@@ -113,7 +113,7 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     grown = np.choose(bank.law, by_law) * np.exp(kinds.GROWTH[kind] * dt_s)
     lasting[:, MU] = np.where(lasts_s > 0.0, free, np.where(SLIDES[kind], grown, 1.0))
     lasting[:, ROUGH] = np.where(_swings(kind), np.exp(-dt_s / kinds.SWING_S), np.exp(-way_m / kinds.ROUGHNESS_M))
-    lasting[:, GRADE] = np.exp(-way_m / kinds.GRADE_M)
+    lasting[:, GRADE] = np.exp(-way_m / kinds.grade_m_of(config))
     lasting[:, OFFSET] = np.exp(-dt_s / noises.LASTS[bank.noise])
     drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
     noise[:, POSITION] = config.motion.position_noise_rate * dt_s
@@ -288,7 +288,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     swinging = _swings(bank.kind)
     lengths = np.where(swinging, time_s / kinds.SWING_S, way_m / kinds.ROUGHNESS_M)
     rough_kept, rough_added = _mean_ahead(lengths, 1.0)
-    grade_kept, grade_added = _mean_ahead(way_m, kinds.GRADE_M)
+    grade_kept, grade_added = _mean_ahead(way_m, kinds.grade_m_of(config))
     slope = used.slope.copy()
     slope[:, ROUGH] *= rough_kept
     slope[:, GRADE] = grade_kept

@@ -226,7 +226,7 @@ def _ahead_of(config: Config) -> mixture.Ahead:
         rough=np.square(kinds.roughness_of(config)),
         fading=kinds.FADING,
         drift=np.square(np.minimum(kinds.DRIFT, DRIFT_AHEAD)),
-        grade_m=kinds.GRADE_M,
+        grade_m=kinds.grade_m_of(config),
         resistance=np.array(config.train.resistance_si),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),

@@ -65,8 +65,8 @@ FREE_S = np.array([kind.free_s for kind in KINDS])
 SWINGS = np.array([kind.swings for kind in KINDS])
 RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
 
-ROUGHNESS_M, GRADE_M = 100.0, 1500.0
-"""Correlation lengths of the roughness and of a grade that no profile tells."""
+ROUGHNESS_M, GRADE_M, RESIDUAL_M = 100.0, 4000.0, 1500.0
+"""Correlation lengths of the roughness, of a grade that no profile tells and of what a profile leaves open of it."""
 
 SWING_S = 0.7
 """Correlation time of a swing."""
@@ -81,3 +81,8 @@ FREE_STD = 0.06
 def roughness_of(config: Config) -> Array:
     """Relative standard deviation of the roughness, or of the swing, of each kind, shape (K,)."""
     return np.where(SWINGS, config.ripple, ROUGHNESS)
+
+
+def grade_m_of(config: Config) -> float:
+    """Correlation length of the grade that is not known, m."""
+    return RESIDUAL_M if config.track.sections else GRADE_M
