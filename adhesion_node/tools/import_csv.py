@@ -67,7 +67,7 @@ def read(source: Path, form: Format) -> tuple[Log, Counter[str]]:
     Raises ValueError when a column is missing or no row is good.
     """
     if not source.is_file():
-        raise ValueError(f"file = {source}: is no file: name a CSV log")
+        raise ValueError(f"file = {source}: is no file: name a CSV log; what comes by a pipe, save in one first")
     refused = Refused()
     log = read_log(source, form, refused.tell)
     refused.end()
@@ -143,7 +143,7 @@ def _work(options: argparse.Namespace) -> int:
     form = format_of(options)
     if options.dry_run:
         log, refused = read(Path(options.file), form)
-        summary = _summary(log, refused)
+        summary = {**_summary(log, refused), "written": 0}
         lines = ["the first rows, in SI, pressures absolute:", log.rows.head(SHOWN).rename_axis("line").to_string()]
     elif options.output:
         log, summary = convert(Path(options.file), Path(options.output), form)

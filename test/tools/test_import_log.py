@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import csv
+import json
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -217,6 +218,8 @@ def test_a_dry_run_shows_rows_and_writes_nothing(importing: Import, capsys: pyte
     assert re.search(r"^speed +65\.\d+ to 180 km/h$", out, re.MULTILINE)
     assert re.search(r"^brake_pressure +0 to 3 bar above the air$", out, re.MULTILINE)
     assert not importing.output.with_name("never").exists()
+    assert import_csv.main([str(importing.log), *options, "--json", "-"]) == 0
+    assert json.loads(capsys.readouterr().out)["written"] == 0
     assert import_csv.main([str(importing.log)]) == 2
     assert "name the recording with --output DIR, or look first with --dry-run" in capsys.readouterr().err
 
