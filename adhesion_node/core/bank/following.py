@@ -161,10 +161,13 @@ def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Br
     swing = (SWINGING * config.ripple * mean) ** 2 if memory.is_pressed(config) else None
     shaking = memory.shaking.after(felt[-1].t_ns, mean, told, elapsed_s, swing)
     memory, variance = memory._replace(shaking=shaking), shaking.variance_of(told, elapsed_s)
-    if memory.braked or memory.misled:
-        memory = memory._replace(pointing=memory.pointing.after(mean, variance, elapsed_s))
-    if memory.pointing.forward is False:
-        return memory.leaving_out(Event(Outcome.TURNED, f"acceleration x = {mean:.3g}"))
+    shown, before = felt[-1].acceleration_mps2, memory.pointing
+    braked = memory.braked or memory.misled
+    pointing = before.after(shown, mean, variance, elapsed_s) if braked else before.resting(shown)
+    memory = memory._replace(pointing=pointing)
+    if pointing.forward is False:
+        outcome = Outcome.STUCK if shown == before.rested_mps2 else Outcome.TURNED
+        return memory.leaving_out(Event(outcome, f"acceleration x = {mean:.3g}"))
     return memory.told(acceleration_seen(config, memory.bank, mean, variance, braking))
 
 

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""An accelerometer that turns out to point backwards: the train is followed anew, from before the brake acted."""
+"""An accelerometer that turns out to lie: the train is followed anew, without it, from before the brake acted."""
 
 from __future__ import annotations
 

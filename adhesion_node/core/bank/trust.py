@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Which sensors a braking shows to lie: a speed that repeats itself, an accelerometer that is turned round."""
+"""Which sensors a braking shows to lie: those that repeat themselves, an accelerometer that is turned round."""
 
 from __future__ import annotations
 
@@ -24,6 +24,9 @@ STEPS = 4.0
 FORWARD_MPS2, BACKWARD_MPS2, MEAN_S, MEAN_SIGMA = 0.2, 0.1, 1.0, 3.0
 """What an accelerometer feels under the brake in the mean over such a time, beyond its noise, once it is turned round,
 and once it is seen not to be."""
+
+STILL_S = 2.0
+"""No accelerometer shows the same to the bit for so long behind the brake's application as before it."""
 
 
 class Repeating(NamedTuple):
@@ -56,13 +59,23 @@ class Pointing(NamedTuple):
     mean_mps2: float = 0.0
     """Forward positive."""
     forward: bool | None = None
-    """Whether it points forward as it should; None: no braking has shown it yet."""
+    """Whether it points forward as it should, and shows anything; None: no braking has shown it yet."""
+    rested_mps2: float = math.nan
+    """What it showed last before the brake, while it has shown nothing else since, ..."""
+    still_s: float = 0.0
+    """... and for how long behind the brake's application."""
 
-    def after(self, felt_mps2: float, variance: float, elapsed_s: float) -> Pointing:
-        """Note the mean of what was felt under the brake since the time before, of such a variance."""
+    def resting(self, shown_mps2: float) -> Pointing:
+        """Note what it shows while no brake is applied."""
+        return self._replace(rested_mps2=shown_mps2, still_s=0.0)
+
+    def after(self, shown_mps2: float, felt_mps2: float, variance: float, elapsed_s: float) -> Pointing:
+        """Note what it shows under the brake, and the mean of that since the time before, of such a variance."""
+        if shown_mps2 == self.rested_mps2:
+            still_s = self.still_s + elapsed_s
+            return self._replace(still_s=still_s, forward=False if still_s > STILL_S else self.forward)
         part = -math.expm1(-elapsed_s / MEAN_S)
         mean = self.mean_mps2 + part * (felt_mps2 - self.mean_mps2)
         noise = MEAN_SIGMA * math.sqrt(0.5 * part * variance)
-        if mean > FORWARD_MPS2 + noise:
-            return Pointing(mean, False)
-        return Pointing(mean, True if mean < -BACKWARD_MPS2 - noise else self.forward)
+        forward = False if mean > FORWARD_MPS2 + noise else True if mean < -BACKWARD_MPS2 - noise else self.forward
+        return Pointing(mean, forward)

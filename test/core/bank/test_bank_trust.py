@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Sensors that lie under the brake: a speed or a position that repeats itself, an accelerometer turned round."""
+"""Sensors that lie under the brake: a speed or a position that repeats itself, an accelerometer turned or dead."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def run(
         factor, noise = imu
         felt = factor * np.gradient(truth[:, 1], H) + noise * rng.standard_normal(times.size)
         measured = [
-            each._replace(imu=(ImuSample(each.t_ns, float(a), noise**2),))
+            each._replace(imu=(ImuSample(each.t_ns, float(a), (noise or 0.05) ** 2),))
             for each, a in zip(measured, felt, strict=True)
         ]
     return Run(times, truth[:, 1], *followed(measured))
@@ -126,6 +126,15 @@ def test_a_coarse_speed_repeats_itself_and_is_used(mu: float, coarse_mps: float)
 def test_an_accelerometer_that_is_turned_round_is_left_out(mu: float, seed: int) -> None:
     found = run(mu, seed, imu=(-1.0, 0.05))
     assert found.state.counts[Outcome.TURNED] > 200
+    assert found.state.counts[Outcome.SLIDING] == found.state.counts[Outcome.RESET] == 0
+    assert_known(found, mu, 9.0, 25.0)
+
+
+@pytest.mark.parametrize("mu", [DRY, WET, 0.03])
+@pytest.mark.parametrize("seed", range(3))
+def test_an_accelerometer_that_shows_nothing_is_left_out(mu: float, seed: int) -> None:
+    found = run(mu, seed, imu=(0.0, 0.0))
+    assert found.state.counts[Outcome.STUCK] > 200
     assert found.state.counts[Outcome.SLIDING] == found.state.counts[Outcome.RESET] == 0
     assert_known(found, mu, 9.0, 25.0)
 
