@@ -20,7 +20,7 @@ from banks import FULL, bank_of
 from oracles import specific_resistance
 from scipy.integrate import solve_ivp
 
-from adhesion_node.core.bank.labels.kinds import GRADE_M, KINDS, ROUGHNESS_M
+from adhesion_node.core.bank.labels.kinds import KINDS, RESIDUAL_M, ROUGHNESS_M
 from adhesion_node.core.bank.labels.noises import NOISES
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SIZE, SPEED
 from adhesion_node.core.bank.motion import Braking, moved, use
@@ -68,7 +68,7 @@ def rate(x: Array, label: tuple[int, int, int], braking: Braking, rotating: floa
         bend = (LAWS[law](v + 1e-4) - LAWS[law](v - 1e-4)) / 2e-4 / LAWS[law](v)
         result[MU] = mu * (bend * -slowing + KINDS[kind].growth)
     result[ROUGH] = -rough / 0.7 if KINDS[kind].name in {"swinging", "even", "failing"} else -rough * v / ROUGHNESS_M
-    result[GRADE] = -grade * v / GRADE_M
+    result[GRADE] = -grade * v / RESIDUAL_M
     result[OFFSET] = -x[OFFSET] / NOISES[noise].lasts_s
     return result
 
