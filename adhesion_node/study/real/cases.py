@@ -35,7 +35,7 @@ from ...wire.track_line import TrackLine, line_of
 from . import point_mass
 from .truth import USED_S
 
-AIDED = ("gnss_doppler", "gnss_imu", "radar", "doppler_only", "full")
+AIDED = ("gnss_doppler", "gnss_smoothed", "gnss_imu", "radar", "doppler_only", "full")
 """Sets with a speed of their own or an accelerometer."""
 
 UNSOUND = ("tacho", "gnss_outages", "gnss_stamps", "one_cylinder", "no_pressure")
@@ -110,7 +110,7 @@ CASES = tuple(
     Case(scenario, fitted)
     for scenario, sets in (
         (point_mass.NAME, "white"),
-        ("wet", "white gnss gnss_wheels gnss_doppler gnss_imu radar doppler_only tacho axle_speed"),
+        ("wet", "white gnss gnss_wheels gnss_doppler gnss_smoothed gnss_imu radar doppler_only tacho axle_speed"),
         ("wet", "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
         ("wet_mass_over", "white gnss_wheels"),
         ("wet_pads_weak", "gnss_wheels"),
@@ -126,8 +126,9 @@ CASES = tuple(
         ("dry_fast", "gnss_wheels"),
         ("undulating_dry", "gnss_wheels"),
         ("sequence_dry", "gnss_doppler"),
-        ("leaves", "white gnss gnss_recorded gnss_wheels gnss_imu gnss_outages one_cylinder one_cylinder_wheels"),
-        ("leaves", "mean_cylinder mean_cylinder_wheels mean_cylinder_demand wheel_dropouts no_pressure full"),
+        ("leaves", "white gnss gnss_recorded gnss_wheels gnss_smoothed gnss_imu gnss_outages"),
+        ("leaves", "one_cylinder one_cylinder_wheels mean_cylinder mean_cylinder_wheels mean_cylinder_demand"),
+        ("leaves", "wheel_dropouts no_pressure full"),
         ("leaves_severe", "gnss_doppler"),
         ("wet_rough", "gnss gnss_wheels gnss_doppler"),
         ("wet_falls", "gnss gnss_wheels gnss_doppler"),

@@ -79,7 +79,6 @@ _TRAM = Scenario("tram_dry", TRAM, 50 * KMH, _dry())
 _FREIGHT = Scenario("freight_dry", FREIGHT, 100 * KMH, _dry())
 _STEPS = ((10.0, 0.35), (20.0, 0.55), (30.0, 0.0), (42.0, 1.0))
 """Service braking, release, coasting, full brake."""
-
 SCENARIOS: Mapping[str, Scenario] = {
     scenario.name: scenario
     for scenario in (

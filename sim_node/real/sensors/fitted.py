@@ -19,7 +19,7 @@ from .imu import Imu
 from .position import Gnss, GnssFix, TachoPosition
 from .pressure import CYLINDER, DEMANDED, MEAN, Pressure
 from .sensor import Sensor
-from .speed import DOPPLER, RADAR, TachoSpeed
+from .speed import DOPPLER, RADAR, SMOOTHED, TachoSpeed
 from .timing import Spells, Timing
 from .wheels import Wheels
 
@@ -64,6 +64,7 @@ _WHITE = {"position": Mounted(Gnss(0.0, white_std_m=0.5), _BUS, "receiver")}
 _FIX = {"fix": Mounted(GnssFix(Gnss()), _RECEIVER, "receiver")}
 _TACHO = {"tacho": Mounted(TachoPosition(), _BUS, "tacho")}
 _DOPPLER = {"speed doppler": Mounted(DOPPLER, _RECEIVER, "receiver")}
+_SMOOTHED = {"speed smoothed doppler": Mounted(SMOOTHED, _RECEIVER, "receiver")}
 _RADAR = {"speed radar": Mounted(RADAR, _BUS, "radar")}
 _AXLE = {"speed axle": Mounted(TachoSpeed(), _BUS, "tacho")}
 _IMU = {"imu": Mounted(Imu(), Timing(rate_hz=50.0), "imu")}
@@ -92,6 +93,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ),
             ("gnss_wheels", "satellites and the wheels", _gnss(), _DEMANDED, _WHEELS),
             ("gnss_doppler", "satellites with the receiver's speed", _gnss(), _DEMANDED, _DOPPLER),
+            ("gnss_smoothed", "satellites with a speed that the receiver smooths", _gnss(), _DEMANDED, _SMOOTHED),
             ("gnss_imu", "satellites and an accelerometer", _gnss(), _DEMANDED, _IMU),
             ("gnss_sure", "a receiver that declares a tenth of its error", _gnss(Gnss(declared=0.1)), _DEMANDED),
             ("gnss_zero_covariance", "a receiver that declares nothing", _gnss(Gnss(declared=0.0)), _DEMANDED),

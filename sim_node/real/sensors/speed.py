@@ -51,6 +51,9 @@ class Speedometer:
 DOPPLER = Speedometer()
 """0.05 m/s from fix to fix, as a receiver's own speed differs from the steps of its positions."""
 
+SMOOTHED = Speedometer(white_std_mps=0.02, correlated_std_mps=0.1, correlation_s=1.0, declared=0.5)
+"""As a receiver's own filter leaves it: its errors last for a second, and it tells half of them."""
+
 RADAR = Speedometer(white_std_mps=0.1, correlated_std_mps=0.0, scale_std=0.01)
 """Its scale hangs on the angle of its beam to the ground."""
 
