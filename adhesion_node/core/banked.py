@@ -72,7 +72,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
             return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
         if state.outliers + 1 >= config.max_outliers:
             anew = _anew(state, Event(Outcome.RESET, detail))
-            return _accepted(config, anew, measurement, bank.met(config, measurement))
+            return _accepted(config, anew, measurement, bank.met(config, measurement, memory))
         state = state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail))
         return _accepted(config, state, blind, bank.followed(config, memory, blind, rail))
     followed = bank.followed(config, memory, measurement, rail, off)

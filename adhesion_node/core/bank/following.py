@@ -22,6 +22,7 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import Array
 from .free import either
 from .gear.brake import BrakeSeen
+from .gear.repeating import FASTEST_STOP_MPS2, HELD_MPS, Repeating
 from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
 from .judging import judged
 from .kernels import weighing
@@ -31,6 +32,7 @@ from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCA
 from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
+from .scatter import BRAKED_FAR, SLOW_FAR
 from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
 
 if TYPE_CHECKING:
@@ -64,8 +66,11 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
     return memory._replace(bank=placed, declared_m=declared, course=course, fixes=memory.fixes + 1)
 
 
-def met(config: Config, measurement: Measurement) -> Memory:
-    """A train just met: its position is known, if it was measured, of its speed only how large it may be."""
+def met(config: Config, measurement: Measurement, before: Memory | None = None) -> Memory:
+    """A train just met: its position is known, if it was measured, of its speed only how large it may be.
+
+    Where it was followed `before`, positions have run away from what was believed: a speed of 0 no longer is.
+    """
     count = len(NOISES)
     declared = math.sqrt(measurement.variance_m2) if measurement.has_position else 1.0
     mean = np.zeros((count, SIZE))
@@ -88,7 +93,8 @@ def met(config: Config, measurement: Measurement) -> Memory:
     }
     for component, variance in variances.items():
         bank.covariance[:, component, component] = variance
-    memory = Memory(either(bank), measurement.t_ns - 1, declared)
+    repeating = Repeating() if before is None else before.repeating.run_away_from()
+    memory = Memory(either(bank), measurement.t_ns - 1, declared, repeating=repeating)
     return followed(config, memory, measurement, lambda: Rail(0.0, 1.0, 0.0))
 
 
@@ -121,7 +127,7 @@ def followed(
             since_s=memory.since_s + (until_ns - memory.t_ns) / S,
             brake=brake,
             braking=_braking(config, memory, brake, until_ns),
-            repeating=memory.repeating.slowed(memory.bank, bank) if memory.braked else memory.repeating,
+            slowed_mps=memory.slowed_mps + (memory.bank.mean_of(SPEED) - bank.mean_of(SPEED) if memory.braked else 0.0),
         )
         if imu:
             felt = [each for each in imu if since_ns < each.t_ns <= until_ns]
@@ -145,11 +151,17 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
     """Take in a speed, unless it repeats itself while the train must have slowed."""
     told = config.speed_std_mps**2 if sample.variance is None else sample.variance
-    repeating, scatter = memory.repeating.after(sample.speed_mps), memory.speeds.after(*sample[:2], told)
+    since_s = memory.speeds.quick.since_s(sample.t_ns)
+    elapsed_s, fall_mps = min(since_s, 1.0), FASTEST_STOP_MPS2 * since_s + HELD_MPS
+    pressed = memory.is_pressed(config)
+    swing, far = 0.0 if pressed and memory.brake.rising else None, BRAKED_FAR if pressed else SLOW_FAR
+    scatter = memory.speeds.after(*sample[:2], told, elapsed_s, swing, far)
+    variance = scatter.quick.variance_of(told) + SPEED_ERROR_MPS**2
+    repeating = memory.repeating.after(sample.speed_mps, memory.slowed_mps, fall_mps)
     memory = memory._replace(repeating=repeating, speeds=scatter)
-    variance = scatter.variance_of(told) + SPEED_ERROR_MPS**2
-    if repeating.is_stuck(variance):
+    if repeating.is_stuck(memory.slowed_mps, variance):
         return memory.leaving_out(Event(Outcome.STUCK, f"speed x = {sample.speed_mps:.6g}"))
+    variance = scatter.variance_of(told, elapsed_s) + SPEED_ERROR_MPS**2
     return memory.told(speed_seen(memory.bank, sample.speed_mps, variance), fixes=2)
 
 
@@ -163,11 +175,13 @@ def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Br
     memory, variance = memory._replace(shaking=shaking), shaking.variance_of(told, elapsed_s)
     shown, before = felt[-1].acceleration_mps2, memory.pointing
     braked = memory.braked or memory.misled
-    pointing = before.after(shown, mean, variance, elapsed_s) if braked else before.resting(shown)
+    pointing = before.after(shown, mean, variance, elapsed_s) if braked else before.resting(shown, elapsed_s)
     memory = memory._replace(pointing=pointing)
     if pointing.forward is False:
-        outcome = Outcome.STUCK if shown == before.rested_mps2 else Outcome.TURNED
+        outcome = Outcome.STUCK if pointing.is_still else Outcome.TURNED
         return memory.leaving_out(Event(outcome, f"acceleration x = {mean:.3g}"))
+    if pointing.repeats:
+        return memory
     return memory.told(acceleration_seen(config, memory.bank, mean, variance, braking))
 
 

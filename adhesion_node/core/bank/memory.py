@@ -18,15 +18,17 @@ from ..belief.rail import Rail
 from ..intake.outcome import Event
 from ..intake.samples import MAX_VARIANCE_M2, SpeedSample
 from ..quick import quick
+from .gear.axles import Axles
 from .gear.brake import BrakeSeen
+from .gear.repeating import Repeating
 from .gear.wheels import WheelsSeen
 from .kernels import weighing
 from .layout import POSITION, Bank
 from .motion import Braking, moved
 from .plausible import Course
-from .scatter import Scatter, Shaking
+from .scatter import LASTING, Coloured
 from .seeing import Observation, corrected
-from .trust import Pointing, Repeating
+from .trust import Pointing
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -48,6 +50,7 @@ class Memory(NamedTuple):
     declared_m: float
     """Standard deviation that the last position declared."""
     brake: BrakeSeen = BrakeSeen()
+    axles: Axles = Axles()
     wheels: WheelsSeen = WheelsSeen()
     braking: Braking = Braking(0.0)
     since_s: float = 0.0
@@ -69,10 +72,12 @@ class Memory(NamedTuple):
     """Whether the positions are those of a sliding wheel: they are left out until the brake is released."""
     seen: int = 0
     """Measurements of the present braking; 0 while there is none."""
+    slowed_mps: float = 0.0
+    """By how much the train was foreseen to slow under the brake, of all brakings."""
     repeating: Repeating = Repeating()
     pointing: Pointing = Pointing()
-    speeds: Scatter = Scatter()
-    shaking: Shaking = Shaking()
+    speeds: Coloured = Coloured(LASTING)
+    shaking: Coloured = Coloured()
     left_out: tuple[Event, ...] = ()
     """Of the newest measurement, with the reason."""
     fixes: int = 0

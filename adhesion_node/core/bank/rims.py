@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement
 from ..physics.train import GRAVITY
+from .gear.axles import ROLLS
 from .gear.wheels import LEARNING_MPS
 from .layout import RADIUS, SPEED, Bank
 from .memory import Memory, S
@@ -33,11 +35,11 @@ ROLLING_SHARE, FASTEST_SHARE = 0.02, 0.008
 CREEP = 0.002
 """By how much the fastest rim is slower than the train while it rolls."""
 
-ROLLS = 0.006
-"""Error of the fastest rim's speed under the brake where it rolls, relative."""
-
 SLIDES = 0.2
 """Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new."""
+
+MANY = 3.0
+"""Standard deviations of its speed by which a train surely runs."""
 
 UNISON_S = 1.5
 """For so long, and the brake's build-up, behind the opening all axles may begin to slide as one."""
@@ -53,11 +55,16 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
     if not measurement.wheels:
         return memory
-    pressed, wheels, newest = memory.is_pressed(config), memory.wheels, measurement.wheels[-1]
+    pressed, axles, wheels, newest = memory.is_pressed(config), memory.axles, memory.wheels, measurement.wheels[-1]
     rim, std = rim_speed(memory.bank)
+    runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
-        wheels = wheels.after(config, sample, rim, std, pressed)
-    rims, memory = wheels.rims(config, newest), memory._replace(wheels=wheels)
+        rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
+        axles = axles.after(rims, sample.t_ns, memory.slowed_mps, runs)
+        newest = sample.without(axles.lying(memory.slowed_mps))
+        wheels = wheels.after(config, newest, rim, std, pressed)
+    memory = _telling(memory._replace(axles=axles, wheels=wheels))
+    rims = wheels.rims(config, newest)
     if memory.braked:
         return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns) if rims else memory
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
@@ -65,6 +72,12 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     if rims and not pressed and rim > LEARNING_MPS:
         return memory._replace(bank=rolling(memory.bank, median(rims)).normalised())
     return memory
+
+
+def _telling(memory: Memory) -> Memory:
+    lying = memory.axles.lying(memory.slowed_mps)
+    names = ", ".join(str(axle + 1) for axle in lying)
+    return memory.leaving_out(Event(Outcome.STUCK, f"wheel_speed of axle {names}")) if lying else memory
 
 
 def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -> Memory:

@@ -10,19 +10,28 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 S = 1_000_000_000
 
-SPAN_NS, SAMPLES, LEAST = 5 * S // 2, 50, 20
+SPAN_NS, SAMPLES = 5 * S // 2, 50
 """Three of a sensor's values within such a time tell how they scatter, whatever the train does; of how many the mean is
-taken, and of how many at least."""
+taken."""
 
-FAR, SLOW_FAR = 4.0, 3.0
-"""Standard deviations that one counts as at most; of means over a second less: a driver's hand is seen there, too."""
+LEAST, SLOW_LEAST = 20, 5
+"""Of how many values it is taken at least, and of how many means over a second."""
 
-UNDERTOLD = 2.25
-"""Times the variance that a message tells, from which the scatter counts instead."""
+FAR, SLOW_FAR, BRAKED_FAR = 4.0, 3.0, 1.5
+"""Standard deviations that one counts as at most; of means over a second less, as a driver's hand is seen there, too,
+and under the brake least, as the adhesion's fall is."""
+
+UNDERTOLD, FEW = 2.25, 4.0
+"""Times the variance that a message tells, from which the scatter counts instead; of n values by FEW / n more."""
+
+LASTING = 4.0
+"""Times what means of a speed scatter from second to second, where that is more than is told: what lasts longer, as
+behind a receiver's own filter, is seen there in part."""
 
 
 class Scatter(NamedTuple):
@@ -32,9 +41,9 @@ class Scatter(NamedTuple):
     """Stamp, ns, and value of the last two."""
     variance: float = 0.0
     samples: int = 0
-    far: float = FAR
+    least: int = LEAST
 
-    def after(self, t_ns: int, value: float, told: float, real: float = 0.0) -> Scatter:
+    def after(self, t_ns: int, value: float, told: float, real: float = 0.0, far: float = FAR) -> Scatter:
         """Note the next value, whose message tells such a variance; so much of it is no error."""
         before = (*self.before[-1:], (t_ns, value))
         if len(self.before) < 2:
@@ -46,45 +55,59 @@ class Scatter(NamedTuple):
         off = middle - (1.0 - share) * first - share * value
         square = off**2 / (1.0 + (1.0 - share) ** 2 + share**2) - real
         samples = min(self.samples + 1, SAMPLES)
-        square = min(square, self.far**2 * max(self.variance, told))
-        return Scatter(before, self.variance + (square - self.variance) / samples, samples, self.far)
+        square = min(square, far**2 * max(self.variance, told))
+        return Scatter(before, self.variance + (square - self.variance) / samples, samples, self.least)
+
+    def since_s(self, t_ns: int) -> float:
+        """Time since the value before, of 10 ms at least; without any, infinite."""
+        return max(t_ns - self.before[-1][0], S // 100) / S if self.before else math.inf
 
     @property
     def is_known(self) -> bool:
         """Whether enough was measured."""
-        return self.samples >= LEAST
+        return self.samples >= self.least
 
     def variance_of(self, told: float) -> float:
         """Variance of a value whose message tells such a one."""
-        return self.variance if self.is_known and self.variance > UNDERTOLD * told else told
+        if not self.is_known or self.variance <= UNDERTOLD * (1.0 + FEW / self.samples) * told:
+            return told
+        return self.variance
 
 
-class Shaking(NamedTuple):
-    """How an accelerometer is shaken: from step to step and, while no brake is applied, from second to second."""
+class Coloured(NamedTuple):
+    """How the errors of a sensor come: from sample to sample, and from second to second."""
 
+    lasting: float = 1.0
+    """How much more of its errors lasts longer than from second to second; counts where those are seen."""
     quick: Scatter = Scatter()
-    slow: Scatter = Scatter(far=SLOW_FAR)
+    slow: Scatter = Scatter(least=SLOW_LEAST)
     since_ns: int = 0
     """Begin of the present second, ..."""
-    felt: float = 0.0
-    """... the integral of what was felt in it, m/s, ..."""
-    felt_s: float = 0.0
+    sum_s: float = 0.0
+    """... the integral of the values in it, ..."""
+    summed_s: float = 0.0
     """... and over which time."""
 
-    def after(self, t_ns: int, mean: float, told: float, elapsed_s: float, swing: float | None) -> Shaking:
-        """Note the mean over a step, of such a variance; the brake makes what is felt `swing` by such a one."""
-        quick = self.quick.after(t_ns, mean, told, swing or 0.0)
+    def after(
+        self, t_ns: int, value: float, told: float, elapsed_s: float, swing: float | None, far: float = SLOW_FAR
+    ) -> Coloured:
+        """Note the mean over a step, of such a variance.
+
+        Without a `swing` means over a second are noted, too; else the brake makes the values swing by such a variance.
+        """
+        quick = self.quick.after(t_ns, value, told, swing or 0.0)
         if swing is not None:
-            return self._replace(quick=quick, felt_s=0.0)
-        if not self.felt_s or t_ns - self.since_ns > 2 * S:
-            return self._replace(quick=quick, since_ns=t_ns, felt=mean * elapsed_s, felt_s=elapsed_s)
-        felt, felt_s = self.felt + mean * elapsed_s, self.felt_s + elapsed_s
+            return self._replace(quick=quick, summed_s=0.0)
+        if not self.summed_s or t_ns - self.since_ns > 2 * S:
+            return self._replace(quick=quick, since_ns=t_ns, sum_s=value * elapsed_s, summed_s=elapsed_s)
+        sum_s, summed_s = self.sum_s + value * elapsed_s, self.summed_s + elapsed_s
         if t_ns - self.since_ns < S:
-            return self._replace(quick=quick, felt=felt, felt_s=felt_s)
-        slow = self.slow.after(t_ns, felt / felt_s, told * elapsed_s / felt_s)
-        return Shaking(quick, slow)
+            return self._replace(quick=quick, sum_s=sum_s, summed_s=summed_s)
+        slow = self.slow.after(t_ns, sum_s / summed_s, told * elapsed_s / summed_s, far=far)
+        return Coloured(self.lasting, quick, slow)
 
     def variance_of(self, told: float, elapsed_s: float) -> float:
         """Variance of the mean over a step whose messages tell such a one, as if its errors did not last."""
-        slow = self.slow.variance_of(told * elapsed_s) / elapsed_s
-        return max(self.quick.variance_of(told), slow)
+        quick, least = self.quick.variance_of(told), told * elapsed_s
+        slow = self.slow.variance_of(least)
+        return max(quick, self.lasting * slow / elapsed_s) if slow > least else quick

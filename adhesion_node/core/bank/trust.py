@@ -6,51 +6,20 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Which sensors a braking shows to lie: those that repeat themselves, an accelerometer that is turned round."""
+"""An accelerometer that a braking shows to lie: it is turned round, or dead."""
 
 from __future__ import annotations
 
 import math
 from typing import NamedTuple
 
-from .layout import SPEED, Bank
-
-COARSEST_MPS = 0.5
-"""No sensor has greater steps: a mile per hour."""
-
-STEPS = 4.0
-"""Steps of the sensor that a train has lost, beside the sensor's error, whose speed cannot be the same any more."""
-
 FORWARD_MPS2, BACKWARD_MPS2, MEAN_S, MEAN_SIGMA = 0.2, 0.1, 1.0, 3.0
 """What an accelerometer feels under the brake in the mean over such a time, beyond its noise, once it is turned round,
 and once it is seen not to be."""
 
-STILL_S = 2.0
-"""No accelerometer shows the same to the bit for so long behind the brake's application as before it."""
-
-
-class Repeating(NamedTuple):
-    """A speed, and what the train must have lost under the brake since it was first measured so."""
-
-    speed_mps: float = math.nan
-    lost_mps: float = 0.0
-    step_mps: float = COARSEST_MPS
-    """Smallest step that the sensor has ever made: a coarse one repeats itself while it works."""
-
-    def slowed(self, before: Bank, bank: Bank) -> Repeating:
-        """The train is foreseen to have slowed from one belief to the next."""
-        return self._replace(lost_mps=self.lost_mps + before.mean_of(SPEED) - bank.mean_of(SPEED))
-
-    def after(self, speed_mps: float) -> Repeating:
-        """Note the next speed."""
-        if speed_mps == self.speed_mps:
-            return self
-        step_mps = abs(speed_mps - self.speed_mps)
-        return Repeating(speed_mps, 0.0, step_mps if step_mps < self.step_mps else self.step_mps)  # never true of NaN
-
-    def is_stuck(self, variance: float) -> bool:
-        """Whether the train cannot have this speed any more, which has such a variance; at 0 it stands."""
-        return self.speed_mps != 0.0 and self.lost_mps > STEPS * self.step_mps + math.sqrt(variance)
+STILL_S, LEAST_STILL_S, WATCHED_S = 2.0, 0.3, 5.0
+"""No accelerometer shows the same to the bit for so long under the brake. One that was watched for so long before the
+brake, and whose noise made it differ, does not for more than this, and three times what it did then."""
 
 
 class Pointing(NamedTuple):
@@ -60,22 +29,41 @@ class Pointing(NamedTuple):
     """Forward positive."""
     forward: bool | None = None
     """Whether it points forward as it should, and shows anything; None: no braking has shown it yet."""
-    rested_mps2: float = math.nan
-    """What it showed last before the brake, while it has shown nothing else since, ..."""
+    shown_mps2: float = math.nan
+    """What it showed last, ..."""
     still_s: float = 0.0
-    """... and for how long behind the brake's application."""
+    """... for how long under the brake it has shown nothing else, ..."""
+    rested_s: float = 0.0
+    """... and for how long without; ..."""
+    longest_s: float = 0.0
+    """... that at its longest, ..."""
+    watched_s: float = 0.0
+    """... of so long a time."""
 
-    def resting(self, shown_mps2: float) -> Pointing:
+    def resting(self, shown_mps2: float, elapsed_s: float) -> Pointing:
         """Note what it shows while no brake is applied."""
-        return self._replace(rested_mps2=shown_mps2, still_s=0.0)
+        rested_s = self.rested_s + elapsed_s if shown_mps2 == self.shown_mps2 else 0.0
+        longest_s = max(self.longest_s, rested_s)
+        return Pointing(self.mean_mps2, self.forward, shown_mps2, 0.0, rested_s, longest_s, self.watched_s + elapsed_s)
+
+    @property
+    def repeats(self) -> bool:
+        """Whether it shows the same for longer than it is used to."""
+        return self.still_s > min(3.0 * self.longest_s if self.watched_s > WATCHED_S else STILL_S, STILL_S)
+
+    @property
+    def is_still(self) -> bool:
+        """Whether it does for too long."""
+        return self.repeats and self.still_s > LEAST_STILL_S
 
     def after(self, shown_mps2: float, felt_mps2: float, variance: float, elapsed_s: float) -> Pointing:
         """Note what it shows under the brake, and the mean of that since the time before, of such a variance."""
-        if shown_mps2 == self.rested_mps2:
-            still_s = self.still_s + elapsed_s
-            return self._replace(still_s=still_s, forward=False if still_s > STILL_S else self.forward)
+        still_s = self.still_s + elapsed_s if shown_mps2 == self.shown_mps2 else 0.0
+        shown = self._replace(shown_mps2=shown_mps2, still_s=still_s)
+        if shown.is_still:
+            return shown._replace(forward=False)
         part = -math.expm1(-elapsed_s / MEAN_S)
         mean = self.mean_mps2 + part * (felt_mps2 - self.mean_mps2)
         noise = MEAN_SIGMA * math.sqrt(0.5 * part * variance)
         forward = False if mean > FORWARD_MPS2 + noise else True if mean < -BACKWARD_MPS2 - noise else self.forward
-        return Pointing(mean, forward)
+        return shown._replace(mean_mps2=mean, forward=forward)

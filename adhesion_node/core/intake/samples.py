@@ -97,6 +97,13 @@ class WheelSample(NamedTuple):
         """Those of the axles that are known."""
         return tuple(speed for speed in self.speeds_radps if not math.isnan(speed))
 
+    def without(self, axles: tuple[int, ...]) -> WheelSample:
+        """The same without those of some axles, counted from 0."""
+        if not axles:
+            return self
+        left = (math.nan if axle in axles else speed for axle, speed in enumerate(self.speeds_radps))
+        return WheelSample(self.t_ns, tuple(left))
+
     def is_valid(self) -> bool:
         """Whether any is known and none infinite."""
         known = self.known_radps

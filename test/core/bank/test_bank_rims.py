@@ -19,12 +19,12 @@ from scipy.stats import norm
 
 from adhesion_node.core.bank.findings.learnt import learnt
 from adhesion_node.core.bank.following import followed, met
+from adhesion_node.core.bank.gear.axles import ROLLS
 from adhesion_node.core.bank.layout import RADIUS, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.rims import (
     CREEP,
     FASTEST_SHARE,
-    ROLLS,
     SLIDES,
     as_fast,
     not_slower,

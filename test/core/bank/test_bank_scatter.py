@@ -17,7 +17,7 @@ from test_bank_trust import Run, assert_known, followed
 
 from adhesion_node.core import ImuSample, SpeedSample
 from adhesion_node.core.bank.findings.learnt import learnt
-from adhesion_node.core.bank.scatter import Scatter, Shaking
+from adhesion_node.core.bank.scatter import LASTING, Coloured, Scatter
 
 H = 0.1
 
@@ -57,15 +57,54 @@ def test_samples_apart_or_back_in_time_tell_nothing() -> None:
 @pytest.mark.parametrize("hertz", [1.2, 0.7])
 def test_an_accelerometer_that_bounces_slowly_is_told_by_its_seconds(hertz: float) -> None:
     """As the body of a coach does; from sample to sample it seems to be sure."""
-    told, shaking = 0.01**2, Shaking()
+    told, shaking = 0.01**2, Coloured()
     for index in range(600):
         t_s = H * index
         shaking = shaking.after(round(t_s * S), 0.2 * float(np.sin(2.0 * np.pi * hertz * t_s)), told, H, None)
     assert shaking.variance_of(told, H) > 20.0 * told  # of what comes and goes as much is left
-    still = Shaking()
+    still = Coloured()
     for index in range(600):
         still = still.after(round(H * index * S), -0.02 if index > 300 else 0.01, told, H, None)
     assert still.variance_of(told, H) == told
+
+
+def lasting(count: int, std: float, lasts_s: float, seed: int) -> np.ndarray:
+    """A Gauss-Markov process, sampled every `H`."""
+    kept, news = np.exp(-H / lasts_s), np.random.default_rng(seed).standard_normal(count)
+    values = std * news
+    for index in range(1, count):
+        values[index] = kept * values[index - 1] + std * np.sqrt(1.0 - kept**2) * news[index]
+    return np.asarray(values)
+
+
+def coloured(values: np.ndarray, told: float, rate_hz: float = 10.0) -> Coloured:
+    found = Coloured(LASTING)
+    for index, value in enumerate(values):
+        t_ns = round((1.0 + index / rate_hz) * S)
+        found = found.after(t_ns, float(value), told, min(found.quick.since_s(t_ns), 1.0), None)
+    return found
+
+
+@pytest.mark.parametrize("lasts_s", [0.5, 1.0])
+@pytest.mark.parametrize("rate_hz", [4.0, 10.0])
+def test_errors_that_last_weigh_as_much_white_noise_as_leaves_the_same_behind(rate_hz: float, lasts_s: float) -> None:
+    """What lasts T, sampled every h, leaves as much in a mean as white noise of 2 T / h times its variance."""
+    of = []
+    for seed in range(5):
+        errors = lasting(round(120 * rate_hz), 0.1, lasts_s * rate_hz * H, seed)
+        of.append(coloured(errors, 0.05**2, rate_hz).variance_of(0.05**2, 1.0 / rate_hz))
+    white = 0.1**2 * 2.0 * lasts_s * rate_hz
+    assert 0.1 * white < np.mean(of) < 3.0 * white
+
+
+@pytest.mark.parametrize("rate_hz", [1.0, 4.0, 10.0])
+@pytest.mark.parametrize("seed", range(5))
+def test_errors_that_do_not_last_weigh_what_they_are_told(rate_hz: float, seed: int) -> None:
+    """Of a train that is driven: by 0.2 m/s^2 more or less every 5 s."""
+    rng = np.random.default_rng(seed)
+    notches = np.repeat(rng.choice([-0.1, 0.1], 24), round(5 * rate_hz))
+    speeds = 40.0 + np.cumsum(notches) / rate_hz + 0.1 * rng.standard_normal(notches.size)
+    assert coloured(speeds, 0.1**2, rate_hz).variance_of(0.1**2, 1.0 / rate_hz) == 0.1**2
 
 
 @pytest.mark.parametrize("mu", [0.3, 0.06, 0.03])
@@ -82,6 +121,21 @@ def test_a_speed_that_tells_a_sixth_of_its_noise_is_known_for_it(mu: float, seed
     assert found.state.memory is not None
     assert learnt(found.state.memory)["speed_scatter"] == pytest.approx(0.3, rel=0.4)
     assert "acceleration_scatter" not in learnt(found.state.memory)
+
+
+@pytest.mark.parametrize("lasts_s", [0.5, 1.0])
+@pytest.mark.parametrize("mu", [0.3, 0.06, 0.03])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_speed_whose_errors_last_is_known_for_it(mu: float, seed: int, lasts_s: float) -> None:
+    """As a receiver's own filter leaves them, of 0.2 m/s, told as 0.05; the train brakes 5 s after it was met."""
+    times, truth, places = braked_run(mu, seed, 60.0)
+    shown = truth[:, 1] + lasting(times.size, 0.2, lasts_s, seed + 200)
+    measured = [
+        each._replace(speeds=(SpeedSample(each.t_ns, float(v), 0.05**2),))
+        for each, v in zip(measurements(times, places, 0.3), shown, strict=True)
+    ]
+    found = Run(times, truth[:, 1], *followed(measured))
+    assert_known(found, mu, 35.0, 50.0)
 
 
 @pytest.mark.parametrize("mu", [0.3, 0.06, 0.03])

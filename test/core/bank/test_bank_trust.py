@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -37,10 +38,10 @@ class Run(NamedTuple):
         return float(np.interp((estimate.t_ns - S) / S, self.times, self.speeds))
 
 
-def held(values: Array, times: Array, from_s: float, until_s: float) -> Array:
-    """The same again and again from one time to another."""
-    kept = values.copy()
-    kept[(times >= from_s) & (times < until_s)] = values[times >= from_s][0]
+def held(values: Array, times: Array, from_s: float, until_s: float, shown: float | None = None) -> Array:
+    """The same again and again from one time to another: what is `shown`, or the first."""
+    kept, when = values.copy(), (times >= from_s) & (times < until_s)
+    kept[when] = values[times >= from_s][0] if shown is None else shown
     return kept
 
 
@@ -54,15 +55,21 @@ def run(
     imu: tuple[float, float] | None = None,
     coarse_mps: float = 0.0,
     speed_mps: float = 70.0,
+    held_mps: float | None = None,
+    died: tuple[float, float | None] = (99.0, 0.0),
 ) -> Run:
-    """`speed`: noise, and from when to when it is held; `place`: the same; `imu`: factor and noise."""
+    """`speed`: noise, and from when to when it is held, or `held_mps` is shown; `place`: the same.
+
+    `imu`: factor and noise; `died`: from when it shows what.
+    """
     rng = np.random.default_rng(seed + 100)
     times, truth, places = braked_run(mu, seed, seconds, speed_mps=speed_mps)
     measured = measurements(times, held(places, times, *place), 0.3)
     if speed is not None:
-        noise, *span = speed
+        noise, begin_s, end_s = speed
         shown = truth[:, 1] + noise * rng.standard_normal(times.size)
-        shown = held(np.floor(shown / coarse_mps) * coarse_mps if coarse_mps else shown, times, *span)
+        shown = np.floor(shown / coarse_mps) * coarse_mps if coarse_mps else shown
+        shown = held(shown, times, begin_s, end_s, held_mps)
         variance = (noise or 0.03) ** 2
         measured = [
             each._replace(speeds=(SpeedSample(each.t_ns, float(v), variance),))
@@ -71,6 +78,7 @@ def run(
     if imu is not None:
         factor, noise = imu
         felt = factor * np.gradient(truth[:, 1], H) + noise * rng.standard_normal(times.size)
+        felt = felt if died[0] > seconds else held(felt, times, died[0], math.inf, died[1])
         measured = [
             each._replace(imu=(ImuSample(each.t_ns, float(a), (noise or 0.05) ** 2),))
             for each, a in zip(measured, felt, strict=True)
@@ -112,6 +120,24 @@ def test_a_speed_that_hung_before_the_brake_was_applied_is_left_out() -> None:
     assert_known(found, DRY, 8.0, 20.0)
 
 
+@pytest.mark.parametrize("mu", [DRY, WET, 0.03])
+@pytest.mark.parametrize(("from_s", "until_s"), [(0.0, 99.0), (3.0, 99.0), (12.0, 99.0), (12.0, 14.0)])
+def test_a_receiver_that_tells_a_standstill_of_a_train_that_runs_is_left_out(
+    mu: float, from_s: float, until_s: float
+) -> None:
+    """As one does that has lost its satellites."""
+    found = run(mu, 1, speed=(0.08, from_s, until_s), held_mps=0.0)
+    assert found.state.counts[Outcome.STUCK] >= 19
+    assert_known(found, mu, 11.0, 25.0)
+
+
+def test_a_train_that_stops_stands() -> None:
+    """A receiver tells that it does from 1 m/s on."""
+    found = run(DRY, 1, seconds=22.6, speed=(0.08, 21.6, 99.0), held_mps=0.0, speed_mps=17.0)
+    assert found.state.counts[Outcome.STUCK] == 0
+    assert found.estimates[-1].speed_mps == pytest.approx(0.0, abs=0.5)
+
+
 @pytest.mark.parametrize("coarse_mps", [0.1, 1.0 / 3.6, 0.44704])
 @pytest.mark.parametrize("mu", [DRY, WET, 0.02])
 def test_a_coarse_speed_repeats_itself_and_is_used(mu: float, coarse_mps: float) -> None:
@@ -137,6 +163,15 @@ def test_an_accelerometer_that_shows_nothing_is_left_out(mu: float, seed: int) -
     assert found.state.counts[Outcome.STUCK] > 200
     assert found.state.counts[Outcome.SLIDING] == found.state.counts[Outcome.RESET] == 0
     assert_known(found, mu, 9.0, 25.0)
+
+
+@pytest.mark.parametrize("mu", [DRY, WET, 0.03])
+@pytest.mark.parametrize("shown", [0.0, None])
+def test_an_accelerometer_that_dies_under_the_brake_is_left_out(mu: float, shown: float | None) -> None:
+    found = run(mu, 1, imu=(1.0, 0.05), died=(12.0, shown))
+    assert found.state.counts[Outcome.STUCK] > 170
+    assert found.state.counts[Outcome.SLIDING] == found.state.counts[Outcome.RESET] == 0
+    assert_known(found, mu, 14.0, 25.0)
 
 
 @pytest.mark.parametrize("noise", [0.05, 1.0])

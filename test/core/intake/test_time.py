@@ -91,7 +91,7 @@ STREAMS: dict[str, Callable[[Measurement], Sample]] = {
     "position": lambda m: PositionSample(*m[:3]),
     "pressure": lambda m: PressureSample(m.t_ns, m.brake_pressure_pa or 0.0),
     "speed": lambda m: SpeedSample(m.t_ns, 80.0 - m.t_ns * 1e-9 / 3),
-    "wheels": lambda m: WheelSample(m.t_ns, (170.0, 171.0, 165.0)),
+    "wheels": lambda m: WheelSample(m.t_ns, tuple(w - m.t_ns * 1e-9 for w in (170.0, 171.0, 165.0))),
 }
 
 

@@ -57,7 +57,7 @@ def learnt(memory: Memory) -> dict[str, float]:
     for name, component, _, _, factor in QUANTITIES:
         found[name] = factor * float(mean[component])
         found[f"{name}_std"] = factor * math.sqrt(max(float(covariance[component, component]), 0.0))
-    for (name, *_), scatter in zip(SCATTERS, (memory.speeds, memory.shaking.quick), strict=True):
+    for (name, *_), scatter in zip(SCATTERS, (memory.speeds.quick, memory.shaking.quick), strict=True):
         if scatter.is_known:
             found[name] = math.sqrt(max(scatter.variance, 0.0))
     weight = memory.bank.weight

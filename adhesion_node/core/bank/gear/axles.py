@@ -1,0 +1,49 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Which axles' speeds are believed: not of one that stands while the train runs, nor one that repeats itself."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from .repeating import Repeating
+
+S = 1_000_000_000
+
+FASTEST_FALL_MPS2 = 100.0
+"""No brake stops a wheel faster, at the rim."""
+
+ROLLS = 0.006
+"""Error of a rim's speed under the brake where it rolls, relative."""
+
+
+class Axles(NamedTuple):
+    """What the sensors of the axles have shown."""
+
+    shown: tuple[Repeating, ...] = ()
+    t_ns: int = 0
+
+    def after(self, rims_mps: Sequence[float], t_ns: int, slowed_mps: float, runs: bool) -> Axles:
+        """Note the speeds of the rims; NaN: not known.
+
+        `slowed_mps` is by how much the train has slowed under the brake in all; a train that `runs` has no brake
+        applied, and every wheel turns.
+        """
+        fall_mps = -math.inf if runs else FASTEST_FALL_MPS2 * max(t_ns - self.t_ns, 0) / S
+        before = self.shown if len(self.shown) == len(rims_mps) else (Repeating(),) * len(rims_mps)
+        shown = tuple(one.after(rim, slowed_mps, fall_mps) for one, rim in zip(before, rims_mps, strict=True))
+        return Axles(shown, t_ns)
+
+    def lying(self, slowed_mps: float) -> tuple[int, ...]:
+        """Those that are not believed, counted from 0."""
+        return tuple(
+            axle for axle, one in enumerate(self.shown) if one.is_stuck(slowed_mps, (ROLLS * one.speed_mps) ** 2)
+        )
