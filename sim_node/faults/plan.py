@@ -103,6 +103,9 @@ FAULTS: Mapping[str, Fault] = {
     "balise_step": Fault("positions moved from one on", Dose(size=2.0), "m", streams.shifted),
     "wrong_frame": Fault("positions in another frame", stream=streams.misframed),
     "kmh": Fault("speeds in km/h", stream=streams.in_kmh),
+    "speed_zero": Fault("speeds of 0, as of a receiver without satellites", stream=streams.standing),
+    "wheels_silent": Fault("wheels that show a standstill", Dose(size=0.5), "of the axles", streams.silent),
+    "wheels_stuck": Fault("one speed of each wheel again and again, freshly stamped", stream=streams.wheels_stuck),
     "gauge": Fault("gauge for absolute pressures", stream=streams.gauge),
 }
 """The faults by name."""

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from adhesion_node.wire.topic import Topic
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, WHEEL_SPEED
 
 from ..train.plant import Truth
 from ..train.sensors import ATMOSPHERE_PA, SensorMessage, Tick
@@ -70,6 +70,12 @@ def moved(message: SensorMessage, by: float) -> SensorMessage:
     return message._replace(values=(message.values[0] + by,))
 
 
+def _without(values: tuple[float, ...], share: float) -> tuple[float, ...]:
+    """The values with 0 in place of such a share of them, from the first on."""
+    first = round(share * len(values))
+    return (0.0,) * first + values[first:]
+
+
 lost = hit(lambda messages, dose, rng: tuple(m for m in messages if m.topic != POSITION))
 duplicated = hit(lambda messages, dose, rng: messages * 2)
 outlying = each(POSITION, lambda message, dose, rng: moved(message, math.copysign(dose.size, rng.standard_normal())))
@@ -77,6 +83,8 @@ shifted = each(POSITION, lambda message, dose, rng: moved(message, dose.size))
 misframed = each(POSITION, lambda message, dose, rng: message._replace(frame="map"))
 undeclared = each(POSITION, lambda message, dose, rng: message._replace(variance=0.0))
 in_kmh = each(SPEED, lambda message, dose, rng: message._replace(values=(3.6 * message.values[0],)))
+standing = each(SPEED, lambda message, dose, rng: message._replace(values=(0.0,)))
+silent = each(WHEEL_SPEED, lambda message, dose, rng: message._replace(values=_without(message.values, dose.size)))
 gauge = each(BRAKE_PRESSURE, lambda message, dose, rng: moved(message, -ATMOSPHERE_PA))
 
 
@@ -119,15 +127,22 @@ def paused(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Itera
         yield truth, tuple(m._replace(t_ns=still_ns) if dose.now(truth) else m for m in messages)
 
 
-def stuck(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
-    """Repeat the last good position under fresh stamps."""
-    shown: tuple[float, ...] | None = None
-    for truth, messages in ticks:
-        if shown is None or not dose.now(truth):
-            shown = next((message.values for message in messages if message.topic == POSITION), shown)
-            yield truth, messages
-        else:
-            yield truth, tuple(m._replace(values=shown) if m.topic == POSITION else m for m in messages)
+def held(topic: Topic) -> Change:
+    """Repeat the last good values of a topic under fresh stamps."""
+
+    def change(ticks: Iterator[Tick], dose: Dose, rng: np.random.Generator) -> Iterator[Tick]:
+        shown: tuple[float, ...] | None = None
+        for truth, messages in ticks:
+            if shown is None or not dose.now(truth):
+                shown = next((message.values for message in messages if message.topic == topic), shown)
+                yield truth, messages
+            else:
+                yield truth, tuple(m._replace(values=shown) if m.topic == topic else m for m in messages)
+
+    return change
+
+
+stuck, wheels_stuck = held(POSITION), held(WHEEL_SPEED)
 
 
 RATES_HZ = (10.0, 1.0, 50.0)

@@ -178,6 +178,16 @@ def test_units_and_frames_are_mistaken() -> None:
     assert {round(b.values[0] - a.values[0]) for a, b in pressures} == {0, 101325}
 
 
+def test_speeds_and_wheels_stand_or_hang() -> None:
+    assert {m.values for m in sent(ticks("speed_zero"), topics.SPEED)[300:]} == {(0.0,)}
+    assert len({m.values for m in sent(ticks("wheels_stuck"), topics.WHEEL_SPEED)[299:]}) == 1
+    silent = np.array([m.values for m in sent(ticks("wheels_silent"), topics.WHEEL_SPEED)])
+    half = silent.shape[1] // 2
+    assert (silent[:300] > 0.0).all()
+    assert not silent[300:, :half].any()
+    assert (silent[300:500, half:] > 0.0).all()
+
+
 def test_heavy_tails_are_heavy() -> None:
     run = ticks("heavy_tails")
     errors = np.array([messages[-1].values[0] - truth.position_m for truth, messages in run])

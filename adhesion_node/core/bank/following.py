@@ -151,17 +151,15 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
     """Take in a speed, unless it repeats itself while the train must have slowed."""
     told = config.speed_std_mps**2 if sample.variance is None else sample.variance
-    since_s = memory.speeds.quick.since_s(sample.t_ns)
+    since_s, pressed = memory.speeds.quick.since_s(sample.t_ns), memory.is_pressed(config)
     elapsed_s, fall_mps = min(since_s, 1.0), FASTEST_STOP_MPS2 * since_s + HELD_MPS
-    pressed = memory.is_pressed(config)
-    swing, far = 0.0 if pressed and memory.brake.rising else None, BRAKED_FAR if pressed else SLOW_FAR
-    scatter = memory.speeds.after(*sample[:2], told, elapsed_s, swing, far)
-    variance = scatter.quick.variance_of(told) + SPEED_ERROR_MPS**2
     repeating = memory.repeating.after(sample.speed_mps, memory.slowed_mps, fall_mps)
-    memory = memory._replace(repeating=repeating, speeds=scatter)
-    if repeating.is_stuck(memory.slowed_mps, variance):
+    memory = memory._replace(repeating=repeating)
+    if repeating.is_stuck(memory.slowed_mps, memory.speeds.quick.variance_of(told) + SPEED_ERROR_MPS**2):
         return memory.leaving_out(Event(Outcome.STUCK, f"speed x = {sample.speed_mps:.6g}"))
-    variance = scatter.variance_of(told, elapsed_s) + SPEED_ERROR_MPS**2
+    swing, far = 0.0 if pressed and memory.brake.rising else None, BRAKED_FAR if pressed else SLOW_FAR
+    memory = memory._replace(speeds=memory.speeds.after(*sample[:2], told, elapsed_s, swing, far))
+    variance = memory.speeds.variance_of(told, elapsed_s) + SPEED_ERROR_MPS**2
     return memory.told(speed_seen(memory.bank, sample.speed_mps, variance), fixes=2)
 
 

@@ -82,6 +82,7 @@ TAILS = World("tunnel_entry", SensorSettings(student_dof=3.0))
 OUTLIERS = World("tunnel_entry", SensorSettings(outlier_fraction=0.05))
 WHEELS = SensorSettings(wheel_speed_std_radps=0.05)
 ODOMETER = SensorSettings(speed_std_mps=0.3)
+DOPPLER = SensorSettings(speed_std_mps=0.1)
 
 PAPER = Estimator(replace(EXACT, method="particle_em", step=10))
 GAUSSIAN = Estimator(replace(EXACT, tail_dof=0.0))
@@ -147,6 +148,9 @@ FAULTS = (
     _lasting("balise step of 1 m back", "balise_step", size=-1.0),
     _lasting("another frame", "wrong_frame"),
     _lasting("odometer in km/h", "kmh", BEFORE_BRAKING_S, sensors=ODOMETER),
+    _lasting("speeds of 0 of a receiver", "speed_zero", config=replace(EXACT, speed_source="doppler"), sensors=DOPPLER),
+    _lasting("half of the wheels stand", "wheels_silent", BEFORE_BRAKING_S, sensors=WHEELS),
+    _lasting("all wheels show the same", "wheels_stuck", sensors=WHEELS),
     _lasting("gauge pressure", "gauge", BEFORE_BRAKING_S),
 )
 """The second table."""
