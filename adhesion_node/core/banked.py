@@ -72,7 +72,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
             return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
         if state.outliers + 1 >= config.max_outliers:
             anew = _anew(state, Event(Outcome.RESET, detail))
-            return _accepted(config, anew, measurement, bank.met(config, measurement, memory))
+            return _accepted(config, anew, measurement, bank.met(config, measurement))
         state = state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail))
         return _accepted(config, state, blind, bank.followed(config, memory, blind, rail))
     followed = bank.followed(config, memory, measurement, rail, off)
@@ -84,7 +84,9 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
 
 def _anew(state: State, event: Event) -> State:
     """Nothing is known of train and rail any more."""
-    kept = state.forgotten()._replace(seen=state.seen, repeated=state.repeated, pace=state.pace)
+    kept = state.forgotten()._replace(
+        seen=state.seen, repeated=state.repeated, pace=state.pace, standing=state.standing
+    )
     return kept.told(event)
 
 

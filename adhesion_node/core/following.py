@@ -17,6 +17,7 @@ from .estimate import Estimate, blind_estimate
 from .intake.outcome import Event, Outcome
 from .intake.plausibility import KMH_PER_MPS, in_mps, is_kmh
 from .intake.samples import Measurement
+from .intake.standing import moving
 from .state import State
 from .windowed import follow_windowed, last_window
 
@@ -27,6 +28,8 @@ SURE_SIGMA = 3.0
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
     seen, placed = state.seen, measurement.has_position
+    measurement, standing, silent = moving(measurement, state.standing, state.pace)
+    state = state._replace(standing=standing).told(*silent)
     if placed:
         repeated = state.repeated.after(measurement, state.sure)
         if repeated.is_stuck(measurement):
@@ -45,7 +48,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         state = state.told(*refused)
         if is_kmh(state.followed_mps, pace.speed_mps):
             detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
-            state = state.forgotten()._replace(pace=pace).told(Event(Outcome.RESET, detail))
+            state = state.forgotten()._replace(pace=pace, standing=standing).told(Event(Outcome.RESET, detail))
     if state.method is None:
         return follow_banked(config, state, measurement)
     return follow_windowed(config, state, measurement)

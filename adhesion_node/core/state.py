@@ -24,6 +24,7 @@ from .intake.outcome import NO_COUNTS, Event, Outcome, counted
 from .intake.pairing import Gate, Inbox
 from .intake.plausibility import Pace, Repeated
 from .intake.samples import Measurement
+from .intake.standing import Standing
 from .methods.protocol import AnyMethod, MethodWindow
 from .quick import quick
 
@@ -84,6 +85,7 @@ class State(NamedTuple):
     """The last estimate that positions have borne out."""
     repeated: Repeated[Sure] = Repeated(math.nan, 0, None)
     pace: Pace = Pace()
+    standing: Standing = Standing()
     unseen: int = 0
     """Measurements in a row of a position sensor that is stuck."""
 

@@ -22,7 +22,6 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import Array
 from .free import either
 from .gear.brake import BrakeSeen
-from .gear.repeating import FASTEST_STOP_MPS2, HELD_MPS, Repeating
 from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
 from .judging import judged
 from .kernels import weighing
@@ -66,11 +65,8 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
     return memory._replace(bank=placed, declared_m=declared, course=course, fixes=memory.fixes + 1)
 
 
-def met(config: Config, measurement: Measurement, before: Memory | None = None) -> Memory:
-    """A train just met: its position is known, if it was measured, of its speed only how large it may be.
-
-    Where it was followed `before`, positions have run away from what was believed: a speed of 0 no longer is.
-    """
+def met(config: Config, measurement: Measurement) -> Memory:
+    """A train just met: its position is known, if it was measured, of its speed only how large it may be."""
     count = len(NOISES)
     declared = math.sqrt(measurement.variance_m2) if measurement.has_position else 1.0
     mean = np.zeros((count, SIZE))
@@ -93,8 +89,7 @@ def met(config: Config, measurement: Measurement, before: Memory | None = None) 
     }
     for component, variance in variances.items():
         bank.covariance[:, component, component] = variance
-    repeating = Repeating() if before is None else before.repeating.run_away_from()
-    memory = Memory(either(bank), measurement.t_ns - 1, declared, repeating=repeating)
+    memory = Memory(either(bank), measurement.t_ns - 1, declared)
     return followed(config, memory, measurement, lambda: Rail(0.0, 1.0, 0.0))
 
 
@@ -151,9 +146,8 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
     """Take in a speed, unless it repeats itself while the train must have slowed."""
     told = config.speed_std_mps**2 if sample.variance is None else sample.variance
-    since_s, pressed = memory.speeds.quick.since_s(sample.t_ns), memory.is_pressed(config)
-    elapsed_s, fall_mps = min(since_s, 1.0), FASTEST_STOP_MPS2 * since_s + HELD_MPS
-    repeating = memory.repeating.after(sample.speed_mps, memory.slowed_mps, fall_mps)
+    elapsed_s, pressed = memory.speeds.quick.since_s(sample.t_ns), memory.is_pressed(config)
+    repeating = memory.repeating.after(sample.speed_mps, memory.slowed_mps)
     memory = memory._replace(repeating=repeating)
     if repeating.is_stuck(memory.slowed_mps, memory.speeds.quick.variance_of(told) + SPEED_ERROR_MPS**2):
         return memory.leaving_out(Event(Outcome.STUCK, f"speed x = {sample.speed_mps:.6g}"))

@@ -10,7 +10,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 S = 1_000_000_000
@@ -59,8 +58,8 @@ class Scatter(NamedTuple):
         return Scatter(before, self.variance + (square - self.variance) / samples, samples, self.least)
 
     def since_s(self, t_ns: int) -> float:
-        """Time since the value before, of 10 ms at least; without any, infinite."""
-        return max(t_ns - self.before[-1][0], S // 100) / S if self.before else math.inf
+        """Time since the value before, of 10 ms at least; 1 s, if that is longer, or there is none."""
+        return min(max(t_ns - self.before[-1][0], S // 100) / S, 1.0) if self.before else 1.0
 
     @property
     def is_known(self) -> bool:

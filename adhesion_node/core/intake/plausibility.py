@@ -30,6 +30,10 @@ KMH_PER_MPS, KMH_BAND, KMH_FROM_MPS = 3.6, 0.15, 5.0
 PACE_NS = 2_000_000_000
 """Positions tell a speed over so long at least: those of a metre to a metre and a half per second."""
 
+RUNS_MPS, RUNS_SPANS = 12.0, 3
+"""A train whose positions were so fast over so many spans, one after the other, did not stop within the last two; one
+position that is far off makes two of them fast."""
+
 
 class Motion(Protocol):
     """What was known of the train's motion at some time."""
@@ -101,6 +105,13 @@ class Pace(NamedTuple):
     since_ns: int | None = None
     position_m: float = 0.0
     speed_mps: float = math.nan
+    fast: int = 0
+    """Spans, one after the other, over which they were those of a train that runs."""
+
+    @property
+    def runs(self) -> bool:
+        """Whether the train surely runs."""
+        return self.fast >= RUNS_SPANS
 
     def after(self, measurement: Measurement) -> Pace:
         """Note the next position, if there is one."""
@@ -112,7 +123,8 @@ class Pace(NamedTuple):
         elapsed_ns = t_ns - self.since_ns
         if elapsed_ns < PACE_NS:
             return self
-        return Pace(t_ns, position_m, abs(position_m - self.position_m) / (elapsed_ns * 1e-9))
+        speed_mps = abs(position_m - self.position_m) / (elapsed_ns * 1e-9)
+        return Pace(t_ns, position_m, speed_mps, self.fast + 1 if speed_mps > RUNS_MPS else 0)
 
 
 def in_mps(measurement: Measurement, known_mps: Iterable[float]) -> tuple[Measurement, tuple[Event, ...]]:

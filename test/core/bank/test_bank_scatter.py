@@ -81,7 +81,7 @@ def coloured(values: np.ndarray, told: float, rate_hz: float = 10.0) -> Coloured
     found = Coloured(LASTING)
     for index, value in enumerate(values):
         t_ns = round((1.0 + index / rate_hz) * S)
-        found = found.after(t_ns, float(value), told, min(found.quick.since_s(t_ns), 1.0), None)
+        found = found.after(t_ns, float(value), told, found.quick.since_s(t_ns), None)
     return found
 
 

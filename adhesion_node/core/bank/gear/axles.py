@@ -10,10 +10,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from ...intake.standing import Standing
 from .repeating import Repeating
 
 S = 1_000_000_000
@@ -28,8 +28,8 @@ ROLLS = 0.006
 class Axles(NamedTuple):
     """What the sensors of the axles have shown."""
 
-    shown: tuple[Repeating, ...] = ()
-    t_ns: int = 0
+    repeating: tuple[Repeating, ...] = ()
+    standing: tuple[Standing, ...] = ()
 
     def after(self, rims_mps: Sequence[float], t_ns: int, slowed_mps: float, runs: bool) -> Axles:
         """Note the speeds of the rims; NaN: not known.
@@ -37,13 +37,20 @@ class Axles(NamedTuple):
         `slowed_mps` is by how much the train has slowed under the brake in all; a train that `runs` has no brake
         applied, and every wheel turns.
         """
-        fall_mps = -math.inf if runs else FASTEST_FALL_MPS2 * max(t_ns - self.t_ns, 0) / S
-        before = self.shown if len(self.shown) == len(rims_mps) else (Repeating(),) * len(rims_mps)
-        shown = tuple(one.after(rim, slowed_mps, fall_mps) for one, rim in zip(before, rims_mps, strict=True))
-        return Axles(shown, t_ns)
+        count = len(rims_mps)
+        before = self if len(self.standing) == count else Axles((Repeating(),) * count, (Standing(),) * count)
+        repeating = (one.after(rim, slowed_mps) for one, rim in zip(before.repeating, rims_mps, strict=True))
+        standing = (
+            one.after(t_ns, rim, FASTEST_FALL_MPS2 * abs(t_ns - one.t_ns) / S, runs)
+            for one, rim in zip(before.standing, rims_mps, strict=True)
+        )
+        return Axles(tuple(repeating), tuple(standing))
 
     def lying(self, slowed_mps: float) -> tuple[int, ...]:
         """Those that are not believed, counted from 0."""
+        both = enumerate(zip(self.repeating, self.standing, strict=True))
         return tuple(
-            axle for axle, one in enumerate(self.shown) if one.is_stuck(slowed_mps, (ROLLS * one.speed_mps) ** 2)
+            axle
+            for axle, (one, stands) in both
+            if stands.silent or one.is_stuck(slowed_mps, (ROLLS * one.speed_mps) ** 2)
         )

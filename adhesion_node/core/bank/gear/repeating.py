@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A speed that lies: it repeats itself while the train slows, or shows a standstill that cannot be."""
+"""A speed that lies: it repeats itself while the train slows."""
 
 from __future__ import annotations
 
@@ -19,9 +19,6 @@ COARSEST_MPS = 0.5
 STEPS = 4.0
 """Steps of the sensor that a train has lost, beside the sensor's error, whose speed cannot be the same any more."""
 
-FASTEST_STOP_MPS2, HELD_MPS = 3.0, 3.0
-"""No train stops faster, by any brake; of a slower one receivers tell that it stands."""
-
 
 class Repeating(NamedTuple):
     """A speed as it was measured last, and by how much the train had slowed when it was first measured so."""
@@ -30,29 +27,15 @@ class Repeating(NamedTuple):
     slowed_mps: float = 0.0
     step_mps: float = COARSEST_MPS
     """Smallest step that the sensor has ever made: a coarse one repeats itself while it works."""
-    silent: bool = False
-    """Whether it shows a standstill that cannot be."""
 
-    def after(self, speed_mps: float, slowed_mps: float, fall_mps: float) -> Repeating:
-        """Note the next speed, and by how much the train has slowed under the brake in all.
-
-        Nothing stops it from a speed of more than `fall_mps` since the speed before.
-        """
-        if math.isnan(speed_mps):
+    def after(self, speed_mps: float, slowed_mps: float) -> Repeating:
+        """Note the next speed, NaN if it is not known, and by how much the train has slowed under the brake in all."""
+        if speed_mps == self.speed_mps or math.isnan(speed_mps):
             return self
-        silent = speed_mps == 0.0 and (self.silent or abs(self.speed_mps) > fall_mps)
-        if speed_mps == self.speed_mps:
-            return self._replace(silent=silent)
         step_mps = abs(speed_mps - self.speed_mps)
-        finer = step_mps < self.step_mps and not silent  # never true of NaN
-        return Repeating(speed_mps, slowed_mps, step_mps if finer else self.step_mps, silent)
-
-    def run_away_from(self) -> Repeating:
-        """Positions run away from what is believed: of a standstill they prove that it is none."""
-        return self._replace(silent=self.speed_mps == 0.0)
+        return Repeating(speed_mps, slowed_mps, step_mps if step_mps < self.step_mps else self.step_mps)  # not if NaN
 
     def is_stuck(self, slowed_mps: float, variance: float) -> bool:
-        """Whether the train cannot have this speed any more, which has such a variance."""
-        if self.speed_mps == 0.0:
-            return self.silent
-        return slowed_mps - self.slowed_mps > STEPS * self.step_mps + math.sqrt(variance)
+        """Whether the train cannot have this speed any more, which has such a variance; at 0 it stands."""
+        lost_mps = slowed_mps - self.slowed_mps
+        return self.speed_mps != 0.0 and lost_mps > STEPS * self.step_mps + math.sqrt(variance)

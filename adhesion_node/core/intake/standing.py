@@ -1,0 +1,53 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""A speed of 0 of a train that runs, as a receiver without satellites tells it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from .outcome import Event, Outcome
+from .plausibility import STRONGEST_MPS2, Pace
+from .samples import Measurement, SpeedSample
+
+S = 1_000_000_000
+
+HELD_MPS = 3.0
+"""Of a slower train receivers tell that it stands."""
+
+
+class Standing(NamedTuple):
+    """A speed as it was measured last, and whether it is of a standstill that cannot be."""
+
+    t_ns: int = 0
+    speed_mps: float = math.nan
+    silent: bool = False
+
+    def after(self, t_ns: int, speed_mps: float, slowest_mps: float, runs: bool = False) -> Standing:
+        """Note the next speed, NaN: not known; what was faster than `slowest_mps`, or `runs`, does not stand."""
+        if math.isnan(speed_mps):
+            return self
+        silent = speed_mps == 0.0 and (self.silent or runs or abs(self.speed_mps) > slowest_mps)
+        return Standing(t_ns, speed_mps, silent)
+
+
+def moving(measurement: Measurement, standing: Standing, pace: Pace) -> tuple[Measurement, Standing, tuple[Event, ...]]:
+    """Without the speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
+    newest_mps, kept = measurement.speed_mps, list[SpeedSample]()
+    alone = () if newest_mps is None else (SpeedSample(measurement.t_ns, newest_mps),)
+    for sample in measurement.speeds or alone:
+        slowest_mps = STRONGEST_MPS2 * abs(sample.t_ns - standing.t_ns) / S + HELD_MPS
+        standing = standing.after(*sample[:2], slowest_mps, pace.runs)
+        kept += [] if standing.silent else [sample]
+    if len(kept) == len(measurement.speeds or alone):
+        return measurement, standing, ()
+    speeds = tuple(kept) if measurement.speeds else ()
+    measurement = measurement._replace(speed_mps=None if standing.silent else newest_mps, speeds=speeds)
+    return measurement, standing, (Event(Outcome.STUCK, "speed x = 0"),)

@@ -1,0 +1,82 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Speeds of 0: of a train that stands they are right, of one that runs they are not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from adhesion_node.core import Measurement, Outcome, SpeedSample
+from adhesion_node.core.intake.plausibility import Pace
+from adhesion_node.core.intake.standing import Standing, moving
+
+S = 1_000_000_000
+
+
+def measured(t_s: float, *speeds_mps: float) -> Measurement:
+    """Speeds of the last tenth of a second, and the newest."""
+    t_ns, count = round(t_s * S), len(speeds_mps)
+    samples = tuple(
+        SpeedSample(t_ns - (count - 1 - index) * S // 100, speed, 0.01) for index, speed in enumerate(speeds_mps)
+    )
+    return Measurement(t_ns, 0.0, math.inf, speed_mps=speeds_mps[-1], speeds=samples)
+
+
+@pytest.mark.parametrize(("was_mps", "gap_s", "believed"), [(40.0, 0.1, False), (40.0, 14.0, True), (2.5, 0.1, True)])
+def test_a_train_stops_no_faster_than_brakes_allow(was_mps: float, gap_s: float, believed: bool) -> None:
+    _, standing, _ = moving(measured(1.0, was_mps), Standing(), Pace())
+    left, standing, told = moving(measured(1.0 + gap_s, 0.0), standing, Pace())
+    assert (left.speed_mps is not None) == bool(left.speeds) == (told == ()) == believed
+    assert standing.silent != believed
+    again, standing, _ = moving(measured(1.2 + gap_s, 0.0), standing, Pace())
+    assert (again.speed_mps is not None) == believed
+
+
+def test_it_is_believed_again_once_it_shows_a_speed() -> None:
+    _, standing, _ = moving(measured(1.0, 40.0), Standing(), Pace())
+    left, standing, told = moving(measured(1.1, 40.0, 0.0, 39.9), standing, Pace())
+    assert [sample.speed_mps for sample in left.speeds] == [40.0, 39.9]
+    assert left.speed_mps == 39.9
+    assert [event.outcome for event in told] == [Outcome.STUCK]
+    assert not standing.silent
+
+
+def test_a_speed_without_its_samples_is_judged_too() -> None:
+    standing = Standing()
+    for speed_mps, believed in ((40.0, 40.0), (0.0, None), (0.0, None), (38.0, 38.0)):
+        one = Measurement(standing.t_ns + S // 10, 0.0, math.inf, speed_mps=speed_mps)
+        left, standing, _ = moving(one, standing, Pace())
+        assert left.speed_mps == believed
+
+
+def paced(places_m: list[float]) -> Pace:
+    pace = Pace()
+    for index, place_m in enumerate(places_m):
+        pace = pace.after(Measurement(index * S // 2, place_m, 4.0))
+    return pace
+
+
+def test_positions_that_run_belie_a_standstill() -> None:
+    assert paced([20.0 * index for index in range(13)]).runs
+    assert not paced([2.0 * index for index in range(60)]).runs
+    left, standing, told = moving(measured(9.0, 0.0), Standing(), paced([20.0 * index for index in range(13)]))
+    assert left.speeds == ()
+    assert standing.silent
+    assert told
+
+
+def test_one_position_far_off_does_not() -> None:
+    places = np.zeros(41)
+    for index in range(5, 36):
+        off = places.copy()
+        off[index] = 500.0
+        assert not paced([*off]).runs
