@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A speed of 0 of a train that runs, as a receiver without satellites tells it."""
+"""A standstill of a train that runs, as a receiver without satellites tells it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .samples import Measurement, SpeedSample
 S = 1_000_000_000
 
 HELD_MPS = 3.0
-"""Of a slower train receivers tell that it stands."""
+"""What is slower is as good as standing: of such a train receivers tell that it stands."""
 
 
 class Standing(NamedTuple):
@@ -34,20 +34,21 @@ class Standing(NamedTuple):
         """Note the next speed, NaN: not known; what was faster than `slowest_mps`, or `runs`, does not stand."""
         if math.isnan(speed_mps):
             return self
-        silent = speed_mps == 0.0 and (self.silent or runs or abs(self.speed_mps) > slowest_mps)
+        silent = abs(speed_mps) < HELD_MPS and (self.silent or runs or abs(self.speed_mps) > slowest_mps)
         return Standing(t_ns, speed_mps, silent)
 
 
 def moving(measurement: Measurement, standing: Standing, pace: Pace) -> tuple[Measurement, Standing, tuple[Event, ...]]:
-    """Without the speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
-    newest_mps, kept = measurement.speed_mps, list[SpeedSample]()
+    """Without speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
+    newest_mps, kept, left_out = measurement.speed_mps, list[SpeedSample](), list[float]()
     alone = () if newest_mps is None else (SpeedSample(measurement.t_ns, newest_mps),)
     for sample in measurement.speeds or alone:
         slowest_mps = STRONGEST_MPS2 * abs(sample.t_ns - standing.t_ns) / S + HELD_MPS
         standing = standing.after(*sample[:2], slowest_mps, pace.runs)
         kept += [] if standing.silent else [sample]
-    if len(kept) == len(measurement.speeds or alone):
+        left_out += [sample.speed_mps] if standing.silent else []
+    if not left_out:
         return measurement, standing, ()
     speeds = tuple(kept) if measurement.speeds else ()
     measurement = measurement._replace(speed_mps=None if standing.silent else newest_mps, speeds=speeds)
-    return measurement, standing, (Event(Outcome.STUCK, "speed x = 0"),)
+    return measurement, standing, (Event(Outcome.STUCK, f"speed x = {left_out[-1]:.6g}"),)

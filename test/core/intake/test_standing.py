@@ -31,13 +31,16 @@ def measured(t_s: float, *speeds_mps: float) -> Measurement:
     return Measurement(t_ns, 0.0, math.inf, speed_mps=speeds_mps[-1], speeds=samples)
 
 
+@pytest.mark.parametrize("shown_mps", [0.0, 0.2, -0.1])
 @pytest.mark.parametrize(("was_mps", "gap_s", "believed"), [(40.0, 0.1, False), (40.0, 14.0, True), (2.5, 0.1, True)])
-def test_a_train_stops_no_faster_than_brakes_allow(was_mps: float, gap_s: float, believed: bool) -> None:
+def test_a_train_stops_no_faster_than_brakes_allow(
+    was_mps: float, gap_s: float, believed: bool, shown_mps: float
+) -> None:
     _, standing, _ = moving(measured(1.0, was_mps), Standing(), Pace())
-    left, standing, told = moving(measured(1.0 + gap_s, 0.0), standing, Pace())
+    left, standing, told = moving(measured(1.0 + gap_s, shown_mps), standing, Pace())
     assert (left.speed_mps is not None) == bool(left.speeds) == (told == ()) == believed
     assert standing.silent != believed
-    again, standing, _ = moving(measured(1.2 + gap_s, 0.0), standing, Pace())
+    again, standing, _ = moving(measured(1.2 + gap_s, shown_mps), standing, Pace())
     assert (again.speed_mps is not None) == believed
 
 
