@@ -41,7 +41,10 @@ class Outcome(Enum):
     STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
     TOO_OFTEN = "publish at most 200 messages a second: no more are used"
     INVALID = "not finite, no positive variance or physically impossible: dropped"
-    STUCK = "the same to the bit although the train must have moved on: check the sensor"
+    STUCK = (
+        "the same to the bit although the train must have moved on, or a standstill that no brake brings about: "
+        "check the sensor"
+    )
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
     SLIDING = (
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
