@@ -127,8 +127,17 @@ def run_tool(
     except OSError as error:
         remedy = REMEDIES.get(type(error), "")
         return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}", FAILED)
-    except KeyboardInterrupt:
+    except (KeyboardInterrupt, SystemError) as error:
+        if not _is_interrupt(error):
+            raise
         return _complain(parser, "interrupted", FAILED)
+
+
+def _is_interrupt(error: BaseException | None) -> bool:
+    """Whether it is a Ctrl-C; within a kernel it comes as the cause of a SystemError, or of several."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def complete(parser: argparse.ArgumentParser) -> None:

@@ -67,6 +67,13 @@ WRITTEN: list[tuple[str, Callable[[pd.DataFrame], str | bytes], str]] = [
     ("a mark", lambda rows: text(rows).encode("utf-8-sig"), "utf-8-sig"),
     ("a preamble", lambda rows: text(rows, head="sep=,\nTrain 4711, car 3\n\ntime,2024-11-21\n"), "header in line 5"),
     ("units", lambda rows: text(rows).replace("\n", "\ns,m,m/s,Pa\n", 1), "line 2 left out as units"),
+    (
+        "units with digits",
+        lambda rows: text(rows).replace("\n", "\ns,m,m/s^1,Pa\n", 1),
+        "line 2 left out as units",
+    ),
+    ("utf-16 without a mark", lambda rows: text(rows, ";").encode("utf-16-le"), "utf-16-le"),
+    ("delimiters at the ends", lambda rows: text(rows).replace("\n", ",\n").replace(",\n", "\n", 1), "delimiter ','"),
 ]
 
 
@@ -147,6 +154,76 @@ def test_a_clock_of_whole_seconds_is_told(importing: Import) -> None:
 def test_a_decimal_comma_that_is_the_delimiter_too_is_told(importing: Import) -> None:
     assert importing("time,speed\n1,5,20,5\n") == 2
     assert "or is it the decimal sign, too? Then export with ';'" in importing.errors[0]
+
+
+@pytest.mark.parametrize(
+    ("begins", "what"),
+    [
+        (b"PK\x03\x04\x14", "a zip file or a workbook"),
+        (b"\x1f\x8b\x08", "compressed"),
+        (b"\xd0\xcf\x11\xe0", "a workbook"),
+    ],
+)
+def test_what_is_no_text_is_told(importing: Import, begins: bytes, what: str) -> None:
+    assert importing(begins + text(ride()).encode()) == 2
+    assert importing.errors == [f"import_csv: FILE: is {what}, no text: unpack it, or save it as CSV"]
+
+
+@pytest.mark.parametrize("missing", ["NaN", "null", "n/a", "NA", "-"])
+def test_what_stands_for_no_value_is_none(importing: Import, missing: str) -> None:
+    """The rest of such a row is kept, as of a receiver that is slower than the rows."""
+    assert importing(text(ride().astype({"position": object}).assign(position=[1000.0, *[missing] * 9] * 60))) == 1
+    assert (importing.summary["written"], importing.summary["empty"]) == (600, {"position": 540})
+    assert len(importing.messages("brake_pressure")) == 600
+
+
+@pytest.mark.parametrize(
+    ("factor", "told"),
+    [
+        (1e-5, "is 3 Pa at most: is it in bar? --pressure-unit bar"),
+        (1e-6, "is it in mpa? --pressure-unit mpa"),
+        (1e-2, "is it in mbar? --pressure-unit mbar"),
+        (1.0 / 6894.757, "is it in psi? --pressure-unit psi; per cent of a full brake are not read: give its pressure"),
+        (100.3 / 3e5, "is it in kpa or psi? --pressure-unit kpa; per cent of a full brake are not read"),
+    ],
+)
+def test_pressures_in_another_unit_are_told(importing: Import, factor: float, told: str) -> None:
+    rows = ride()
+    assert importing(text(rows.assign(brake_pressure=(factor * rows.brake_pressure).round(6)))) == 1
+    assert [said for said in importing.summary["odd"] if told in said]
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.0 / 9.80665, -1.0])
+def test_an_accelerometer_that_tells_of_another_motion_is_told(importing: Import, factor: float) -> None:
+    """0.8 m/s^2 under the brake, with a bias of 0.05 m/s^2."""
+    rows = ride().assign(acceleration=lambda rows: factor * (-0.8 * (rows.time >= 20.0) - 0.05))
+    importing(text(rows))
+    told = [said for said in importing.summary["odd"] if said.startswith("the acceleration is")]
+    cure = {1.0: None, -1.0: "change its sign"}.get(factor, "another unit? --acceleration-unit g")
+    assert len(told) == (cure is not None)
+    assert cure is None or cure in told[0]
+
+
+@pytest.mark.parametrize(
+    ("per_mps", "read_as", "unit"),
+    [
+        (1 / 0.46, "radps", None),
+        (1 / 0.35, "radps", None),
+        (1.0, "radps", "mps"),
+        (8.0, "radps", ""),
+        (0.2, "radps", ""),
+        (1 / 0.46, "rpm", "radps"),
+    ],
+)
+def test_wheels_that_turn_otherwise_than_the_train_runs_are_told(
+    importing: Import, per_mps: float, read_as: str, unit: str | None
+) -> None:
+    """Of a wheel of 0.46 m, and of a smaller one; the last are of no unit. What slides tells nothing."""
+    rows = ride().assign(wheel_speed_1=lambda rows: per_mps * rows.speed * np.where(rows.time > 30.0, 0.5, 1.0))
+    importing(text(rows), "--wheel-radius", "0.46", "--wheel-unit", read_as)
+    told = [said for said in importing.summary["odd"] if said.startswith("the wheels turn")]
+    assert len(told) == (unit is not None)
+    assert not unit or told[0].endswith(f"another unit? --wheel-unit {unit}")
 
 
 def test_all_that_is_odd_is_told_at_once(importing: Import) -> None:

@@ -14,19 +14,15 @@ Means over a second are judged, so that neither noise nor the rate of the rows m
 import math
 from collections.abc import Iterator
 from itertools import chain, product
-from typing import NamedTuple
 
 import numpy as np
-import pandas as pd
 
 from ...core.physics.train import KMH, Array
 from ...run.results.seen import FASTEST_MPS
 from .format import PLACES, POSITION_UNITS, PRESSURE_UNITS, PRESSURES, SPEED_UNITS, TIME_UNITS, Format, option
-from .rows import Flags
+from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, SAME, Motion, motion_of
+from .sensors import felt, rolling
 from .whole import Log, moment
-
-LEAST_S, LEAST_M = 10.0, 100.0
-"""Of less time or less way nothing is said."""
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
@@ -37,52 +33,14 @@ SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
 MOVES_MPS, ONE_WAY = 2.0, 0.9
 """Where a train moves its positions rise, or fall, for so much of its way; slower ones are noise."""
 
-BRAKES_MPS2, RUNS_MPS2 = -0.3, -0.1
-"""A train that slows down more than by the first brakes; by less than the second, it runs or coasts."""
+SILENT, WEAKEST_PA, FULL_PA = 0.1, 15e3, (5e4, 1.5e6)
+"""Up to the first nothing is measured; no brake's greatest pressure is below the second; mostly it is in the third."""
 
-OVER_S = 5
-"""Seconds over which it is seen whether a train brakes, however noisy its positions."""
+PERCENT = 15.0, 120.0
+"""What the greatest demand may be that is told in per cent of the full one."""
 
 RELEASED_PIPE_PA = 2.5e5
 """No cylinder has so much while the train runs; the pipe has 5 bar then."""
-
-SAME = math.log(1.25)
-"""By so much positions and speed may differ, as where a wheel slides."""
-
-
-class Motion(NamedTuple):
-    """Means over the n seconds of a log; NaN where nothing was measured."""
-
-    place_m: Array
-    speed_mps: Array
-    pressure_pa: Array
-    """Of brake_pressure, gauge."""
-
-    @property
-    def course_mps(self) -> Array:
-        """By the positions, from the second before; shape (n,)."""
-        return np.diff(self.place_m, prepend=math.nan)
-
-    @property
-    def pace_mps(self) -> Array:
-        """The measured speed between a second and the one before; shape (n,)."""
-        before = np.append(math.nan, self.speed_mps[:-1])
-        return np.abs(before + self.speed_mps) / 2.0
-
-    @property
-    def both(self) -> Flags:
-        """Where positions and speed tell of the same seconds."""
-        return np.isfinite(self.course_mps + self.pace_mps)
-
-    @property
-    def is_compared(self) -> bool:
-        """Whether there is enough of both."""
-        return bool(self.both.sum() > LEAST_S and self.pace_mps[self.both].sum() > LEAST_M)
-
-    @property
-    def fastest_mps(self) -> Array:
-        """Speed, by the positions where none was measured."""
-        return np.abs(self.speed_mps if np.isfinite(self.speed_mps).any() else self.course_mps)
 
 
 def odd(log: Log) -> list[str]:
@@ -91,10 +49,10 @@ def odd(log: Log) -> list[str]:
     of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *_pressures(log)]
     if of_time or t_s[-1] < LEAST_S:
         return of_time + texts
-    motion = _motion(log, t_s)
+    motion = motion_of(log, t_s)
     of_way = [*(_speed_against_positions(motion, log.form) if motion.is_compared else _slow_or_falling(motion))]
     of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion)]
-    return [*texts, *of_way, *_pipe(motion), *_clock(log, t_s)]
+    return [*texts, *of_way, *_pipe(motion), *felt(motion, log.form), *rolling(motion, log.form), *_clock(log, t_s)]
 
 
 def _rows_too_far(t_s: Array, form: Format) -> Iterator[str]:
@@ -119,28 +77,17 @@ def _pressures(log: Log) -> Iterator[str]:
 
 
 def _other_unit(name: str, most_pa: float) -> Iterator[str]:
-    if 0.1 < most_pa < 3000.0:
-        unit = "bar" if most_pa < 15.0 else "kpa"
-        percent = "" if most_pa != 100.0 else "; per cent of a full brake are not read, give its pressure"
-        yield f"{name} is {most_pa:g} Pa at most: is it in {unit}? --pressure-unit {unit}{percent}"
+    if SILENT < most_pa < WEAKEST_PA:
+        units = [unit for unit, pa in PRESSURE_UNITS.items() if FULL_PA[0] < most_pa * pa <= FULL_PA[1]]
+        is_share = PERCENT[0] < most_pa < PERCENT[1]
+        cure = "; per cent of a full brake are not read: give its pressure" if is_share else ""
+        yield f"{name} is {most_pa:g} Pa at most: is it in {' or '.join(units)}? --pressure-unit {units[0]}{cure}"
 
 
 def _empty(log: Log) -> Iterator[str]:
     for name in (*chain.from_iterable(PLACES), *PRESSURES):
         if name in log.rows and log.rows[name].isna().all():
             yield f"no row has a {name}: name another column with {option(name)} COL"
-
-
-def _motion(log: Log, t_s: Array) -> Motion:
-    rows, second = log.rows, np.floor(t_s).astype(np.int64)
-    means = rows.groupby(second).mean().reindex(range(int(second[-1]) + 1)) if second[-1] < 10**6 else rows
-
-    def column(name: str, offset: float = 0.0) -> Array:
-        values = means[name] if name in means else pd.Series(math.nan, index=means.index)
-        read: Array = values.to_numpy(dtype=np.float64) - offset
-        return read
-
-    return Motion(column("position"), column("speed"), column("brake_pressure", log.form.ambient_pressure_pa))
 
 
 def _speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
@@ -214,8 +161,7 @@ def _too_fast(motion: Motion, form: Format) -> Iterator[str]:
 
 def _pipe(motion: Motion) -> Iterator[str]:
     """The pressure of a cylinder rises when the train brakes, that of the pipe falls."""
-    speed, late = motion.fastest_mps, np.full(OVER_S, math.nan)
-    slows = np.append(late, speed[OVER_S:] - speed[:-OVER_S]) / OVER_S
+    slows = motion.slows_mps2
     known = np.isfinite(motion.pressure_pa)
     braking, running = (
         motion.pressure_pa[known & (slows < BRAKES_MPS2)],

@@ -33,8 +33,8 @@ EXCEL_1970 = 25_569
 """The day of a spreadsheet on which the epoch begins."""
 
 POSITION_UNITS = {"m": 1.0, "km": 1e3}
-PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5}
-SPEED_UNITS = {"mps": 1.0, "kmh": KMH}
+PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757}
+SPEED_UNITS = {"mps": 1.0, "kmh": KMH, "mph": 0.44704}
 ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665}
 WHEEL_UNITS = ("radps", "rpm", "mps", "kmh")
 """The last two of the rim."""
@@ -139,15 +139,18 @@ class Format:
 
     def factors(self) -> Mapping[str, float]:
         """What one unit of a column is in SI, where it is not 1."""
-        radius = self.wheel_radius_m
-        wheel = {"radps": 1.0, "rpm": math.pi / 30.0, "mps": 1.0 / radius, "kmh": KMH / radius}
         return {
             "position": POSITION_UNITS[self.position_unit],
             **dict.fromkeys(PRESSURES, PRESSURE_UNITS[self.pressure_unit]),
             **dict.fromkeys(("speed", "speed_std"), SPEED_UNITS[self.speed_unit]),
             "acceleration": ACCELERATION_UNITS[self.acceleration_unit],
-            "wheel_speed": wheel[self.wheel_unit],
+            "wheel_speed": wheel_units(self.wheel_radius_m)[self.wheel_unit],
         }
+
+
+def wheel_units(radius_m: float) -> Mapping[str, float]:
+    """What one of each of `WHEEL_UNITS` is in rad/s."""
+    return dict(zip(WHEEL_UNITS, (1.0, math.pi / 30.0, 1.0 / radius_m, KMH / radius_m), strict=True))
 
 
 _NO_ZONE = (ZoneInfoNotFoundError, ValueError, OSError)

@@ -24,6 +24,16 @@ from .format import PLACES, Format
 
 DELIMITERS = (",", ";", "\t", "|")
 
+_BOOK = b"\xd0\xcf\x11\xe0"
+ARCHIVES = ((b"PK\x03\x04", "a zip file or a workbook"), (b"\x1f\x8b", "compressed"), (_BOOK, "a workbook"))
+"""How files begin that are no text, and what they are."""
+
+MISSING = frozenset(("nan", "null", "n/a", "na", "none", "-"))
+"""What stands in a cell without a value, however it is written."""
+
+UTF_16 = ((slice(1, 4, 2), "utf-16-le"), (slice(0, 4, 2), "utf-16-be"))
+"""Where the zeros stand in Latin letters of 16 bits."""
+
 MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 """Byte order marks and what they say of the encoding."""
 
@@ -34,6 +44,8 @@ BLOCK = 2_000
 """Lines that are read together."""
 
 NO_HEADER = "has no header line: begin with the names of the columns, their quotes closed; or is --skip-rows another?"
+
+_NUMBERED = re.compile("[+-]?[.,]?[0-9]")
 
 _WITH_COMMA, _WITH_POINT = (re.compile(rf"[+-]?[0-9]*{sign}[0-9]+([eE][+-]?[0-9]+)?") for sign in (",", "[.]"))
 
@@ -61,12 +73,12 @@ def understood(path: Path, form: Format) -> Format:
         raise ValueError(f"{path}: {NO_HEADER}")
     delimiter, header = _header(lines, form)
     rows = [cells for text in lines[header + 1 :] if (cells := _cells(text, delimiter))]
-    first = "".join(rows[0]) if len(rows) > 1 else ""
+    first = rows[0] if len(rows) > 1 else []
     return replace(
         form,
         delimiter=delimiter,
         skip_rows=header,
-        units_rows=int(any(map(str.isalpha, first)) and not any(map(str.isdigit, first))),
+        units_rows=int(any(map(str.isalpha, "".join(first))) and not any(map(_NUMBERED.match, first))),
         decimal=form.decimal or _decimal(cell for cells in rows for cell in cells),
     )
 
@@ -96,12 +108,15 @@ def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple
             why = f"close the quotes of this row ({error})"
             refused.append(Refusal(line, "broken_quotes", f"{path}:{line}: row = {_shown(text)}: {why}"))
             continue
+        if not any(cells[len(names) :]):  # a delimiter at the end of the line, none in the header
+            cells = cells[: len(names)]
         if len(cells) == len(names):
             at.append(line)
-            rows.append(cells)
+            rows.append(["" if cell.lower() in MISSING else cell for cell in cells])
         elif text.strip():
             too = ", or is it the decimal sign, too? Then export with ';'" if delimiter == "," else ""
-            why = f"{len(cells)} cells under {len(names)} columns: quote a cell that holds {delimiter!r}{too}"
+            cure = f"quote a cell that holds {delimiter!r}{too}" if len(cells) > len(names) else "is the row cut off?"
+            why = f"{len(cells)} cells under {len(names)} columns: {cure}"
             refused.append(Refusal(line, "cell_count", f"{path}:{line}: row = {_shown(text)}: {why}"))
     return Block(pd.DataFrame(rows, index=at, columns=list(names), dtype=object), refused)
 
@@ -130,12 +145,21 @@ def _lines(path: Path, form: Format) -> Iterator[str]:
 
 
 def _encoding(path: Path) -> str:
-    """That of the byte order mark; else UTF-8 where all of the file is, else that of Western Windows."""
+    """That of the byte order mark; else UTF-8 where all of the file is, else that of Western Windows.
+
+    Raises ValueError for what is no text.
+    """
     decoder = codecs.getincrementaldecoder("utf-8")()
     with path.open("rb") as file:
         head = file.read(4)
         for mark, encoding in MARKS:
             if head.startswith(mark):
+                return encoding
+        for begins, what in ARCHIVES:
+            if head.startswith(begins):
+                raise ValueError(f"{path}: is {what}, no text: unpack it, or save it as CSV")
+        for places, encoding in UTF_16:
+            if head[places] == b"\0\0":
                 return encoding
         try:
             decoder.decode(head)

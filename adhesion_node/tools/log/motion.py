@@ -1,0 +1,92 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""A log by the second: what its columns say of the train's motion, for checks of one against the other."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import pandas as pd
+
+from ...core.physics.train import Array
+from .rows import Flags
+from .whole import Log
+
+LEAST_S, LEAST_M = 10.0, 100.0
+"""Of less time or less way nothing is said."""
+
+BRAKES_MPS2, RUNS_MPS2 = -0.3, -0.1
+"""A train that slows down more than by the first brakes; by less than the second, it runs or coasts."""
+
+OVER_S = 5
+"""Seconds over which it is seen whether a train brakes, however noisy its positions."""
+
+SAME = math.log(1.25)
+"""By so much positions and speed may differ, as where a wheel slides."""
+
+
+class Motion(NamedTuple):
+    """Means over the n seconds of a log; NaN where nothing was measured."""
+
+    place_m: Array
+    speed_mps: Array
+    pressure_pa: Array
+    """Of brake_pressure, gauge."""
+    felt_mps2: Array
+    """Of the accelerometer."""
+    rolls_radps: Array
+    """Of the middle axle, without sign."""
+
+    @property
+    def course_mps(self) -> Array:
+        """By the positions, from the second before; shape (n,)."""
+        return np.diff(self.place_m, prepend=math.nan)
+
+    @property
+    def pace_mps(self) -> Array:
+        """The measured speed between a second and the one before; shape (n,)."""
+        before = np.append(math.nan, self.speed_mps[:-1])
+        return np.abs(before + self.speed_mps) / 2.0
+
+    @property
+    def both(self) -> Flags:
+        """Where positions and speed tell of the same seconds."""
+        return np.isfinite(self.course_mps + self.pace_mps)
+
+    @property
+    def is_compared(self) -> bool:
+        """Whether there is enough of both."""
+        return bool(self.both.sum() > LEAST_S and self.pace_mps[self.both].sum() > LEAST_M)
+
+    @property
+    def fastest_mps(self) -> Array:
+        """Speed, by the positions where none was measured."""
+        return np.abs(self.speed_mps if np.isfinite(self.speed_mps).any() else self.course_mps)
+
+    @property
+    def slows_mps2(self) -> Array:
+        """Change of the speed over the last `OVER_S` s, per second, shape (n,)."""
+        speed = self.fastest_mps
+        return np.append(np.full(min(OVER_S, speed.size), math.nan), speed[OVER_S:] - speed[:-OVER_S]) / OVER_S
+
+
+def motion_of(log: Log, t_s: Array) -> Motion:
+    """Means of the rows by the whole seconds of their times."""
+    rows, second = log.rows, np.floor(t_s).astype(np.int64)
+    means = rows.groupby(second).mean().reindex(range(int(second[-1]) + 1)) if second[-1] < 10**6 else rows
+
+    def column(name: str, offset: float = 0.0) -> Array:
+        values = means[name] if name in means else pd.Series(math.nan, index=means.index)
+        read: Array = values.to_numpy(dtype=np.float64) - offset
+        return read
+
+    axles = [name for name in log.columns.axles if name in means]
+    rolls = means[axles].abs().median(axis=1).to_numpy(dtype=np.float64) if axles else column("")
+    pressure = column("brake_pressure", log.form.ambient_pressure_pa)
+    return Motion(column("position"), column("speed"), pressure, column("acceleration"), rolls)

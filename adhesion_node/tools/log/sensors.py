@@ -1,0 +1,58 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Whether accelerometer and wheels tell of the same motion as positions and speed; if not, in which unit they do."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from .format import ACCELERATION_UNITS, Format, wheel_units
+from .motion import BRAKES_MPS2, LEAST_S, OVER_S, RUNS_MPS2, SAME, Motion
+
+RUNS_MPS = 5.0
+"""Slower wheels tell nothing of their radius."""
+
+RADII_M = 0.2, 0.65
+"""Of the wheels of trains."""
+
+
+def felt(motion: Motion, form: Format) -> Iterator[str]:
+    """What an accelerometer feels is the change of the speed, over seconds in which a train brakes."""
+    felt_mps2 = np.convolve(motion.felt_mps2, np.full(OVER_S, 1.0 / OVER_S))[: motion.felt_mps2.size]
+    slows = motion.slows_mps2
+    braking = np.isfinite(felt_mps2) & (slows < BRAKES_MPS2)
+    if braking.sum() < OVER_S:
+        return
+    ratio = float((felt_mps2 * slows)[braking].sum() / np.square(slows[braking]).sum())
+    told = f"the acceleration is {ratio:.2g} times what the speed changes by while the train brakes"
+    for unit, mps2 in ACCELERATION_UNITS.items():
+        other = ACCELERATION_UNITS[form.acceleration_unit] / mps2
+        if unit != form.acceleration_unit and abs(math.log(max(abs(ratio), 1e-9) / other)) < 2.0 * SAME:
+            yield f"{told}: another unit? --acceleration-unit {unit}"
+            return
+    if ratio < -0.5:
+        yield f"{told}: change its sign, it counts forward along the run"
+
+
+def rolling(motion: Motion, form: Format) -> Iterator[str]:
+    """Wheels that roll turn as often as the way asks for."""
+    course = np.abs(motion.course_mps) if np.isfinite(motion.course_mps).any() else motion.fastest_mps
+    known = np.isfinite(course + motion.rolls_radps) & (course > RUNS_MPS) & ~(motion.slows_mps2 < RUNS_MPS2)
+    if known.sum() < LEAST_S:
+        return
+    radius_m = float(np.median(course[known] / np.maximum(motion.rolls_radps[known], 1e-6)))
+    if RADII_M[0] <= radius_m <= RADII_M[1]:
+        return
+    units = wheel_units(form.wheel_radius_m)
+    for unit, radps in units.items():
+        if abs(math.log(radius_m * units[form.wheel_unit] / radps / form.wheel_radius_m)) < SAME:
+            yield f"the wheels turn as if their radius were {radius_m:.2g} m: another unit? --wheel-unit {unit}"
+            return
+    yield f"the wheels turn as if their radius were {radius_m:.2g} m: are --wheel-unit and --wheel-radius right?"

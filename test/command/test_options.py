@@ -1,0 +1,40 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""How a command line tool ends."""
+
+import argparse
+
+import pytest
+
+from adhesion_node.command.options import FAILED, run_tool
+
+
+def interrupted_in_a_kernel(_: argparse.Namespace) -> int:
+    """What a compiled kernel makes of a Ctrl-C, called by another one."""
+    try:
+        try:
+            raise KeyboardInterrupt
+        except KeyboardInterrupt as error:
+            raise SystemError("branched returned a result with an exception set") from error
+    except SystemError as error:
+        raise SystemError("pruned returned a result with an exception set") from error
+
+
+def test_a_ctrl_c_within_a_kernel_is_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_tool(argparse.ArgumentParser("tool"), interrupted_in_a_kernel, []) == FAILED
+    assert capsys.readouterr().err == "tool: interrupted\n"
+
+
+def broken(_: argparse.Namespace) -> int:
+    raise SystemError("an error in Python itself")
+
+
+def test_another_error_of_the_system_is_not_hidden() -> None:
+    with pytest.raises(SystemError, match="in Python itself"):
+        run_tool(argparse.ArgumentParser("tool"), broken, [])
