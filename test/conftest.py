@@ -70,6 +70,7 @@ def pytest_configure(config: pytest.Config) -> None:
     set_hypothesis_home_dir(os.path.join(home, "hypothesis"))
     os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(ROOT), os.environ.get("PYTHONPATH")]))
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)  # each of some hundred programs would translate the packages anew
     if config.getoption("dist", None) == "load":  # what tests of one file share is made once, and none ends long before
         config.option.dist = "worksteal"
 
