@@ -9,6 +9,7 @@
 """The quality of service that the publishers of a topic offered: rosbag2 keeps it, so that a player offers the same."""
 
 from collections.abc import Iterable
+from functools import lru_cache
 from typing import Any
 
 from rosbags.interfaces import Qos, QosDurability, QosHistory, QosLiveliness, QosReliability, QosTime
@@ -35,6 +36,7 @@ LATCHED = RELIABLE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)
 """Who subscribes late gets the last message."""
 
 
+@lru_cache  # most channels say the same, and a file says it of each at least twice
 def parse(text: str) -> tuple[Qos, ...]:
     """Read the list that a channel of an MCAP file holds: by names since version 9, by numbers before.
 
