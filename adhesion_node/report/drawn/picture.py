@@ -91,6 +91,7 @@ def draw(
     foot.legend(patches, names, loc="center", ncols=len(names), title=meaning, handler_map={tuple: HandlerTuple(None)})
     for path in paths:
         figure.savefig(path, dpi=110)
+        figure.set_layout_engine("none")  # the places are found once for all files
 
 
 def _draw_curves(axis: Any, run: Run) -> None:
