@@ -78,8 +78,15 @@ def lines(run: dict[str, Any], title: str) -> dict[str, dict[str, Any]]:
     return {line["label"]: line for line in chart["lines"]}
 
 
-def test_a_recording_with_results_is_shown_as_recorded(tmp_path: Path) -> None:
-    result, page = make(tmp_path, str(record(tmp_path / "mine")))
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any], Parser]:
+    """The report of a recording with results: its folder, the JSON and the page."""
+    folder = tmp_path_factory.mktemp("shown")
+    return folder / "report", *make(folder, str(record(folder / "mine")))
+
+
+def test_a_recording_with_results_is_shown_as_recorded(shown: tuple[Path, dict[str, Any], Parser]) -> None:
+    folder, result, page = shown
     (run,) = page.data["runs"]
     assert (run["name"], run["source"], result["runs"][0]["source"]) == ("mine", "as recorded", "as recorded")
     adhesion, speed, forces = (lines(run, title) for title in ("Adhesion", "Speed", "Forces"))
@@ -92,8 +99,8 @@ def test_a_recording_with_results_is_shown_as_recorded(tmp_path: Path) -> None:
     assert forces["adhesion F, identified"]["y"][5:] == pytest.approx([0.09 * 536 * 9.8] * 15, abs=0.05)
     assert len(run["moments"]) == 20
     for name in ("mine.png", "mine.pdf"):
-        assert (tmp_path / "report" / name).stat().st_size > 10_000
-    assert (tmp_path / "report" / "mine.pdf").read_bytes().startswith(b"%PDF")
+        assert (folder / name).stat().st_size > 10_000
+    assert (folder / "mine.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: Path) -> None:
@@ -145,10 +152,10 @@ def test_results_are_estimated_anew_on_demand(tmp_path: Path, capsys: pytest.Cap
     assert "topic position: not in the recording" in capsys.readouterr().err
 
 
-def test_the_page_fetches_nothing(tmp_path: Path) -> None:
-    _, page = make(tmp_path, str(record(tmp_path / "mine")))
+def test_the_page_fetches_nothing(shown: tuple[Path, dict[str, Any], Parser]) -> None:
+    folder, _, page = shown
     assert page.fetched == []
-    html = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    html = (folder / "report.html").read_text(encoding="utf-8")
     assert set(re.findall(r"https?://[^\s\"']+", html)) == {"http://www.w3.org/2000/svg"}
     assert "default-src 'none'" in html
     assert not re.search(r"@import|url\((?!#)", html)
