@@ -111,7 +111,7 @@ def test_a_recording_is_replayed_whole() -> None:
 
 
 def test_a_recording_is_reported_with_its_results_and_without() -> None:
-    results, sensors = recording.report(0.02, 10.0, seed=1)
+    results, sensors = recording.report(0.01, 10.0, seed=1)
     assert (results["holds"], sensors["holds"]) == ("results", "sensors")
     assert results["beside_estimating"] == results["cpu_seconds"] > 0.0
     assert 0.0 < sensors["beside_estimating"] < sensors["cpu_seconds"]
