@@ -14,6 +14,8 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..belief.rail import Rail
 from ..intake.samples import MAX_VARIANCE_M2
 from .branching import branched, opened, pruned, unlikely_kept
@@ -38,6 +40,9 @@ PAST_NS = 4 * S
 DOUBTED, PASSED, CERTAIN, CHANGED = 0.1, 0.5, 0.99, 0.2
 """Probabilities from which a change of the rail is in doubt, up to which it still goes on, and from which it is told,
 and by how much it must have changed."""
+
+SURELY = 2.0
+"""Standard deviations of what is used now by which it must have changed, or not, to be told so: else it is waited."""
 
 SETTLING_S = 6.0
 """For so long, and the brake's build-up, behind its opening a braking tells no change."""
@@ -103,8 +108,8 @@ def _led_again(memory: Memory) -> Memory:
 def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
     """Tell a change of the rail once it is certain and passed, and the adhesion used another than before any doubt.
 
-    That axles roll, where they slid before, is one, too. While the brake may still build up, or the border of the last
-    one lies under the train, none is told.
+    While that may be or not be, by `SURELY`, it is waited. That axles roll, where they slid before, is one, too. While
+    the brake may still build up, or the border of the last one lies under the train, none is told.
     """
     now_s, held, seen = memory.t_ns / S, HELD if memory.slid else PASSING, memory.seen + 1
     changed, passing, sliding = weighing.changing(
@@ -116,13 +121,18 @@ def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:
     steady, slid = (bank, memory.braking), sliding > SLID
     if settling or changed < DOUBTED:
         return memory._replace(bank=bank, seen=seen, steady=steady, slid=slid)
-    before = 0.0 if memory.steady is None else _used(config, *memory.steady)
-    changes = memory.changes + (abs(_used(config, *steady) - before) > CHANGED * before)
+    (used, std), before = _used(config, *steady), 0.0 if memory.steady is None else _used(config, *memory.steady)[0]
+    by, least = abs(used - before), CHANGED * before
+    if SURELY * std > max(by, least):
+        return memory._replace(bank=bank, seen=seen)
+    changes = memory.changes + (by > least)
     passed_s = now_s + config.train.length_m / max(bank.mean_of(SPEED), config.slowest_mps)
     return memory._replace(bank=bank, seen=seen, told_s=passed_s, changes=changes, steady=steady, slid=slid)
 
 
-def _used(config: Config, bank: Bank, braking: Braking) -> float:
-    """Adhesion that is used but for roughness and swing, over all hypotheses."""
-    used = use(config, bank, braking, resistance(config, bank))
-    return float(bank.weight @ (used.value - used.slope[:, ROUGH] * bank.mean[:, ROUGH]))
+def _used(config: Config, bank: Bank, braking: Braking) -> tuple[float, float]:
+    """Mean and standard deviation of the adhesion that is used, but for roughness and swing, over all hypotheses."""
+    used, weight = use(config, bank, braking, resistance(config, bank)), bank.weight
+    smooth = used.value - used.slope[:, ROUGH] * bank.mean[:, ROUGH]
+    mean = float(weight @ smooth)
+    return mean, math.sqrt(float(weight @ (np.square(smooth - mean) + np.square(used.std(config, bank)))))

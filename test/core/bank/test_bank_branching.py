@@ -254,3 +254,19 @@ def test_a_swing_is_no_change_of_the_rail(mu: float, changes: int) -> None:
         behind, 60 * S, 1.0, brake, braking=braking, seen=100, told_s=30.0, steady=(before, braking), slid=True
     )
     assert judged(CONFIG, memory, lambda: Rail(0.05, 0.04, 0.02)).changes == changes
+
+
+@pytest.mark.parametrize(("mu", "std", "changes", "waits"), [(0.03, 0.002, 1, False), (0.03, 0.012, 0, True)])
+def test_a_change_is_told_once_it_is_beyond_what_is_not_known(mu: float, std: float, changes: int, waits: bool) -> None:
+    """From 0.05, certain: to 0.03 +- 0.002, and to 0.03 +- 0.012, which a receiver's wandering shows as well."""
+    kind = [each.name for each in KINDS].index("smooth")
+    sure = bank_of([kind], spread=0.0).with_fresh(ROUGH, 0.0, 0.0)
+    sure = sure._replace(covariance=1e-6 * sure.covariance, changed_s=np.array([50.0]))
+    before, behind = sure.with_fresh(MU, 0.05, 1e-4), sure.with_fresh(MU, mu, std)
+    brake, braking = BrakeSeen(demanded_pa=FULL_PA), Braking(FULL)
+    memory = Memory(
+        behind, 60 * S, 1.0, brake, braking=braking, seen=100, told_s=30.0, steady=(before, braking), slid=True
+    )
+    after = judged(CONFIG, memory, lambda: Rail(0.05, 0.04, 0.02))
+    assert after.changes == changes
+    assert (after.steady is memory.steady) is waits, "what was before is kept for when it is certain"

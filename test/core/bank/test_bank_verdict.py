@@ -288,6 +288,18 @@ def test_a_brake_is_said_to_limit_only_where_it_gives_what_is_demanded() -> None
     assert limits(HELD, 0.5) is Regime.COASTING
 
 
+def test_whether_a_brake_weaker_than_a_film_limits_wheels_alone_can_tell() -> None:
+    """A freight train, whose whole brake asks for 0.024: leaves may give as much, and what they give looks the same."""
+    for mass, regime in ((1.0, Regime.BRAKE_LIMITED), (2.3, Regime.BRAKE_LIMITED), (2.5, Regime.COASTING)):
+        config = replace(CONFIG, train=replace(CRH3, mass_kg=mass * CRH3.mass_kg))
+        bank = bank_of([HELD], spread=0.0)
+        bank.mean[:, BRAKE] = 1.0
+        memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(FULL / mass), 3)
+        assert found(config, memory, NOTHING, NOTHING).regime is regime
+        rolls = memory._replace(wheels=WheelsSeen((1.0,) * 4, 0, 0.03, (None,) * 4, (10 * S,) * 4))
+        assert found(config, rolls, NOTHING, NOTHING).regime is Regime.BRAKE_LIMITED
+
+
 @pytest.mark.parametrize("seed", range(12))
 def test_bounds_stand_in_their_order_whatever_the_bank(seed: int) -> None:
     rng = np.random.default_rng(seed)

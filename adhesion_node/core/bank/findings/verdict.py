@@ -23,6 +23,7 @@ from ..following import SPEED_ERROR_MPS
 from ..gear.wheels import BRAKE_BELOW
 from ..kernels import mixture, weighing
 from ..labels import kinds
+from ..labels.laws import SLIPPERY
 from ..layout import SPEED, Bank
 from ..memory import Memory, S
 from ..motion import Braking, Use, model_of, resistance, use
@@ -186,7 +187,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     if slides > CLAIMED and (part < 1.0 - 2.0 * error or memory.braking.told > 0.0):
         return Regime.ADHESION_LIMITED
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * _whole_brake(config)
-    if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not dumps:
+    weak = _whole_brake(config) <= SLIPPERY  # a film may give what such a brake asks for, to within its error
+    if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not (dumps or weak):
         return Regime.BRAKE_LIMITED
     return Regime.COASTING
 
