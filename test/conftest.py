@@ -14,6 +14,7 @@ start, whichever copy is installed beside them.
 
 from __future__ import annotations
 
+import fcntl
 import gc
 import os
 import shutil
@@ -124,6 +125,21 @@ def _claim_domain(behind: int = 0) -> int:
 def _give_domain_back() -> None:
     while _domain_locks:
         _domain_locks.pop().close()
+
+
+def made_once(temporary: pytest.TempPathFactory, name: str, make: Callable[[Path], object]) -> Path:
+    """Return a folder that one worker fills by `make` for all: the tests of a file may be divided among them."""
+    base = temporary.getbasetemp()
+    base = base.parent if "PYTEST_XDIST_WORKER" in os.environ else base
+    folder = base / name
+    with (base / f"{name}.made").open("a+", encoding="utf-8") as made:
+        fcntl.flock(made, fcntl.LOCK_EX)  # until it is closed
+        if not made.seek(0, os.SEEK_END):
+            shutil.rmtree(folder, ignore_errors=True)  # of a worker that failed
+            folder.mkdir()
+            make(folder)
+            made.write("made")
+    return folder
 
 
 @pytest.fixture

@@ -10,10 +10,11 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
-from conftest import ROOT
+from conftest import ROOT, made_once
 from forked import Ended, ended
 from test_package import NODES, console_scripts
 
@@ -39,12 +40,17 @@ CALLS = [
 ]
 
 
+def call_all(folder: Path) -> None:
+    found = ended([(call, {}) for call in CALLS], folder / "calls", f"{BLOCKED}\n{SHARED}")
+    assert not (folder / "calls" / "there").exists()
+    (folder / "ended.json").write_text(json.dumps(found), encoding="utf-8")
+
+
 @pytest.fixture(scope="module")
 def without_ros(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Ended]:
     """How each of `CALLS` ends, by its words."""
-    folder = tmp_path_factory.mktemp("calls") / "calls"
-    found = ended([(call, {}) for call in CALLS], folder, f"{BLOCKED}\n{SHARED}")
-    assert not (folder / "there").exists()
+    file = made_once(tmp_path_factory, "without_ros", call_all) / "ended.json"
+    found = [Ended(*each) for each in json.loads(file.read_text(encoding="utf-8"))]
     return {" ".join(call): each for call, each in zip(CALLS, found, strict=True)}
 
 

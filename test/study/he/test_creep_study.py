@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import made_once
 from tasks import computed_here
 
 from adhesion_node.command import engines
@@ -27,13 +28,16 @@ from adhesion_node.study.he import study as creep
 KEYS = {"experiment", "peak_true", "peak_estimated_mean", "peak_estimated_std", "used_fraction"}
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[Any, dict[str, Any]]]:
-    """The study with 20 seeds, once: the folder of its figures and its rows by experiment."""
-    folder = tmp_path_factory.mktemp("study")
+def make_study(folder: Path) -> None:
     files = ["--json", str(folder / "creep.json"), "--figures", str(folder / "figures")]
     with computed_here():
         assert main(["creep", *files, "--cache", str(folder / "cache")]) == 0
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[Any, dict[str, Any]]]:
+    """The study with 20 seeds, once: the folder of its figures and its rows by experiment."""
+    folder = made_once(tmp_path_factory, "creep_study", make_study)
     rows = json.loads((folder / "creep.json").read_text(encoding="utf-8"))
     return folder / "figures", {row["experiment"]: row for row in rows}
 

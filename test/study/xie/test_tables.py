@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from conftest import made_once
 from tasks import computed_here
 
 from adhesion_node.command.running import save
@@ -73,10 +74,8 @@ def test_the_tables_stand_at_the_papers_settings() -> None:
     assert (config.particles, config.iterations, config.position_noise_m) == (20, 50, 0.02)
 
 
-@pytest.fixture(scope="module")
-def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, Any]], Path]:
-    """`study tables --runs 1` with short stand-ins for the paper's method in the cache, and its figures."""
-    folder = tmp_path_factory.mktemp("study")
+def make_study(folder: Path) -> None:
+    """`study tables --runs 1` with short stand-ins for the paper's method in the cache."""
     (folder / "cache").mkdir()
     for scenario in TABLES:
         wanted = trials(scenario, METHODS["particle_em"], 1)
@@ -87,7 +86,13 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, Any]
     options = ["--runs", "1", "--json", file, "--cache", cache, "--figures", figures, "--format", "svg"]
     with computed_here():
         assert main(["tables", *options]) == 0
-    return json.loads(Path(file).read_text()), folder / "figures"
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[dict[str, Any]], Path]:
+    """The rows of the study and its figures."""
+    folder = made_once(tmp_path_factory, "study_tables", make_study)
+    return json.loads((folder / "t.json").read_text()), folder / "figures"
 
 
 def test_json_of_the_tables(study: tuple[list[dict[str, Any]], Path]) -> None:
