@@ -24,7 +24,7 @@ from ..gear.wheels import BRAKE_BELOW
 from ..kernels import mixture, weighing
 from ..labels import kinds
 from ..labels.laws import SLIPPERY
-from ..layout import SPEED, Bank
+from ..layout import BRAKE, SPEED, Bank
 from ..memory import Memory, S
 from ..motion import Braking, Use, model_of, resistance, use
 from ..seeing import ROLLED
@@ -134,7 +134,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         regime = _regime(config, memory, slides, rail.mu)
         rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
         least = least if _is_partial(config, memory.braking) and rolls else 0.0
-    floor, is_lost = _for_the_fastest(config, bank, min(least, _whole_brake(config)))
+    floor, is_lost = _for_the_fastest(config, bank, min(least, _surely(config, bank)))
     lower = max(rail.lower, least)
     ahead = _for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
     rail = rail._replace(lower=min(lower, rail.mu))
@@ -144,6 +144,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
 
 def _unfelt(config: Config, bank: Bank, lower: float) -> Ahead:
     """A bound of any speed: who brakes by it leaves room for the error of the speed, but not for one that is lost."""
+    lower = min(lower, _surely(config, bank))
     floor, is_lost = _for_the_fastest(config, bank, lower)
     return floor if is_lost else constant(lower)
 
@@ -169,6 +170,13 @@ def _speeds_ahead(bank: Bank) -> Array:
 
 def _is_partial(config: Config, braking: Braking) -> bool:
     return braking.applied < PARTIAL * _whole_brake(config)
+
+
+def _surely(config: Config, bank: Bank) -> float:
+    """What the whole brake surely asks for, by what is known of its force; of a strong one what its papers say."""
+    std, missed = np.sqrt(bank.covariance[:, BRAKE, BRAKE]), KNOWN_SHARE * (1.0 - config.curve_confidence)
+    factor = float(quantiles(bank.weight, bank.mean[:, BRAKE], std, (missed,)).item())
+    return min(max(factor, 0.0), 1.0) * _whole_brake(config)
 
 
 @once
@@ -216,7 +224,7 @@ def counted_on(
     if not (partial or braking.told):
         weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
         weight /= weight.sum()
-    borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, _whole_brake(config))) if partial else (1.0, 0.0)
+    borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, _surely(config, bank))) if partial else (1.0, 0.0)
     asked = mixture.Asked(float(missed), borne, float(least))
     low = mixture.counted_on(_ahead_of(config), bank, weight, used, speeds, asked)
     return Ahead(tuple(speeds.tolist()), tuple(low.tolist()))
