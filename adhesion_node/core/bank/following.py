@@ -115,7 +115,8 @@ def followed(
         bank = memory.bank_at(config, until_ns) if ahead is None or memory is not start else ahead
         since_ns, before_ns, braking = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
-        brake = memory.brake.after(config, now, demand_pa)
+        share = memory.wheels.share(until_ns)
+        brake = memory.brake.after(config, now, demand_pa, share is not None and share < BRAKE_BELOW)
         memory = memory._replace(
             bank=bank,
             t_ns=until_ns,

@@ -61,6 +61,32 @@ def cycling(period_s: float, least_pa: float) -> Callable[[float], float]:
     return pressure
 
 
+def released(time: float) -> float:
+    """From 4 s on eased to 150 kPa within 0.8 s, as a valve does."""
+    return applying(time) if time < 4.0 else 150e3 + (FULL_PA - 150e3) * 0.1 ** ((time - 4.0) / 0.8)
+
+
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+@pytest.mark.parametrize("told_by", ["wheels", "demand"])
+def test_a_release_that_wheels_or_the_demand_tell_is_no_dump(config: Config, told_by: str) -> None:
+    brake = BrakeSeen()
+    for sample in sampled(released, 12.0):
+        time = (sample.t_ns - S) / S
+        demand_pa = (FULL_PA if time < 4.0 else 150e3) if told_by == "demand" else None
+        brake = brake.after(config, [sample], demand_pa, rolls=told_by == "wheels")
+        assert not brake.has_slid(sample.t_ns)
+        assert time < 7.0 or brake.applied_pa == pytest.approx(150e3, rel=0.02)
+
+
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+def test_a_dump_that_wheels_see_later_than_the_pressure_is_one(config: Config) -> None:
+    samples, brake = sampled(cycling(1.0, 40e3), 5.0), BrakeSeen()
+    for sample in samples:
+        brake = brake.after(config, [sample], None, rolls=sample.t_ns - S < 4.4 * S)
+    assert brake.has_slid(samples[-1].t_ns)
+    assert brake.demanded_pa > 0.9 * FULL_PA
+
+
 @pytest.mark.parametrize("every_ms", [50, 100, 200])
 @pytest.mark.parametrize("least_pa", [0.0, 40e3, 150e3])
 @pytest.mark.parametrize("period_s", [1.0, 2.0])

@@ -55,14 +55,19 @@ class BrakeSeen(NamedTuple):
     full_ns: int = 0
     """When the cylinder was last not empty."""
 
-    def after(self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None) -> BrakeSeen:
-        """Take in pressures, by their stamps, and what the handle or valve demands, if that is known."""
+    def after(
+        self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None, rolls: bool = False
+    ) -> BrakeSeen:
+        """Take in pressures, by their stamps, and what the handle or valve demands, if that is known.
+
+        Where wheels are seen and every axle `rolls`, or as the demand falls, what falls was released.
+        """
         brake = self
         for sample in pressures:
-            brake = brake._pressed(config, sample, demand_pa)
+            brake = brake._pressed(config, sample, demand_pa, rolls)
         return brake
 
-    def _pressed(self, config: Config, sample: PressureSample, demand_pa: float | None) -> BrakeSeen:
+    def _pressed(self, config: Config, sample: PressureSample, demand_pa: float | None, rolls: bool) -> BrakeSeen:
         t_ns, pressure = sample
         first, end = bisect_left(self.recent, (t_ns - RISING_NS,)), bisect_left(self.recent, (t_ns,))
         recent = (*self.recent[first:end], sample)
@@ -74,10 +79,12 @@ class BrakeSeen(NamedTuple):
             applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
             return BrakeSeen(recent, pressure, applied, None, full_ns)
         peak = max([each.pressure_pa for each in recent[bisect_left(recent, (t_ns - DUMP_NS,)) :]])
-        dumps = peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak)
-        if self.dumped_ns is not None:
+        dumped_ns, dumps = None if rolls else self.dumped_ns, peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak)
+        if demand_pa is not None:
+            dumps = dumps and pressure < (1.0 - DUMP_SHARE) * demand_pa
+        if dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
-        dumped_ns = t_ns if dumps else self.dumped_ns
+        dumped_ns = t_ns if dumps and not rolls else dumped_ns
         dumping = dumped_ns is not None and t_ns - dumped_ns < HELD_NS and t_ns - full_ns < EMPTY_NS
         demanded = demand_pa
         if demanded is None:
