@@ -205,8 +205,8 @@ class Config:
         0.005, "Drift of the true over the expected brake force, standard deviation over 1 s", "", 0.0, 1.0
     )
     ahead_std: float = _unsure(
-        0.045,
-        "By how much the adhesion, or the brake's force, may differ over the way ahead in the mean, relative",
+        0.08,
+        "By how much the adhesion, or the brake's force, comes to differ over 2 km of the way ahead, relative",
         "",
         0.0,
         1.0,

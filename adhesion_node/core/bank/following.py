@@ -116,7 +116,7 @@ def followed(
         since_ns, before_ns, braking = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
         share = memory.wheels.share(until_ns)
-        brake = memory.brake.after(config, now, demand_pa, share is not None and share < BRAKE_BELOW)
+        brake = memory.brake.after(config, now, demand_pa, None if share is None else share < BRAKE_BELOW)
         memory = memory._replace(
             bank=bank,
             t_ns=until_ns,

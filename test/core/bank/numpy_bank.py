@@ -301,7 +301,8 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
         + np.minimum(kinds.DRIFT[bank.kind], verdict.DRIFT_AHEAD) ** 2 * time_s / 3.0
     )
     variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added
-    variance += np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
+    ahead = verdict.NEAR**2 + _mean_ahead(way_m, verdict.AHEAD_M)[1]
+    variance += ahead * np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
     speeds = float(bank.weight @ speed) * verdict.SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
     rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** verdict.COUNTED_RISE

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -178,6 +179,39 @@ def test_a_release_is_seen(kind: Config, slid: bool, seconds: float) -> None:
         if sample.t_ns - S > round((8.0 + seconds) * 1000) * MS + 1600 * MS:
             assert brake.demanded_pa == 0.0, (sample.t_ns - S) / S
             assert brake.dumped_ns is None or sample.t_ns - brake.dumped_ns > 1500 * MS
+
+
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+@pytest.mark.parametrize("within_s", [2.1, 3.0])
+@pytest.mark.parametrize("left", [0.0, 0.3])
+def test_a_release_as_quick_as_the_build_up_is_heard_as_one_by_the_pressure_alone(
+    config: Config, within_s: float, left: float
+) -> None:
+    """A driver who pumps the brake: 90 % of what is let go of goes within the build-up time, and comes again."""
+
+    def pressure(time: float) -> float:
+        since = math.fmod(time, 8.0)
+        if since < 4.0:
+            return FULL_PA * max(left, min(since / 2.0, 1.0))
+        return FULL_PA * (left + (1.0 - left) * 0.1 ** ((since - 4.0) / within_s))
+
+    for brake in seen(config, sampled(pressure, 24.0, noise_pa=500.0)):
+        assert brake.dumped_ns is None
+    steep = replace(config, brake_build_up_s=20.0)  # of a brake that does all this slowly it is none
+    assert any(brake.dumped_ns for brake in seen(steep, sampled(pressure, 24.0)))
+
+
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+def test_what_falls_no_quicker_than_a_release_but_comes_back_at_once_is_a_dump(config: Config) -> None:
+    """The pulses of a valve: a quarter within 0.4 s, and back within 0.4 s."""
+
+    def pressure(time: float) -> float:
+        return applying(time) if time < 4.0 else FULL_PA * (1.0 - 0.25 * math.sin(math.pi * (time - 4.0) / 0.8) ** 2)
+
+    samples = sampled(pressure, 8.0)
+    for sample, brake in zip(samples, seen(config, samples), strict=True):
+        time = (sample.t_ns - S) / S
+        assert brake.has_slid(sample.t_ns) == (time > 4.0) or 4.0 < time < 5.0
 
 
 def test_a_slow_release_is_followed_at_once() -> None:

@@ -42,6 +42,10 @@ DRIFT_AHEAD = 0.02
 LEAST_AHEAD = 0.002
 """Adhesion less grade ahead counts as no less."""
 
+AHEAD_M, NEAR = 2000.0, 0.375
+"""Over which way the adhesion, or the brake's force, comes to differ by `ahead_std`, and what share of that the mean of
+the shortest way may differ by."""
+
 COUNTED_RISE = 0.5
 """Power of what a law promises for lower speeds that is counted on: slide protection uses less of it."""
 
@@ -241,6 +245,8 @@ def _ahead_of(config: Config) -> mixture.Ahead:
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),
         error=float(config.ahead_std),
+        error_m=AHEAD_M,
+        near=NEAR,
         laws=model_of(config).laws,
         rise=COUNTED_RISE,
         least=LEAST_AHEAD,

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 S = 1_000_000_000
 
 DUMP_PA, DUMP_SHARE, DUMP_NS = 60e3, 0.15, S // 2
-"""A fall of the pressure by so much, and by so much of what it was, within this time: no driver releases so fast."""
+"""A fall of the pressure by so much, and by so much of what it was, within this time: no driver releases so fast unless
+his brake lets go as fast as it builds up."""
 
 HELD_NS = 4 * S
 """So long behind a dump the brake counts as demanded as before."""
@@ -56,18 +57,20 @@ class BrakeSeen(NamedTuple):
     """When the cylinder was last not empty."""
 
     def after(
-        self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None, rolls: bool = False
+        self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None, rolls: bool | None = None
     ) -> BrakeSeen:
         """Take in pressures, by their stamps, and what the handle or valve demands, if that is known.
 
-        Where wheels are seen and every axle `rolls`, or as the demand falls, what falls was released.
+        Where every axle `rolls`, or as the demand falls, what falls was released; None: no wheels are seen.
         """
         brake = self
         for sample in pressures:
             brake = brake._pressed(config, sample, demand_pa, rolls)
         return brake
 
-    def _pressed(self, config: Config, sample: PressureSample, demand_pa: float | None, rolls: bool) -> BrakeSeen:
+    def _pressed(
+        self, config: Config, sample: PressureSample, demand_pa: float | None, rolls: bool | None
+    ) -> BrakeSeen:
         t_ns, pressure = sample
         first, end = bisect_left(self.recent, (t_ns - RISING_NS,)), bisect_left(self.recent, (t_ns,))
         recent = (*self.recent[first:end], sample)
@@ -78,10 +81,13 @@ class BrakeSeen(NamedTuple):
             most = before_s * config.train.full_pressure_pa / config.brake_build_up_s
             applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
             return BrakeSeen(recent, pressure, applied, None, full_ns)
-        peak = max([each.pressure_pa for each in recent[bisect_left(recent, (t_ns - DUMP_NS,)) :]])
-        dumped_ns, dumps = None if rolls else self.dumped_ns, peak - pressure >= max(DUMP_PA, DUMP_SHARE * peak)
-        if demand_pa is not None:
-            dumps = dumps and pressure < (1.0 - DUMP_SHARE) * demand_pa
+        lately = recent[bisect_left(recent, (t_ns - DUMP_NS,)) :]
+        peak = max([each.pressure_pa for each in lately])
+        dumped_ns = None if rolls else self.dumped_ns
+        if demand_pa is not None or rolls is not None:
+            dumps = _falls(lately) and (demand_pa is None or pressure < (1.0 - DUMP_SHARE) * demand_pa)
+        else:  # nothing tells it from a release but that it is quicker, or comes back
+            dumps = _falls(lately, config.brake_build_up_s) or _swings(recent, max(DUMP_PA, DUMP_SHARE * peak))
         if dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
         dumped_ns = t_ns if dumps and not rolls else dumped_ns
@@ -111,6 +117,16 @@ class BrakeSeen(NamedTuple):
         if self.dumped_ns is not None or not self.recent:
             return False  # slide protection makes pressures rise, too
         return self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa
+
+
+def _falls(lately: Sequence[PressureSample], released_s: float = math.inf) -> bool:
+    """Whether the newest pressure is that of a dump, where a driver releases no more than 90 % within so long."""
+    now_ns, pressure_pa = lately[-1]
+    return any(
+        before_pa - pressure_pa
+        >= max(DUMP_PA, DUMP_SHARE * before_pa, before_pa * (1.0 - 0.1 ** ((now_ns - t_ns) / S / released_s)))
+        for t_ns, before_pa in lately
+    )
 
 
 def _swings(recent: Sequence[PressureSample], least_pa: float) -> bool:

@@ -44,7 +44,11 @@ class Ahead(NamedTuple):
     grade_error: float
     resistance_error: float
     error: float
-    """Of what is foreseen, relative."""
+    """By how much the way ahead comes to differ, relative."""
+    error_m: float
+    """Over which way it does."""
+    near: float
+    """What share of that the mean of any way may differ by, however short it is."""
     laws: Array
     """floor, gain, offset, scale of each law, shape (L, 4)."""
     rise: float
@@ -168,7 +172,8 @@ def counted_on(
         by[SPEED] -= per_mps
         c = rule.resistance
         basic = c[0] + x[SPEED] * (c[1] + c[2] * x[SPEED])
-        variance = (rule.grade_error**2 + (rule.resistance_error * basic) ** 2) * grade_added + (rule.error * u) ** 2
+        variance = (rule.grade_error**2 + (rule.resistance_error * basic) ** 2) * grade_added
+        variance += (rule.error * u) ** 2 * (rule.near**2 + _mean_ahead(way_m / rule.error_m)[1])
         for i in range(SIZE):
             if by[i] != 0.0:
                 for j in range(SIZE):
