@@ -193,7 +193,7 @@ def test_a_release_as_quick_as_the_build_up_is_heard_as_one_by_the_pressure_alon
         since = math.fmod(time, 8.0)
         if since < 4.0:
             return FULL_PA * max(left, min(since / 2.0, 1.0))
-        return FULL_PA * (left + (1.0 - left) * 0.1 ** ((since - 4.0) / within_s))
+        return FULL_PA * (left + (1.0 - left) * math.pow(0.1, (since - 4.0) / within_s))
 
     for brake in seen(config, sampled(pressure, 24.0, noise_pa=500.0)):
         assert brake.dumped_ns is None
