@@ -9,23 +9,19 @@
 """Tables of what was measured, out of doc/evidence/*.json; under each the command that made it."""
 
 import json
-import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
+from forms import COLUMNS, Row, cell, listed
 from interface_tables import table
+from real_tables import real
 
-Row = Mapping[str, Any]
 Crossed = tuple[tuple[str, str], str]
 """Line, column and cell."""
 
 FOLDER = Path(__file__).resolve().parent / "evidence"
 MADE_BY: dict[str, dict[str, str]] = json.loads((FOLDER / "made_by.json").read_text(encoding="utf-8"))
 """Command, seeds and settings by the name of the file they made."""
-COLUMNS: dict[str, Sequence[tuple[str, str]]] = json.loads(Path(__file__).with_suffix(".json").read_text("utf-8"))
-"""Heads of the tables, and the forms into which the numbers of a row are filled."""
-
 SCENARIOS = {"tunnel_entry": "flat → wet tunnel, 300 → 100 km/h", "tunnel_exit": "tunnel → wet line, 250 → 50 km/h"}
 METHODS = {
     "bank": "bank",
@@ -38,28 +34,6 @@ PAPERS = {"particle_em": "paper", "ekf_naive": "paper's EKF"}
 
 ERROR = "{mean_relative_error_percent:.2f} ± {std_relative_error_percent:.2f}"
 PEAK = "{peak_estimated_mean:.3f} ± {peak_estimated_std:.3f}"
-GOALS = {
-    "error_percent": ("error against used: positions, aided, leaves, patches", "≤ 4, 2, 4, 6 %", "{by:+.1f} %", 1.0),
-    "coverage95": ("95 % interval covers it", "92–99 %", "{by:+.1f} %", 100.0),
-    "bound_kept": ("bound ≤ used", "≥ 95 %", "{by:+.1f} %", 100.0),
-    "safe": ("safe curve long enough", "≥ 99 %", "{by:+.1f} %", 100.0),
-    "shortfall_percent": ("worst shortfall", "≤ 5 %", "{by:+.1f} %", 1.0),
-    "excess_percent": ("mean excess, sound sensors", "≤ 20 %", "{by:+.0f} %", 1.0),
-    "regime_wrong": ("regime wrong", "≤ 5 %", "{by:+.1f} %", 100.0),
-    "false_changes_per_hour": ("false changes", "≤ 1/h", "{by:+.1f}/h", 1.0),
-    "speed_beyond_3_std": ("published speed beyond 3 σ", "≤ 2 %", "{by:+.1f} %", 100.0),
-    "silence_s": ("longest silence", "≤ 1 s", "{by:+.1f} s", 1.0),
-    "found_s": ("patch found", "≤ 1 s; positions alone 1.2 × soonest", "{by:+.1f} s", 1.0),
-}
-"""Figures of `study real` that have a goal: what it says, the goal, the form of a distance and its factor."""
-
-BOUGHT = ("error, %", "bound", "safe")
-BESIDE = (*BOUGHT, "covers", "short, %", "false/h")
-"""Columns of the real train's table that stand in the shorter ones."""
-
-RAILS = ("wet", "leaves")
-"""Scenarios in which sets of sensors are compared."""
-
 EARLIER = {"SBI": "sbi_m", "W": "warning_m", "P": "permitted_m", "I": "indication_m"}
 
 
@@ -68,7 +42,7 @@ def parts() -> dict[str, str]:
     files = {name: json.loads((FOLDER / f"{name}.json").read_text(encoding="utf-8")) for name in MADE_BY}
     robust, creep = files["robust"], files["creep"]
     rails, faults = ([row for row in robust if row["table"] == name] for name in ("rails", "faults"))
-    listed: dict[str, tuple[str, Iterable[Row]]] = {
+    lists: dict[str, tuple[str, Iterable[Row]]] = {
         "rails": ("robust", map(_found, rails)),
         "faults measured": ("robust", map(_lost, faults)),
         "bound": ("bound", map(_at_speeds, files["bound"])),
@@ -78,17 +52,8 @@ def parts() -> dict[str, str]:
         "creep experiments": ("creep", (_switched(row) for row in creep if "samples" in row)),
         "creep withheld": ("creep", map(_wrong, creep[0]["withholding"])),
     }
-    made = {name: (file, _listed(COLUMNS[name], rows)) for name, (file, rows) in listed.items()}
-    for name in ("real", "real_before"):
-        rows = ({"error_least_percent": None, "excess_least_percent": None, **row} for row in files[name])
-        made[name] = name, _listed(COLUMNS["real"], rows, _marked)
-    made["real soonest"] = "real", _listed(COLUMNS["real soonest"], _soonest(files["real"]))
-    made["real goals"] = "real", table(("figure", "goal", "met", "missed most by"), _reached(files["real"]))
-    made["real before and now"] = "real", table(("case", *BESIDE), _beside(files["real_before"], files["real"]))
-    made["real sensors"] = (
-        "real",
-        table(("sensors", *(f"{rail}: {head}" for rail in RAILS for head in BOUGHT)), _bought(files["real"])),
-    )
+    made = {name: (file, listed(COLUMNS[name], rows)) for name, (file, rows) in lists.items()}
+    made |= {name: ("real_before" if name == "real_before" else "real", shown) for name, shown in real(files).items()}
     made["creep noise"] = "creep", _crossed("noise on λ", _noise(creep))
     made["creep coverage"] = "creep", _crossed("", _coverage(creep[0]["coverage95"]))
     for name, scenario in SCENARIOS.items():
@@ -104,51 +69,6 @@ def _source(file: str) -> str:
     return f"*`{of['command']}`; {of['seeds']}; {of['settings']} (`doc/evidence/{file}.json`).*"
 
 
-def _cell(form: str, row: Row) -> str:
-    """Fill in a form; a dash where a number is missing: None takes no format."""
-    try:
-        return re.sub(r"(?<=\d)%", " %", form.format_map(row))
-    except TypeError:
-        return "–"
-
-
-def _listed(columns: Sequence[tuple[str, str]], rows: Iterable[Row], cell: Callable[[str, Row], str] = _cell) -> str:
-    return table([head for head, _ in columns], ([cell(form, row) for _, form in columns] for row in rows))
-
-
-def _marked(form: str, row: Row) -> str:
-    """Fill in a form, bold where its figure misses its goal."""
-    shown = _cell(form, row)
-    return f"**{shown}**" if any(f"{{{figure}:" in form for figure in row["missed"]) else shown
-
-
-def _reached(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
-    """By goal: in how many of the cases that have a figure it is met, and where it is missed most."""
-    for figure, (says, goal, form, factor) in GOALS.items():
-        judged = [row for row in rows if row[figure] is not None and figure in row["goals"]]
-        worst = max(judged, key=lambda row: abs(row["missed"].get(figure, 0.0)), default=None)
-        by = 0.0 if worst is None else worst["missed"].get(figure, 0.0)
-        met = sum(figure not in row["missed"] for row in judged)
-        where = f"{form.format(by=factor * by)} ({worst['case']})" if worst is not None and by else "–"
-        yield says, goal, f"{met} of {len(judged)}", where
-
-
-def _beside(before: Sequence[Row], now: Sequence[Row]) -> Iterator[Sequence[str]]:
-    """The cases that were measured before, too: each figure as it was and as it is."""
-    was, forms = {row["case"]: row for row in before}, dict(COLUMNS["real"])
-    for row in (row for row in now if row["case"] in was):
-        cells = ((_marked(forms[head], was[row["case"]]), _marked(forms[head], row)) for head in BESIDE)
-        yield row["case"], *(f"{then} → {after}" for then, after in cells)
-
-
-def _bought(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
-    """Sets of sensors on the rails on which they are compared."""
-    at, forms = {(row["scenario"], row["fitted"]): row for row in rows}, dict(COLUMNS["real"])
-    for fitted in dict.fromkeys(fitted for rail, fitted in at if rail in RAILS):
-        own = [at.get((rail, fitted)) for rail in RAILS]
-        yield f"`{fitted}`", *("–" if row is None else _marked(forms[head], row) for row in own for head in BOUGHT)
-
-
 def _crossed(corner: str, found: Iterable[Crossed]) -> str:
     """Return a table of cells by line and column, both in the order of their first cell."""
     cells = dict(found)
@@ -161,24 +81,17 @@ def _accuracy(rows: Sequence[Row]) -> Iterator[Crossed]:
     for row in rows:
         start, method = row["start_mu"], row["method"]
         line = "**mean**" if start == "mean" else f"{start:g}"
-        yield (line, METHODS[method]), _cell(ERROR, row)
+        yield (line, METHODS[method]), cell(ERROR, row)
         if method in PAPERS:
-            yield (line, PAPERS[method]), _cell("{paper_mean_relative_error_percent:.2f}", row)
+            yield (line, PAPERS[method]), cell("{paper_mean_relative_error_percent:.2f}", row)
         if start == "mean":
             converged = "never" if row["converged_kmh"] is None else f"{row['converged_kmh']:.0f} km/h"
             for name, form in COLUMNS["of all starts"]:
-                yield (name, METHODS[method]), _cell(form, {**row, "converged": converged})
-
-
-def _soonest(rows: Sequence[Row]) -> Iterator[Row]:
-    """By what the bound allows: the sets of sensors that it allows that to."""
-    sets = {row["fitted"]: row["found_soonest_s"] for row in rows}
-    for bound_s in sorted({bound_s for bound_s in sets.values() if bound_s is not None}):
-        yield {"bound_s": bound_s, "sets": ", ".join(f"`{name}`" for name, own in sets.items() if own == bound_s)}
+                yield (name, METHODS[method]), cell(form, {**row, "converged": converged})
 
 
 def _found(row: Row) -> Row:
-    times = {name: [_cell("{s:.1f}", {"s": s}) for s in row[f"{name}_s"] or ()] for name in ("found", "again")}
+    times = {name: [cell("{s:.1f}", {"s": s}) for s in row[f"{name}_s"] or ()] for name in ("found", "again")}
     return {**row, **{name: " and ".join(shown) or "–" for name, shown in times.items()}}
 
 
@@ -202,7 +115,7 @@ def _saved(rows: Sequence[Row]) -> Iterator[Row]:
 
 def _limits(rows: Sequence[Row]) -> Iterator[Crossed]:
     """Where the emergency brake intervenes by speed and case; how much earlier the other limits of the truth are."""
-    yield from (((f"{row['speed_kmh']:g}", row["case"]), _cell("{ebi_m:.0f}", row)) for row in rows)
+    yield from (((f"{row['speed_kmh']:g}", row["case"]), cell("{ebi_m:.0f}", row)) for row in rows)
     for row in (row for row in rows if row["case"] == rows[0]["case"]):
         for head, name in EARLIER.items():
             yield (f"{row['speed_kmh']:g}", head), f"{row[name] - row['ebi_m']:.0f}"
@@ -217,12 +130,12 @@ def _noise(rows: Sequence[Row]) -> Iterator[Crossed]:
     for row in rows:
         level, _, way = str(row["experiment"]).partition(", ")
         if level.startswith("creep noise"):
-            yield (level.split()[-1], way), _cell(PEAK, row)
+            yield (level.split()[-1], way), cell(PEAK, row)
 
 
 def _coverage(shares: Mapping[str, float]) -> Iterator[Crossed]:
     for (name, _, noise), share in ((key.partition(", "), share) for key, share in shares.items()):
-        yield (f"`{name}`", noise), _cell("{share:.1%}", {"share": share})
+        yield (f"`{name}`", noise), cell("{share:.1%}", {"share": share})
 
 
 def _wrong(row: Row) -> Row:

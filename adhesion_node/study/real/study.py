@@ -26,7 +26,7 @@ from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cases import Case, chosen
 from .goals import goals, missed, soonest
-from .possible.least import least
+from .possible.least import Least, least
 from .score import score
 from .trials import found
 
@@ -91,8 +91,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing, return a row per case, draw the figures."""
-    cases = found(chosen(options.only, options.set), options.first_seed, options.runs, running(options))
-    table = [row(case, score(of_case)) for case, of_case in cases.items()]
+    wanted, where = chosen(options.only, options.set), running(options)
+    cases, bounds = found(wanted, options.first_seed, options.runs, where), least(wanted, where)
+    table = [row(case, score(of_case), bounds[case]) for case, of_case in cases.items()]
     for entry in table:
         entry["first_seed"] = options.first_seed
     if (figures := figures_of(options)) is not None:
@@ -104,14 +105,13 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     return table, "\n".join([*lines(COLUMNS, table), "", *_missed_lines(table)])
 
 
-def row(case: Case, scored: Mapping[str, Any]) -> dict[str, Any]:
+def row(case: Case, scored: Mapping[str, Any], at_best: Least) -> dict[str, Any]:
     """The row of a case: its figures, its goals, and by how much they are missed."""
     ranges = {
         goal.figure: [limit if np.isfinite(limit) else None for limit in (goal.least, goal.most)]
         for goal in goals(case)
     }
     named: dict[str, Any] = {"case": case.name, "scenario": case.scenario, "fitted": case.fitted}
-    at_best = least(case)
     bound = {
         "found_soonest_s": soonest(case),
         "error_least_percent": at_best.error_percent,

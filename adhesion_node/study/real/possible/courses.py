@@ -21,16 +21,17 @@ from sim_node.real.plant.journey import PERIOD_S, Journey
 from ....core.physics.train import Array
 from ....run.results.score import CONVERGED_AFTER_MPS
 from ..cases import Case
-from ..score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M
+from ..score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M, UNSEEN_S
 from ..trials import SLOWEST_MPS
 from ..truth import Border, borders, slid
+from .unknown import STEP_S, Unknown, unknown_of
 
 SEEDS = (5000, 5001, 5002, 5003)
 """Of the journeys."""
 
-STEP_S, BEFORE_S, TIMES, TIMES_OF_PATCHES = 0.2, 10.0, 4, 24
-"""Of the grid; what is used of the time before the full brake; how many moments of a journey are asked about the
-present, more where the rail changes."""
+BEFORE_S, TIMES, TIMES_OF_PATCHES = 10.0, 4, 24
+"""What is used of the time before the full brake; how many moments of a journey are asked about the present, more where
+the rail changes."""
 
 
 class Course(NamedTuple):
@@ -46,38 +47,53 @@ class Course(NamedTuple):
     swings: Array
     """1 where adhesion limits and swings, else 0."""
     factors: Array
-    """By how much each unknown factor of the adhesion applies, shape (N, F)."""
+    """1 where a factor of the adhesion of its own applies, shape (N, F): one from border to border of the rail."""
+    braked: Array
+    """1 from the first demand on: before it traction makes up for what slows the train down."""
     asked: Sequence[int]
     """Steps at which the error is asked for."""
     counted: Sequence[int]
     """Steps at which the excess counts."""
+    since_s: float
+    """The rail has changed for the last time; -inf: it does not change."""
+    axles: int
+    unknown: Unknown
+    """What is not known of rail, train and track."""
 
 
 @lru_cache(maxsize=2)  # the cases of a scenario follow each other
 def courses_of(scenario: str, built_after_s: float) -> tuple[Course, ...]:
     """Journeys of a scenario, whose brake has built up everywhere after so long, on their mean."""
     journeys = (drive.journey for drive in Case(scenario, "gnss").drives(SEEDS))
-    return on_the_mean([_course(journey, built_after_s) for journey in journeys])
+    courses = on_the_mean([_course(journey, built_after_s) for journey in journeys])
+    return tuple(course._replace(unknown=unknown_of(course, scenario)) for course in courses)
 
 
 def _course(journey: Journey, built_after_s: float) -> Course:
     stride = round(STEP_S / PERIOD_S)
     start = int(np.searchsorted(journey.time_s, journey.full_from_s - BEFORE_S))
     count = (journey.time_s.size - start) // stride
-    time_s, speed, used, sliding = (
+    demanded = np.maximum.accumulate(journey.demanded_pa > 0.0)
+    time_s, speed, used, sliding, braked = (
         column[start : start + count * stride].reshape(count, stride).mean(axis=1)
-        for column in (journey.time_s - journey.full_from_s, journey.speed_mps, journey.used, slid(journey))
+        for column in (journey.time_s - journey.full_from_s, journey.speed_mps, journey.used, slid(journey), demanded)
     )
     at_full = float(np.interp(0.0, time_s, speed))
     limits = (time_s >= built_after_s) & (sliding >= LIMITS_FROM) & (speed > SLOWEST_MPS)
     late = np.flatnonzero(limits & (speed < at_full - min(CONVERGED_AFTER_MPS, AFTER_SHARE * at_full)))
-    factors = _factors(time_s + journey.full_from_s, borders(journey), limits)
+    between = borders(journey)
+    factors = _factors(time_s + journey.full_from_s, between, limits)
     times = TIMES if factors.shape[1] == 1 else TIMES_OF_PATCHES
     asked = late[np.linspace(0, late.size - 1, times).round().astype(int)].tolist() if late.size else []
-    counted = (time_s >= built_after_s) & (remaining_m(speed) > LONG_WAY_M) & (speed > SLOWEST_MPS)
+    changed_s = max((border.end_s for border in between), default=-np.inf) - journey.full_from_s
+    counted = (time_s >= max(built_after_s, changed_s + UNSEEN_S)) & (remaining_m(speed) > LONG_WAY_M)
     swings = limits.astype(np.float64)
     factors = factors if factors.shape[1] > 1 else (time_s > 0.0).astype(np.float64)[:, np.newaxis]
-    return Course(time_s, speed, used, used, swings, factors, asked, np.flatnonzero(counted).tolist())
+    some = asked, np.flatnonzero(counted & (speed > SLOWEST_MPS)).tolist()
+    known = Unknown(*np.zeros((3, count, 0)))
+    return Course(
+        time_s, speed, used, used, swings, factors, braked, *some, changed_s, journey.wheel_radps.shape[1], known
+    )
 
 
 def _factors(time_s: Array, between: Sequence[Border], limits: NDArray[np.bool_]) -> Array:

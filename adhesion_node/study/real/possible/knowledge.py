@@ -10,8 +10,9 @@
 
     var(m | y) = w'K w - k'S^-1 k,   k = H K w,   S = H K H' + U U' + R
 
-with the covariance K of the adhesion used u; its mean m = w'u, over 1 s about now (half of which still lies ahead) or
-over the way ahead; what the sensors show, H u; what else is unknown, U; and their errors, R.
+with the covariance K of the adhesion used u and of all else that slows the train down; a mean m of it by its weights w,
+over 1 s about now (half of which still lies ahead) or over the way ahead; what the sensors show, H; what else is
+unknown, U; and their errors, R.
 """
 
 from collections.abc import Sequence
@@ -23,49 +24,71 @@ from sim_node.real.sensors.fitted import Mounted
 from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss, GnssFix
 from sim_node.real.sensors.speed import Speedometer
+from sim_node.real.sensors.wheels import Wheels
 
 from ....core.physics.train import GRAVITY, Array
-from ..trials import SLOWEST_MPS
-from .courses import STEP_S, Course
+from .courses import Course
+from .unknown import STEP_S
 
-FACTOR_STD, FAR_M, FAST_MPS = 0.5, 1e3, 50.0
-"""What is known beforehand of a factor, and of place and speed."""
-
-POWER_STD = 0.06
-"""What is known beforehand of the power of the speed: published laws fall with the powers 0 (a film of leaves) to 0.2
-(`wet`), what a train with slide protection uses with 0 to 0.06 in the plant."""
+FAR_M, FAST_MPS = 1e3, 50.0
+"""What is known beforehand of place and speed."""
 
 PITCH_STD = 0.029
 """Of what an accelerometer feels too much as the nose dips under the brake, over what slows the train down: 0.3 to 1
 degree at 1.2 m/s^2, which no train's papers tell."""
 
-HONEST = (Gnss, GnssFix, Speedometer, Imu)
-"""Sensors whose errors have a law; a wheel's are those of its slides."""
+WORN_STD = 0.0087
+"""Of the wheels' mean radius over that of new ones: up to 3 % are worn off."""
+
+HONEST = (Gnss, GnssFix, Speedometer, Imu, Wheels)
+"""Sensors whose errors have a law. Of wheels it is told by how much each slides: what they err by else is noise."""
 
 
 def std_of(course: Course, now: int, mean: Array, mounted: Sequence[Mounted], autocovariance: Array) -> float:
     """Standard deviation of a mean of the adhesion used, by its weights, given all that was measured until `now`."""
+    return _std_of(course, now, mean, course.unknown.used, mounted, autocovariance)
+
+
+def std_of_slowing(course: Course, now: int, mean: Array, mounted: Sequence[Mounted], autocovariance: Array) -> float:
+    """The same of all that slows the train down, over g: adhesion, resistance, grade and rotating mass."""
+    return _std_of(course, now, mean, course.unknown.slowing, mounted, autocovariance, course.unknown.grade)
+
+
+def _std_of(
+    course: Course,
+    now: int,
+    mean: Array,
+    wanted: Array,
+    mounted: Sequence[Mounted],
+    autocovariance: Array,
+    graded: Array | None = None,
+) -> float:
     end = mean.size
-    smooth, factors = course.smooth[:end], course.factors[:end]
-    power = factors.sum(axis=1) * np.log(np.maximum(course.speed_mps[:end], SLOWEST_MPS) / course.speed_mps[now])
-    spread = FACTOR_STD**2 * factors @ factors.T + POWER_STD**2 * np.outer(power, power)
-    spread = spread * np.outer(smooth, smooth) + _swinging(course, end, autocovariance)
-    shown, errors = _shown(course, now, end, mounted)
-    cross = shown @ spread @ mean
-    told = cross @ cho_solve(cho_factor(shown @ spread @ shown.T + errors), cross)
-    return float(np.sqrt(max(mean @ spread @ mean - told, 0.0)))
+    slowing, grade = course.unknown.slowing[:end], course.unknown.grade[:end]
+    swings, own = _swinging(course, end, autocovariance), wanted[:end].T @ mean
+    shown, climbed, errors = _shown(course, now, end, mounted)
+    cross = shown @ (swings @ mean + slowing @ own)
+    variance = mean @ swings @ mean + own @ own
+    if graded is not None:
+        climbs = grade.T @ mean
+        cross, variance = cross + climbed @ climbs, variance + climbs @ climbs
+    total = shown @ (swings + slowing @ slowing.T) @ shown.T + climbed @ climbed.T + errors
+    return float(np.sqrt(max(variance - cross @ cho_solve(cho_factor(total), cross), 0.0)))
 
 
 def apart(course: Course, now: int, others: Array, mounted: Sequence[Mounted], autocovariance: Array) -> Array:
     """How far from what the sensors have shown until `now` lies what they would have, had each of `others` been used.
 
-    In standard deviations of the best test between both, shape (R,); `others`, shape (R, N), at each step.
+    In standard deviations of the best test between both, shape (R,); `others`, shape (R, N), at each step. Of the train
+    and the track no more is told than else.
     """
     end = now + 1
-    shown, errors = _shown(course, now, end, mounted)
-    total = cho_factor(shown @ _swinging(course, end, autocovariance) @ shown.T + errors)
+    shown, climbed, errors = _shown(course, now, end, mounted)
+    of_train = (course.unknown.slowing - course.unknown.used)[:end]
+    moved = shown @ of_train
+    total = shown @ _swinging(course, end, autocovariance) @ shown.T + moved @ moved.T + climbed @ climbed.T + errors
     off = shown @ (course.used - others)[:, :end].T
-    return np.asarray(np.sqrt(np.sum(off * cho_solve(total, off), axis=0)))
+    return np.asarray(np.sqrt(np.sum(off * cho_solve(cho_factor(total), off), axis=0)))
 
 
 def _swinging(course: Course, end: int, autocovariance: Array) -> Array:
@@ -74,31 +97,42 @@ def _swinging(course: Course, end: int, autocovariance: Array) -> Array:
     return np.asarray(np.outer(swings, swings) * toeplitz(autocovariance[:end]))
 
 
-def _shown(course: Course, now: int, end: int, mounted: Sequence[Mounted]) -> tuple[Array, Array]:
-    """What all sensors show until now of the adhesion used; the covariance of what else moves them."""
-    seen = [_seen(one, course, now, end) for one in mounted if isinstance(one.sensor, HONEST)]
+def _shown(course: Course, now: int, end: int, mounted: Sequence[Mounted]) -> tuple[Array, Array, Array]:
+    """What all sensors show until now of what slows the train down, and of the grade; the covariance of their errors.
+
+    Place and speed at first count among these.
+    """
+    sensors = [one for one in mounted if isinstance(one.sensor, HONEST)]
+    seen = [_seen(one, course, now, end) for one in sensors]
+    grade = course.unknown.grade[:end]
+    climbed = [part[0] @ grade * (not isinstance(one.sensor, Imu)) for part, one in zip(seen, sensors, strict=True)]
     moved = np.vstack([part[1] for part in seen])
-    return np.vstack([part[0] for part in seen]), moved @ moved.T + block_diag(*(part[2] for part in seen))
+    errors = moved @ moved.T + block_diag(*(part[2] for part in seen))
+    return np.vstack([part[0] for part in seen]), np.vstack(climbed), errors
 
 
 def _seen(mounted: Mounted, course: Course, now: int, end: int) -> tuple[Array, Array, Array]:
-    """What a sensor shows until now: of the adhesion used; of place and speed at first; its errors' covariance."""
+    """What a sensor shows until now: of what slows down; of place and speed at first; its errors' covariance."""
     sensor = mounted.sensor.gnss if isinstance(mounted.sensor, GnssFix) else mounted.sensor
     per_step = mounted.timing.rate_hz * STEP_S
     every, together = max(round(1.0 / per_step), 1), max(per_step, 1.0)
     at = np.arange(now % every, now + 1, every)
-    time_s, one = course.time_s[at] - course.time_s[0], np.ones(at.size)
+    time_s, one, speed = course.time_s[at] - course.time_s[0], np.ones(at.size), course.speed_mps[at]
     slower = -GRAVITY * STEP_S * np.tri(now + 1, end)
+    first = np.column_stack([0.0 * one, FAST_MPS * one])
     if isinstance(sensor, Imu):
         steady = sensor.bias_std_mps2**2 + (GRAVITY * sensor.mounting_std_rad) ** 2
         pitched = PITCH_STD * GRAVITY * course.smooth[at] * (course.time_s[at] > 0.0)
         errors = sensor.white_std_mps2**2 / together * np.eye(at.size) + steady + np.outer(pitched, pitched)
-        return -GRAVITY * np.eye(now + 1, end)[at], np.zeros((at.size, 2)), errors
+        return -GRAVITY * np.eye(now + 1, end)[at], 0.0 * first, errors
+    if isinstance(sensor, Wheels):
+        noise, worn = (sensor.noise * speed) ** 2 / (course.axles * together), WORN_STD * speed
+        return slower[at], first, np.diag(noise) + np.outer(worn, worn)
     assert isinstance(sensor, Gnss | Speedometer)  # the last that are honest
     lasting = np.exp(-np.abs(time_s[:, np.newaxis] - time_s) / sensor.correlation_s)
     if isinstance(sensor, Gnss):
         errors = sensor.white_std_m**2 / together * np.eye(at.size) + sensor.correlated_std_m**2 * lasting
         return (STEP_S * np.cumsum(slower, axis=0))[at], np.column_stack([FAR_M * one, FAST_MPS * time_s]), errors
-    scale = sensor.scale_std * course.speed_mps[at]
+    scale = sensor.scale_std * speed
     errors = sensor.white_std_mps**2 / together * np.eye(at.size) + sensor.correlated_std_mps**2 * lasting
-    return slower[at], np.column_stack([0.0 * one, FAST_MPS * one]), errors + np.outer(scale, scale)
+    return slower[at], first, errors + np.outer(scale, scale)
