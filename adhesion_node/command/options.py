@@ -9,6 +9,7 @@
 """What the command line tools share: --help, --json, completion, exit codes, errors in one line, progress."""
 
 import argparse
+import io
 import json
 import os
 import shutil
@@ -31,6 +32,9 @@ REMEDIES: Mapping[type[OSError], str] = {
     PermissionError: ": name one that you may write, or read",
 }
 """What to do where the system refuses."""
+
+ESCAPED = "backslashreplace"
+"""What becomes of letters that a terminal's encoding has not, and of bytes in a file's name that are none."""
 
 PROGRESS_S = 1.0
 """Time between two signs of life."""
@@ -117,6 +121,9 @@ def run_tool(
     A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback.
     Bad usage ends the program with 2 (SystemExit). Asked by a shell, it says how the command line may go on and ends.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors=ESCAPED)
     version_option(parser)
     complete(parser)
     options = parser.parse_args(args)
@@ -131,6 +138,11 @@ def run_tool(
         if not _is_interrupt(error):
             raise
         return _complain(parser, "interrupted", FAILED)
+
+
+def printable(path: str) -> str:
+    """The path as text: bytes that are none, as a file's name may have, are escaped."""
+    return path.encode(errors=ESCAPED).decode()
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

@@ -26,6 +26,7 @@ from ..command.options import (
     help_texts,
     json_option,
     out_option,
+    printable,
     remap_option,
     report,
     run_tool,
@@ -71,7 +72,7 @@ def _work(options: argparse.Namespace) -> int:
         raise ValueError(f"out = {options.out}: holds the estimates of one recording, {len(options.bags)} are given")
     given = parameters_of(options)
     setup, output = setup_of(given), Path(options.output)
-    subjects = [_subject(path, name, options, setup) for path, name in _named(options.bags)]
+    subjects = [_subject(path, printable(name), options, setup) for path, name in _named(options.bags)]
     page = _page(output, subjects, options, given)
     from .drawn.picture import draw  # only now: what the messages and the page took is free, and no table is drawn
 

@@ -23,7 +23,17 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..bag import BagReader, select_from
-from ..command.options import DONE, FAILED, help_texts, json_option, remap_option, report, run_tool, setting_options
+from ..command.options import (
+    DONE,
+    FAILED,
+    help_texts,
+    json_option,
+    printable,
+    remap_option,
+    report,
+    run_tool,
+    setting_options,
+)
 from ..command.running import Arrays, add_running_options, run_all, running
 from ..run import offline
 from ..run.pipeline import Pipeline
@@ -123,7 +133,7 @@ def _work(options: argparse.Namespace) -> int:
             failed[task.path] = str(found["failed"])
             print(f"brakings: {task.path}: {failed[task.path]}", file=sys.stderr)
             continue
-        rows.append(pd.DataFrame(found["rows"]).assign(train=task.train, recording=task.path))
+        rows.append(pd.DataFrame(found["rows"]).assign(train=printable(task.train), recording=printable(task.path)))
         cells.append(pd.DataFrame(found["cells"]))
     result: dict[str, Any] = {"train": setup.train, "recordings": len(rows), "failed": failed, "brakings": 0}
     if rows:

@@ -9,10 +9,12 @@
 """How a command line tool ends."""
 
 import argparse
+import io
+import os
 
 import pytest
 
-from adhesion_node.command.options import FAILED, run_tool
+from adhesion_node.command.options import DONE, FAILED, run_tool
 
 
 def interrupted_in_a_kernel(_: argparse.Namespace) -> int:
@@ -38,3 +40,16 @@ def broken(_: argparse.Namespace) -> int:
 def test_another_error_of_the_system_is_not_hidden() -> None:
     with pytest.raises(SystemError, match="in Python itself"):
         run_tool(argparse.ArgumentParser("tool"), broken, [])
+
+
+def shouting(options: argparse.Namespace) -> int:
+    print(f"μ of {options.path}")
+    return DONE
+
+
+def test_what_a_terminal_cannot_show_is_escaped(monkeypatch: pytest.MonkeyPatch) -> None:
+    parser, written = argparse.ArgumentParser("tool"), io.BytesIO()
+    parser.add_argument("path")
+    monkeypatch.setattr("sys.stdout", io.TextIOWrapper(written, encoding="ascii", write_through=True))
+    assert run_tool(parser, shouting, [os.fsdecode(b"t\xff")]) == DONE
+    assert written.getvalue() == b"\\u03bc of t\\udcff\n"

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -70,6 +71,14 @@ def make(tmp_path: Path, *arguments: str) -> tuple[dict[str, Any], Parser]:
     result = tmp_path / "result.json"
     assert main([*arguments, "--output", str(tmp_path / "report"), "--json", str(result)]) == 0
     return json.loads(result.read_text()), Parser((tmp_path / "report" / "report.html").read_text(encoding="utf-8"))
+
+
+def test_a_name_of_bytes_that_are_no_text_is_escaped(tmp_path: Path) -> None:
+    named = tmp_path / os.fsdecode(b"t\xff")
+    write_run(named, samples(15.0, 30.0))
+    result, page = make(tmp_path, str(named))
+    assert result["runs"][0]["name"] == "t\\udcff"
+    assert "t\\udcff" in " ".join(page.texts)
 
 
 def lines(run: dict[str, Any], title: str) -> dict[str, dict[str, Any]]:

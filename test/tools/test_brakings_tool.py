@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 
 import pandas as pd
@@ -65,6 +66,13 @@ def test_what_is_finished_is_kept(bags: Path, tmp_path: Path) -> None:
     written = kept.stat().st_mtime_ns
     assert brakings.main([str(bags / "monday"), *options]) == 0
     assert ((tmp_path / "brakings.csv").read_bytes(), kept.stat().st_mtime_ns) == (first, written)
+
+
+def test_a_name_of_bytes_that_are_no_text_is_escaped(bags: Path, tmp_path: Path) -> None:
+    named, table = tmp_path / os.fsdecode(b"t\xff"), tmp_path / "brakings.csv"
+    named.symlink_to(bags / "monday", target_is_directory=True)
+    assert brakings.main([str(named), "--output", str(table), "--cache", str(tmp_path / "cache")]) == 0
+    assert list(pd.read_csv(table)["recording"]) == [str(tmp_path / "t\\udcff")]
 
 
 def test_the_map_says_how_often_where_and_when() -> None:

@@ -95,10 +95,18 @@ def test_the_standard_deviation_of_all_positions(importing: Import) -> None:
     assert [message.position_covariance[0] for message in importing.messages("fix")] == [4.0]
 
 
+def test_a_receiver_without_a_fix_tells_0_and_0(importing: Import) -> None:
+    """What else its row holds counts."""
+    assert importing("time,lat,lon,speed\n1,0,0.0,20\n2,0,8,20\n3,47,8,20\n") == 0, importing.errors
+    assert [one.t_ns for one in read(importing, SPEED)] == [S, 2 * S, 3 * S]
+    assert [message.longitude for message in importing.messages("fix")] == [8.0, 8.0]
+    assert importing.summary["empty"]["lat"] == 1
+
+
 @pytest.mark.parametrize(
     ("row", "message"),
     [
-        ("1,91,8,", "FILE:2: lat = '91': 91 is not from -90 to 90 degrees: are latitude and longitude exchanged?"),
+        ("1,91,8,", "FILE:2: lat = '91': 91 is not from -90 to 90 degrees: are latitude and longitude exchanged, or"),
         ("1,47,181,", "FILE:2: lon = '181': 181 is not from -180 to 180 degrees"),
         ("1,47,,", "FILE:2: row = '1,47,,': a place needs both, latitude and longitude"),
         ("1,47,8,2000", "FILE:2: wheel_speed_1 = '2000': 2000 is not from -1000 to 1000 rad/s: is the --wheel-unit"),

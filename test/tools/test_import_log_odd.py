@@ -57,6 +57,12 @@ ODD: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], str, list[str]]] = 
         "648 km/h",
         ["--speed-unit", "kmh"],
     ),
+    (
+        "wheels in km/h",
+        lambda r: r.assign(wheel_speed_1=3.6 * r.speed),
+        "their radius were 0.28 m",
+        ["--wheel-unit", "kmh"],
+    ),
     ("ms", lambda r: r.assign(time=1e3 * r.time), "a row every 100 s", ["--time-unit", "ms"]),
     (
         "degrees",
@@ -109,6 +115,10 @@ def test_what_is_odd_is_said_with_the_option_that_cures_it(
         assert option in odd
     importing.output = tmp_path / "cured"
     assert importing(log, *cure) == 0, importing.errors
+
+
+def test_small_wheels_are_not_odd(importing: Import) -> None:
+    assert importing(text(ride().assign(wheel_speed_1=ride().speed / 0.31))) == 0, importing.errors
 
 
 def test_a_speed_against_the_positions_is_said(importing: Import) -> None:

@@ -97,6 +97,15 @@ def test_a_bad_file_is_bad_input(capfd: pytest.CaptureFixture[str]) -> None:
     assert err.startswith("train: train = nowhere.yaml: not readable")
 
 
+def test_a_file_of_something_else_is_not_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,position\n" + "0.1,4.0\n" * 1000, encoding="utf-8")
+    code, _, err = told(capfd, "--check", str(log))
+    assert code == 2
+    assert "give mass_kg, length_m" in err
+    assert len(err) < 400
+
+
 BRAKE, RESISTANCE = 0.85, 1.4
 """True over believed."""
 

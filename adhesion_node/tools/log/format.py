@@ -55,7 +55,7 @@ _ABSOLUTE = (MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA, _IS_PRESSURE)
 
 LIMITS = {
     "position": (-MAX_POSITION_M, MAX_POSITION_M, "m: is the --position-unit another?"),
-    "lat": (-90.0, 90.0, "degrees: are latitude and longitude exchanged?"),
+    "lat": (-90.0, 90.0, "degrees: are latitude and longitude exchanged, or is it in 1e-7 degrees?"),
     "lon": (-180.0, 180.0, "degrees"),
     "height": (-500.0, 10_000.0, "m"),
     "variance": (MIN_VARIANCE_M2, MAX_VARIANCE_M2, "m^2: leave it empty where unknown"),

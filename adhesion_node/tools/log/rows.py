@@ -9,7 +9,7 @@
 """Rows of a log as measurements in SI units, and a reason with a remedy for each row that is none."""
 
 import re
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -81,6 +81,7 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
     form, (names, axles, _), factors = log.form, log.columns, log.form.factors()
     kinds = {name: name for name in names if name != "time"} | dict.fromkeys(axles, "wheel_speed")
     theirs = {name: cells[names.get(name, name)] for name in ("time", *kinds)}
+    theirs |= _without_fix(theirs, form.decimal or ".")
     filled = {name: _filled(column) for name, column in theirs.items()}
     against: dict[int, Refusal] = {}
     good = np.ones(len(cells), dtype=np.bool_)
@@ -118,6 +119,15 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
         refuse(outside, "out_of_range", name, _out_of_range(read, least, most, remedy))
         rows[name] = read
     return pd.DataFrame(rows, index=cells.index)[good], list(against.values())
+
+
+def _without_fix(columns: "Mapping[str, pd.Series[Any]]", decimal: str) -> "dict[str, pd.Series[Any]]":
+    """Latitude and longitude, empty where both are 0: so a receiver tells that it has no fix."""
+    if not {"lat", "lon"} <= columns.keys():
+        return {}
+    places = {name: columns[name] for name in ("lat", "lon")}
+    nowhere = np.all([numbers(cells, decimal) == 0.0 for cells in places.values()], axis=0)
+    return {name: cells.mask(nowhere, "") for name, cells in places.items()}
 
 
 def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any]", form: Format) -> None:

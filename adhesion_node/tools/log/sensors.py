@@ -22,6 +22,9 @@ RUNS_MPS = 5.0
 RADII_M = 0.2, 0.65
 """Of the wheels of trains."""
 
+JUST = math.log(1.04)
+"""By so much those of a train may differ, as they are worn: km/h read as rad/s look like wheels of 0.28 m, a tram's."""
+
 
 def felt(motion: Motion, form: Format) -> Iterator[str]:
     """What an accelerometer feels is the change of the speed, over seconds in which a train brakes."""
@@ -48,11 +51,13 @@ def rolling(motion: Motion, form: Format) -> Iterator[str]:
     if known.sum() < LEAST_S:
         return
     radius_m = float(np.median(course[known] / np.maximum(motion.rolls_radps[known], 1e-6)))
-    if RADII_M[0] <= radius_m <= RADII_M[1]:
+    units, is_a_trains = wheel_units(form.wheel_radius_m), RADII_M[0] <= radius_m <= RADII_M[1]
+    if abs(math.log(radius_m / form.wheel_radius_m)) < SAME:
         return
-    units = wheel_units(form.wheel_radius_m)
     for unit, radps in units.items():
-        if abs(math.log(radius_m * units[form.wheel_unit] / radps / form.wheel_radius_m)) < SAME:
+        off = abs(math.log(radius_m * units[form.wheel_unit] / radps / form.wheel_radius_m))
+        if unit != form.wheel_unit and off < (JUST if is_a_trains else SAME):
             yield f"the wheels turn as if their radius were {radius_m:.2g} m: another unit? --wheel-unit {unit}"
             return
-    yield f"the wheels turn as if their radius were {radius_m:.2g} m: are --wheel-unit and --wheel-radius right?"
+    if not is_a_trains:
+        yield f"the wheels turn as if their radius were {radius_m:.2g} m: are --wheel-unit and --wheel-radius right?"

@@ -9,6 +9,7 @@
 """Files that describe a train in the terms of its papers; what they give the estimator are settings by name."""
 
 import math
+import reprlib
 from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -125,7 +126,7 @@ def _force(brake: Mapping[str, Any], train: Train) -> dict[str, float]:
 def _mapping(value: Any, what: str, needed: tuple[str, ...], optional: tuple[str, ...]) -> Mapping[str, Any]:
     """Check the keys of a mapping."""
     if not isinstance(value, Mapping):
-        raise ValueError(f"{what} = {value!r}: give {', '.join((*needed, *optional))}; {_SEE}")
+        raise ValueError(f"{what} = {reprlib.repr(value)}: give {', '.join((*needed, *optional))}; {_SEE}")
     for key in value:
         if key not in (*needed, *optional):
             close = get_close_matches(str(key), (*needed, *optional), n=1)
@@ -139,5 +140,5 @@ def _mapping(value: Any, what: str, needed: tuple[str, ...], optional: tuple[str
 
 def _number(value: Any, name: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise ValueError(f"{name} = {value!r}: give a number")
+        raise ValueError(f"{name} = {reprlib.repr(value)}: give a number")
     return float(value)
