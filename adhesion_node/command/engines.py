@@ -20,6 +20,9 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing.connection import Connection
 
+THREADS = "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"
+"""How many threads a process's linear algebra takes: by themselves as many as cores, in each worker."""
+
 CONNECT_S = 10.0
 """How long a scheduler may take to answer."""
 
@@ -28,8 +31,10 @@ CONNECT_S = 10.0
 def processes(workers: int) -> Iterator[Executor]:
     """Give an executor of worker processes, which end with the block or with this process, whatever ends it.
 
-    Raises OSError when a worker was killed.
+    Each has one thread, unless the environment says otherwise. Raises OSError when a worker was killed.
     """
+    for name in THREADS:
+        os.environ.setdefault(name, "1")
     lifeline, held = multiprocessing.Pipe(duplex=False)
     spawn = multiprocessing.get_context("spawn")  # a fork would copy threads in any state
     with lifeline, ProcessPoolExecutor(workers, spawn, _be_a_worker, (lifeline,)) as executor, held:

@@ -71,6 +71,16 @@ class Killed(NamedTuple):
         return {}
 
 
+class Told(NamedTuple):
+    """Says how many threads its linear algebra was told to take."""
+
+    name: str = "told"
+    weight: float = 1.0
+
+    def compute(self) -> Arrays:
+        return {"threads": np.array([int(os.environ[name]) for name in engines.THREADS])}
+
+
 @pytest.fixture(scope="module")
 def dask() -> Iterator[LocalCluster]:
     """A cluster of two workers, which hear of the tasks through TCP."""
@@ -173,6 +183,14 @@ def test_without_dask_the_extra_is_named(
 def test_a_killed_worker_ends_the_study_with_a_reason(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="a worker was killed"):
         squares([Killed()], Running(tmp_path))
+
+
+def test_workers_do_not_take_each_others_cores(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in engines.THREADS:
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setenv(engines.THREADS[0], "3")
+    (told,) = run_all([Told()], Running(tmp_path))
+    assert told["threads"].tolist() == [3, 1, 1]
 
 
 def test_bad_numbers_of_workers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
