@@ -32,7 +32,7 @@ GOALS = {
 AT_BEST = {"error_percent": "error_least_percent", "excess_percent": "excess_least_percent"}
 """Figures of `study real` for which a bound is told, by its name."""
 
-CAUSES = ("no estimator could: the case, what is (what is possible), %", "possible, and missed")
+CAUSES = ("below the bound: the case, what is (the bound), %", "possible, and missed")
 
 BOUGHT = ("error, %", "bound", "safe")
 BESIDE = (*BOUGHT, "covers", "short, %", "false/h")
@@ -46,7 +46,7 @@ def real(files: Mapping[str, Sequence[Row]]) -> dict[str, str]:
     """Return the tables by the name of their part, of what is and of what was before."""
     rows, before = files["real"], files["real_before"]
     nothing = dict.fromkeys(AT_BEST.values())
-    heads = "figure", "goal", "met", "no estimator could", "missed most by"
+    heads = "figure", "goal", "met", "missed, below the bound", "missed most by"
     bought = (f"{rail}: {head}" for rail in RAILS for head in BOUGHT)
     return {
         "real": listed(COLUMNS["real"], rows, _marked),
@@ -78,7 +78,7 @@ def _reached(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
 
 
 def _is_forbidden(figure: str, row: Row) -> bool:
-    """Whether a goal that is missed lies below what is possible."""
+    """Whether a goal that is missed lies below its bound."""
     least = row[AT_BEST[figure]]
     return figure in row["missed"] and least is not None and least > row["goals"][figure][1]
 

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The least excess that the safe curve could have: at each moment the greater of two bounds, of easier tasks.
+"""The least excess that the safe curve could have: at each moment the greatest of three bounds, of easier tasks.
 
 The mean of what slows the train down ahead is unknown. A way is in proportion to its inverse. Where it is known in
 proportion, within s, the shortest curve that holds with 99 % is in the mean longer than the true one by

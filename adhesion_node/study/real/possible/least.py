@@ -12,7 +12,8 @@ They are those of the best linear estimator of an easier task. It is told the se
 slides, that adhesion limits and from when on, where the rail changes, how it depends on speed on such a rail in the
 mean of days, but for a factor between two changes and a power of the speed, and how it swings about that: its
 autocovariance in the plant. Unknown are factors and power, place and speed, scale and bias of the sensors, how the
-train pitches, and by how much it differs from its papers (`unknown`). For Gaussian swings no estimator does better.
+train pitches, and by how much it differs from its papers (`unknown`). For Gaussian swings no
+estimator does better in the mean over such laws of the speed, rails and trains; on a single one it may.
 """
 
 from collections.abc import Iterable, Mapping
