@@ -10,9 +10,12 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
+from statistics import median
 
 from forms import COLUMNS, Row, cell, listed
 from interface_tables import table
+
+from sim_node.real.sensors.fitted import FITTED
 
 GOALS = {
     "error_percent": ("error against used: positions, aided, leaves, patches", "≤ 4, 2, 4, 6 %", "{by:+.1f} %", 1.0),
@@ -54,6 +57,7 @@ def real(files: Mapping[str, Sequence[Row]]) -> dict[str, str]:
         "real soonest": listed(COLUMNS["real soonest"], _soonest(rows)),
         "real goals": table(heads, _reached(rows)),
         "real missed": table(("goal", *CAUSES), _by_cause(rows)),
+        "real times": table(("over what is possible", "cases", "least", "median", "most"), _times(rows)),
         "real before and now": table(("case", *BESIDE), _beside(before, rows)),
         "real sensors": table(("sensors", *bought), _bought(rows)),
     }
@@ -95,6 +99,18 @@ def _by_cause(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
 def _with_best(figure: str, rows: Sequence[Row]) -> str:
     digits = 0 if figure == "excess_percent" else 1
     return "; ".join(f"{row['case']} {row[figure]:.{digits}f} ({row[AT_BEST[figure]]:.{digits}f})" for row in rows)
+
+
+def _times(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
+    """How many times what is possible a figure is, where wheels are heard and where they are not."""
+    for figure, best in AT_BEST.items():
+        for sensors, heard in (("without wheels", False), ("with wheels", True)):
+            own = [row for row in rows if row[figure] and row[best]]
+            own = [row for row in own if ("wheels" in FITTED[row["fitted"]].sensors) == heard]
+            times = sorted((row[figure] / row[best], row["case"]) for row in own)
+            least, most = (f"{ratio:.2f} ({case})" for ratio, case in (times[0], times[-1]))
+            middle = f"{median(ratio for ratio, _ in times):.2f}"
+            yield f"{figure.split('_')[0]}, {sensors}", str(len(times)), least, middle, most
 
 
 def _beside(before: Sequence[Row], now: Sequence[Row]) -> Iterator[Sequence[str]]:

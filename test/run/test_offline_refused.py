@@ -131,7 +131,7 @@ def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offl
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--set", "windw=40"], "setting 'windw=40': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
+        (["--set", "windw=40"], "setting 'windw=40': did you mean window=VALUE?"),
         (["--set", "window=forty"], "setting window = 'forty': give a value of type int"),
         (["--set", "window=2"], "window = 2: give a value from 3 to 10000"),
         (["--set", "window=10"], "step = 10: choose less than the window, 10"),

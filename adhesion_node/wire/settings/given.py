@@ -10,6 +10,7 @@
 
 import argparse
 from collections.abc import Sequence
+from difflib import get_close_matches
 from typing import Any
 
 from ...core.setting import Setting
@@ -37,7 +38,10 @@ def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[st
     name, separator, value = text.partition("=")
     setting = next((setting for setting in settings if setting.name == name), None)
     if setting is None or not separator:
-        raise ValueError(f"setting {text!r}: write NAME=VALUE with one of {', '.join(s.name for s in settings)}")
+        names = [each.name for each in settings]
+        close = get_close_matches(name, names, n=1)
+        remedy = f"did you mean {close[0]}=VALUE?" if close else f"write NAME=VALUE with one of {', '.join(names)}"
+        raise ValueError(f"setting {text!r}: {remedy}")
     kind = type(setting.default)
     try:
         return name, {"true": True, "false": False}[value.lower()] if kind is bool else kind(value)

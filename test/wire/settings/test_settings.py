@@ -205,8 +205,9 @@ def test_a_text_becomes_the_settings_type(text: str, expected: tuple[str, Any]) 
         ("window=", "setting window = '': give a value of type int"),
         ("start_mu=0,12", "setting start_mu = '0,12': give a value of type float"),
         ("identify_noise=1", "setting identify_noise = '1': give a value of type bool"),
-        ("windw=40", "setting 'windw=40': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
-        ("window", "setting 'window': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
+        ("windw=40", "setting 'windw=40': did you mean window=VALUE?"),
+        ("window", "setting 'window': did you mean window=VALUE?"),
+        ("zzz=1", "setting 'zzz=1': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
         ("", "setting '': write NAME=VALUE with one of seed, frame, ambient_pressure_pa"),
     ],
 )
