@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .bank import BANK
-from .bank.findings.verdict import Ahead
+from .bank.findings.ahead import Ahead
 from .belief import tracker
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail, age, ignorance

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, motion
-from adhesion_node.core.bank.findings import verdict
+from adhesion_node.core.bank.findings import ahead
 from adhesion_node.core.bank.labels import kinds, noises
 from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.labels.laws import SLIPPERY, WET, laws_of
@@ -298,28 +298,28 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     adhesion = adhesion - 2.0 * slowing / GRAVITY * (mean[:, SPEED] - told) / told
     roughness = (
         _roughness(config, bank.kind) ** 2 * rough_added
-        + np.minimum(kinds.DRIFT[bank.kind], verdict.DRIFT_AHEAD) ** 2 * time_s / 3.0
+        + np.minimum(kinds.DRIFT[bank.kind], ahead.DRIFT_AHEAD) ** 2 * time_s / 3.0
     )
     variance = np.einsum("hi,hij,hj->h", slope, bank.covariance, slope) + open_variance(config, bank) * grade_added
-    ahead = verdict.NEAR**2 + _mean_ahead(way_m, verdict.AHEAD_M)[1]
-    variance += ahead * np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
-    speeds = float(bank.weight @ speed) * verdict.SPEEDS_AHEAD
+    apart = ahead.NEAR**2 + _mean_ahead(way_m, ahead.AHEAD_M)[1]
+    variance += apart * np.square(config.ahead_std * used.value) + np.where(sliding, mean[:, MU] ** 2 * roughness, 0.0)
+    speeds = float(bank.weight @ speed) * ahead.SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
-    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** verdict.COUNTED_RISE
+    rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** ahead.COUNTED_RISE
     foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
     std = np.sqrt(np.maximum(variance, 1e-12)) * rising
     # the whole brake may make axles slide that roll under a part of it
     whole = config.train.specific_brake(config.train.full_pressure_pa)
-    partial = braking.applied < verdict.PARTIAL * whole
+    partial = braking.applied < ahead.PARTIAL * whole
     borne = used.value * (ROLLED[0] / ROLLED[1] if partial else 1.0)
     least = min(known.lower, whole) if partial else 0.0
     foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < least)
     foreseen, std = np.where(more, least, foreseen), np.where(more, 1e-6, std)
-    middle = np.maximum(foreseen, verdict.LEAST_AHEAD)
+    middle = np.maximum(foreseen, ahead.LEAST_AHEAD)
     variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
     # where nothing tells which, sliding since the brake was applied is as likely as rolling beforehand
     since = sliding & np.isneginf(bank.born_s) & (not partial) & (braking.told == 0.0)
-    odds = np.where(since, verdict.UNTOLD, 1.0) * bank.weight
+    odds = np.where(since, ahead.UNTOLD, 1.0) * bank.weight
     weight = odds / odds.sum()
     low = np.exp(quantiles(weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
     return speeds, low

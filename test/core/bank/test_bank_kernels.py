@@ -21,8 +21,7 @@ import pytest
 from banks import FULL, bank_of
 
 from adhesion_node.core.bank import branching, kernels, motion, seeing
-from adhesion_node.core.bank.findings import verdict
-from adhesion_node.core.bank.findings.verdict import quantiles
+from adhesion_node.core.bank.findings.ahead import counted_on, quantiles
 from adhesion_node.core.bank.kernels import parabola, weighing
 from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING, SLIDES
 from adhesion_node.core.bank.labels.noises import NOISES
@@ -161,7 +160,7 @@ def test_quantiles(shape: tuple[int, ...]) -> None:
 def test_what_is_counted_on_ahead(config: Config, braking: Braking) -> None:
     for known in (0.0, 0.06):
         rail = Rail(0.07, 0.02, known)
-        ours = verdict.counted_on(config, BANK, 0.02, braking, rail)
+        ours = counted_on(config, BANK, 0.02, braking, rail)
         speeds, mu = by_numpy.counted_on(config, BANK, 0.02, braking, rail)
         np.testing.assert_allclose(ours.speed_mps, speeds, rtol=1e-12)
         np.testing.assert_allclose(ours.mu, mu, rtol=1e-9)

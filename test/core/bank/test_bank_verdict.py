@@ -20,7 +20,8 @@ from banks import FULL, FULL_PA, S, bank_of
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from adhesion_node.core.bank.findings.verdict import Ahead, constant, counted_on, found, quantiles
+from adhesion_node.core.bank.findings.ahead import Ahead, constant, counted_on, quantiles
+from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.gear.wheels import WheelsSeen
 from adhesion_node.core.bank.kernels import mixture as mixtures

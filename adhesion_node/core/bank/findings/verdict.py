@@ -6,61 +6,44 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""What the bank's hypotheses say together: what limits, the adhesion that is used, what may be counted on ahead."""
+"""What the bank's hypotheses say together: what limits, and the adhesion that is used."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ...belief.rail import Rail
 from ...belief.regime import Regime
-from ...physics.train import Array
-from ...setting import once
 from ..following import SPEED_ERROR_MPS
 from ..gear.wheels import BRAKE_BELOW
-from ..kernels import mixture, weighing
-from ..labels import kinds
 from ..labels.laws import SLIPPERY
-from ..layout import BRAKE, SPEED, Bank
-from ..memory import Memory, S
-from ..motion import Braking, Use, model_of, resistance, use
-from ..seeing import ROLLED
+from ..memory import Memory
+from ..motion import resistance, use
+from .ahead import (
+    KNOWN_SHARE,
+    PARTIAL,
+    Ahead,
+    borne_out,
+    constant,
+    counted_on,
+    for_the_fastest,
+    is_partial,
+    quantiles,
+    surely,
+    unfelt,
+    whole_brake,
+)
 
 if TYPE_CHECKING:
     from ...config import Config
 
-
-SPEEDS_AHEAD = np.linspace(0.0, 1.0, 6)
-"""Parts of the present speed at which adhesion is foreseen."""
-
-DRIFT_AHEAD = 0.02
-"""Most drift that is counted on ahead: a border will have been passed."""
-
-LEAST_AHEAD = 0.002
-"""Adhesion less grade ahead counts as no less."""
-
-AHEAD_M, NEAR = 2000.0, 0.375
-"""Over which way the adhesion, or the brake's force, comes to differ by `ahead_std`, and what share of that the mean of
-the shortest way may differ by."""
-
-COUNTED_RISE = 0.5
-"""Power of what a law promises for lower speeds that is counted on: slide protection uses less of it."""
-
 TWO_SIDED_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
-KNOWN_SHARE = 0.6
-"""Of the chance that the bound or the safe curve may fail, what is left to all that the hypotheses know of; the rest is
-for what they do not."""
-
 SLOWING = 0.02
 """Net deceleration over g from which a train of whose brake nothing is known brakes."""
-
-PARTIAL = 0.8
-"""Part of the full brake below which adhesion may be more than it shows: what was known before still holds."""
 
 LIKELY = 0.5
 """Probability of sliding from which what is used is what the rail gives."""
@@ -69,38 +52,6 @@ SLIDES_FROM, CLAIMED = 0.5, 0.8
 """Share of sliding axles that leaves no doubt, and the probability from which something is claimed without them."""
 
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
-
-UNTOLD = 4.0
-"""Times its odds sliding since the brake was applied counts for the way ahead while neither wheels nor slide protection
-tell of it: as if it had been as likely as rolling, so that nothing but what is measured since speaks for the brake."""
-
-LOST, LOST_MPS, STANDS_MPS = 1.5, 5.0, 0.1
-"""A speed is lost where the train may be so many times as fast as told, and by so much; told is the third at least."""
-
-BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
-"""A change of the rail counts for the way ahead after so long, once it is so probable, or once all that are so young
-prevail; before its border is passed, if all that say so are so probable together."""
-
-
-class Ahead(NamedTuple):
-    """Adhesion, less what an unknown grade may take away, that the way to a standstill does not fall below."""
-
-    speed_mps: tuple[float, ...]
-    """Rising from 0 to the present speed."""
-    mu: tuple[float, ...]
-
-    def __call__(self, speed_mps: Array) -> Array:
-        """Adhesion at speeds, element by element."""
-        return np.asarray(np.interp(speed_mps, self.speed_mps, self.mu))
-
-    def at_least(self, other: Ahead) -> Ahead:
-        """No less than another one of the same speeds."""
-        return self._replace(mu=tuple(map(max, self.mu, other.mu)))
-
-
-def constant(mu: float) -> Ahead:
-    """The same at any speed."""
-    return Ahead((0.0,), (max(mu, 0.0),))
 
 
 class Findings(NamedTuple):
@@ -119,7 +70,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if memory.misled:
         return Findings(Regime.COASTING, nothing, constant(nothing.lower), nothing)
     if not memory.braked and memory.brake.known:
-        return Findings(Regime.COASTING, before, _unfelt(config, bank, before.lower), before)
+        return Findings(Regime.COASTING, before, unfelt(config, bank, before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
@@ -128,65 +79,22 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
         free = before
         if rail.mu > SLOWING:
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
-        return Findings(Regime.COASTING, free, _unfelt(config, bank, before.lower), free)
+        return Findings(Regime.COASTING, free, unfelt(config, bank, before.lower), free)
     missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
-    ahead = counted_on(config, _borne_out(memory), missed, memory.braking, memory.known, used)
+    ahead = counted_on(config, borne_out(memory), missed, memory.braking, memory.known, used)
     slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, least)
     else:
         regime = _regime(config, memory, slides, rail.mu)
         rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
-        least = least if _is_partial(config, memory.braking) and rolls else 0.0
-    floor, is_lost = _for_the_fastest(config, bank, min(least, _surely(config, bank)))
+        least = least if is_partial(config, memory.braking) and rolls else 0.0
+    floor, is_lost = for_the_fastest(config, bank, min(least, surely(config, bank)))
     lower = max(rail.lower, least)
-    ahead = _for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
+    ahead = for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
     return Findings(regime, rail, ahead, known)
-
-
-def _unfelt(config: Config, bank: Bank, lower: float) -> Ahead:
-    """A bound of any speed: who brakes by it leaves room for the error of the speed, but not for one that is lost."""
-    lower = min(lower, _surely(config, bank))
-    floor, is_lost = _for_the_fastest(config, bank, lower)
-    return floor if is_lost else constant(lower)
-
-
-def _for_the_fastest(config: Config, bank: Bank, mu: float) -> tuple[Ahead, bool]:
-    """Adhesion that stops the fastest train there may be, told as the slower one needs it for the same way, v^2 / 2a.
-
-    And whether the speed is lost: what is counted on ahead holds for errors that are small beside it.
-    """
-    speeds = _speeds_ahead(bank)
-    std, missed = np.sqrt(bank.covariance[:, SPEED, SPEED]), KNOWN_SHARE * (1.0 - config.curve_confidence)
-    fastest = float(quantiles(bank.weight, bank.mean[:, SPEED], std, (1.0 - missed,)).item())
-    told = max(abs(float(bank.weight @ bank.mean[:, SPEED])), STANDS_MPS)
-    share, resisting = (told / max(fastest, told)) ** 2, config.train.specific_resistance(speeds)
-    is_lost = fastest > LOST * told and fastest - told > LOST_MPS
-    return Ahead(tuple(speeds.tolist()), tuple(((mu + resisting) * share - resisting).tolist())), is_lost
-
-
-def _speeds_ahead(bank: Bank) -> Array:
-    """From 0 to the present speed."""
-    return np.asarray(float(bank.weight @ np.maximum(bank.mean[:, SPEED], 1.0)) * SPEEDS_AHEAD)
-
-
-def _is_partial(config: Config, braking: Braking) -> bool:
-    return braking.applied < PARTIAL * _whole_brake(config)
-
-
-def _surely(config: Config, bank: Bank) -> float:
-    """What the whole brake surely asks for, by what is known of its force; of a strong one what its papers say."""
-    std, missed = np.sqrt(bank.covariance[:, BRAKE, BRAKE]), KNOWN_SHARE * (1.0 - config.curve_confidence)
-    factor = float(quantiles(bank.weight, bank.mean[:, BRAKE], std, (missed,)).item())
-    return min(max(factor, 0.0), 1.0) * _whole_brake(config)
-
-
-@once
-def _whole_brake(config: Config) -> float:
-    """B/(M g) by the train's papers."""
-    return config.train.specific_brake(config.train.full_pressure_pa)
 
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
@@ -198,66 +106,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     part, error = mu / max(demanded, 1e-6), config.brake_error
     if slides > CLAIMED and (part < 1.0 - 2.0 * error or memory.braking.told > 0.0):
         return Regime.ADHESION_LIMITED
-    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * _whole_brake(config)
-    weak = _whole_brake(config) <= SLIPPERY  # a film may give what such a brake asks for, to within its error
+    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * whole_brake(config)
+    weak = whole_brake(config) <= SLIPPERY  # a film may give what such a brake asks for, to within its error
     if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not (dumps or weak):
         return Regime.BRAKE_LIMITED
     return Regime.COASTING
-
-
-def _borne_out(memory: Memory) -> Bank:
-    """Without what has only just come to mind: that the rail may change this moment is always possible."""
-    bank = memory.bank
-    age_s, limits = memory.t_ns / S - bank.born_s, (BORNE_OUT_S, BORNE_OUT, kinds.PASSING, BORDER)
-    return bank._replace(log_weight=weighing.borne_out(bank.log_weight, age_s, bank.kind, *limits))
-
-
-def counted_on(
-    config: Config, bank: Bank, missed: float, braking: Braking, known: Rail, used: Use | None = None
-) -> Ahead:
-    """Quantile of adhesion and grade ahead, at each of some speeds down to a standstill.
-
-    What is known of roughness and grade here fades along the way, and the way takes the mean of them. Axles that roll
-    under a part of the brake leave the bound as it was `known` when the braking began, as far as the whole brake can
-    use it: that may make them slide.
-    `used` is what each hypothesis uses now, if that is at hand.
-    """
-    used = use(config, bank, braking, resistance(config, bank)) if used is None else used
-    weight, partial = bank.weight, _is_partial(config, braking)
-    speeds = _speeds_ahead(bank)
-    if not (partial or braking.told):
-        weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
-        weight /= weight.sum()
-    borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, _surely(config, bank))) if partial else (1.0, 0.0)
-    asked = mixture.Asked(float(missed), borne, float(least))
-    low = mixture.counted_on(_ahead_of(config), bank, weight, used, speeds, asked)
-    return Ahead(tuple(speeds.tolist()), tuple(low.tolist()))
-
-
-@once
-def _ahead_of(config: Config) -> mixture.Ahead:
-    return mixture.Ahead(
-        rough=np.square(kinds.roughness_of(config)),
-        fading=kinds.FADING,
-        drift=np.square(np.minimum(kinds.DRIFT, DRIFT_AHEAD)),
-        grade_m=kinds.grade_m_of(config),
-        resistance=np.array(config.train.resistance_si),
-        grade_error=float(config.grade_error),
-        resistance_error=float(config.resistance_std),
-        error=float(config.ahead_std),
-        error_m=AHEAD_M,
-        near=NEAR,
-        laws=model_of(config).laws,
-        rise=COUNTED_RISE,
-        least=LEAST_AHEAD,
-    )
-
-
-def quantiles(weights: Array, means: Array, stds: Array, probabilities: Sequence[float]) -> Array:
-    """Quantiles of mixtures of Gaussians.
-
-    `weights` has the shape (H,), `means` and `stds` (..., H); the result (..., P) for P probabilities.
-    """
-    mean, std = (np.ascontiguousarray(np.atleast_2d(each)) for each in (means, stds))
-    rows = mixture.quantiles(weights, mean, std, np.array(probabilities))
-    return rows.reshape(*means.shape[:-1], len(probabilities))
