@@ -13,6 +13,8 @@ from __future__ import annotations
 import numpy as np
 from oracles import specific_resistance
 
+from adhesion_node.core.bank.gear.brake import BrakeSeen
+from adhesion_node.core.bank.labels.kinds import KINDS
 from adhesion_node.core.bank.layout import (
     BIAS,
     BRAKE,
@@ -28,6 +30,9 @@ from adhesion_node.core.bank.layout import (
     SPEED,
     Bank,
 )
+from adhesion_node.core.bank.memory import Memory
+from adhesion_node.core.bank.motion import Braking
+from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import Measurement, PressureSample
 from adhesion_node.core.physics.train import Array
@@ -46,6 +51,10 @@ S = 1_000_000_000
 FULL_PA = 410e3
 FULL = 500_183 / (536e3 * 9.8)
 """B/(M g) of the full brake (model.md)."""
+
+SMOOTH = [kind.name for kind in KINDS].index("smooth")
+NOTHING = Rail(0.05, 0.04, 0.02)
+"""What is known of any rail."""
 
 MEAN = {POSITION: 500.0, SPEED: 40.0, MU: 0.05, ROUGH: 0.02, BRAKE: 1.03, GRADE: 0.002}
 MEAN |= {OFFSET: 1.5, BIAS: 0.001, PITCH: 0.08, SCALE: 0.004, RADIUS: -0.01}
@@ -73,6 +82,20 @@ def bank_of(
         np.zeros(count),
     )
     return bank.normalised()
+
+
+def ahead_bank(mu: float, speed: float, kinds: list[int] | None = None) -> Bank:
+    """Hypotheses of these kinds that say the same of adhesion and speed."""
+    bank = bank_of(kinds or [2, 3, 4, 5], spread=0.0)
+    for component, value in ((MU, mu), (SPEED, speed), (ROUGH, 0.0), (GRADE, 0.0)):
+        bank = bank.with_fresh(component, value, 0.05 * abs(value))
+    return bank
+
+
+def memory_of(bank: Bank, braking: Braking, seen: int) -> Memory:
+    """The bank of a braking train, of whose rail nothing is known, under the full pressure."""
+    pressed = BrakeSeen((PressureSample(10 * S, FULL_PA),), FULL_PA, FULL_PA, None, 10 * S)
+    return Memory(bank, 10 * S, 1.0, brake=pressed, braking=braking, seen=seen, known=NOTHING)
 
 
 def braked_run(
