@@ -10,7 +10,6 @@
 
 import math
 
-from .bank.steps import Stepping
 from .banked import follow_banked, last_banked
 from .config import Config
 from .estimate import Estimate, blind_estimate
@@ -37,6 +36,9 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
             if not _is_moved(config, state, measurement):
                 return _unseen(config, state, measurement)
             measurement, placed = measurement._replace(variance_m2=math.inf), False
+        elif repeated.is_held(measurement):
+            state = state.told(Event(Outcome.HELD, f"position x = {measurement.position_m:.12g}"))
+            measurement = measurement._replace(variance_m2=math.inf)
     else:
         repeated = state.repeated
     pace = state.pace.after(measurement)
@@ -66,10 +68,8 @@ def _surely(seen: Estimate | None) -> float:
 
 
 def _stuck(state: State, measurement: Measurement) -> State:
-    """The position is stuck: nothing of what it has said since it was so for the first time is believed."""
-    event, before = Event(Outcome.STUCK, f"position x = {measurement.position_m:.12g}"), state.repeated.before
-    if not state.stuck and before is not None and before.memory is not None:
-        state = state._replace(memory=before.memory, stepping=Stepping(stepped_m=state.stepping.stepped_m))
+    """The position is stuck: it has said nothing since it was the same for the first time."""
+    event = Event(Outcome.STUCK, f"position x = {measurement.position_m:.12g}")
     return state._replace(unseen=state.unseen + 1).told(event)
 
 

@@ -45,6 +45,7 @@ class Outcome(Enum):
         "the same to the bit although the train must have moved on, or a standstill that no brake brings about: "
         "check the sensor"
     )
+    HELD = "the same to the bit as before: taken for a value that is held until the next one; publish each only once"
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
     SLIDING = (
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
@@ -68,7 +69,7 @@ class Outcome(Enum):
 DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "TICK", "CHANGED", "RESET"))
 """Outcomes of a sample that is not used."""
 
-QUIET = ("ACCEPTED", "TICK", "REPEATED", "OUTLIER", "SLOW", "IDLE", "CHANGED")
+QUIET = ("ACCEPTED", "TICK", "REPEATED", "HELD", "OUTLIER", "SLOW", "IDLE", "CHANGED")
 """Names of those that an operator need not hear of beyond their counts: they are part of good days."""
 
 NO_COUNTS: Mapping[Outcome, int] = MappingProxyType(dict.fromkeys(Outcome, 0))

@@ -17,6 +17,10 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 from .outcome import Event, Outcome
 from .samples import Measurement
 
+HELD_S, STUCK_S = 3.0, 1.2
+"""A position that is the same to the bit again is no measurement for so long, but a value that is held until the next
+one, as of a receiver that measures once a second; from when on its sensor is stuck if the train must have moved on."""
+
 STUCK_STEPS, LEAST_STUCK_M, MOST_STUCK_M = 2.0, 2.0, 10.0
 """A position that repeats itself to the bit comes in steps, and steps of d alone have the variance d^2/12. A train that
 must have gone so many of the greatest steps that the variance allows, within these bounds, has a stuck sensor."""
@@ -70,14 +74,19 @@ class Repeated(NamedTuple, Generic[Of]):
         same = measurement.position_m == self.position_m and measurement.t_ns >= self.since_ns
         return self if same else Repeated(measurement.position_m, measurement.t_ns, known)
 
+    def is_held(self, measurement: Measurement) -> bool:
+        """Whether the position is the one before, said again."""
+        return 0 < measurement.t_ns - self.since_ns < HELD_S * 1e9
+
     def is_stuck(self, measurement: Measurement) -> bool:
         """Whether the train must have moved on from a position that is still the same."""
-        if self.before is None or measurement.t_ns == self.since_ns:  # most positions are new
+        same_s = (measurement.t_ns - self.since_ns) * 1e-9
+        if self.before is None or same_s < STUCK_S:  # most positions are new
             return False
         before = self.before.estimate
         known_s = abs(self.since_ns - before.t_ns) * 1e-9
         slowest = max(abs(before.speed_mps) - 3.0 * before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
-        return least_way(slowest, (measurement.t_ns - self.since_ns) * 1e-9) >= stuck_way(measurement.variance_m2)
+        return least_way(slowest, same_s) >= stuck_way(measurement.variance_m2)
 
 
 def stuck_way(variance_m2: float) -> float:

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,6 +127,25 @@ def test_a_sensor_that_recovers_is_used_again() -> None:
     assert pipeline.last.window >= 50
     true = next(t for t, _ in run(find("tunnel_entry"), 0.1, 1) if t.t_ns == pipeline.last.t_ns)
     assert pipeline.last.speed_mps == pytest.approx(true.speed_mps, abs=1.0)
+
+
+@pytest.mark.parametrize("held_s", [0.2, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("method", ["bank", "rail_condition"])
+def test_a_position_that_is_held_until_the_next_one_is_measured_once(held_s: float, method: str) -> None:
+    """A receiver that is slower than the messages: the train stays known as fast as it is, from the start on."""
+    pipeline, newest = Pipeline(replace(FAST, method=method), 1), PositionSample(0, 0.0, 0.25)
+    times, speeds = zip(*((r.t_ns, truth.speed_mps) for truth, r in run(find("tunnel_entry"), 0.1, 1)), strict=True)
+    for sample in ride(0.0, 34.0):
+        sent = sample
+        if isinstance(sample, PositionSample):
+            newest = sample if sample.t_ns >= newest.t_ns + held_s * S or not newest.t_ns else newest
+            sent = sample._replace(position_m=newest.position_m)
+        for estimate, *_ in pipeline.push(sent):
+            off_mps = estimate.speed_mps - np.interp(estimate.t_ns, times, speeds)
+            assert abs(off_mps) < 4.0 * estimate.speed_std_mps + 0.1, estimate
+    assert pipeline.dropped["HELD"] > 100
+    assert "OUTLIER" not in pipeline.dropped
+    assert "RESET" not in pipeline.dropped
 
 
 def test_a_train_that_stands_is_not_stuck() -> None:
