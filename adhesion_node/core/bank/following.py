@@ -106,7 +106,8 @@ def followed(
     """
     pressures, speeds, start = _pressures(measurement), _speeds(config, measurement), memory
     demand_pa, imu = measurement.demand_pa, measurement.imu
-    if measurement.brake_pressure_pa is None and demand_pa is None:
+    memory = memory._replace(untold=measurement.brake_pressure_pa is None and demand_pa is None)
+    if memory.untold:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
     memory = memory._replace(left_out=()) if memory.left_out else memory
@@ -129,7 +130,7 @@ def followed(
             felt = [each for each in imu if since_ns < each.t_ns <= until_ns]
             memory = _felt(config, memory, felt, braking, (until_ns - since_ns) / S) if felt else memory
         for speed in speeds:
-            if since_ns < speed.t_ns <= until_ns and (config.speed_source != "axle" or not memory.braked):
+            if since_ns < speed.t_ns <= until_ns and not (config.speed_source == "axle" and _may_slide(memory)):
                 memory = _with_speed(config, memory, speed)
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
@@ -142,6 +143,11 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
         return Foreseen()
     before = memory.bank, (measurement.t_ns - memory.t_ns) / S, memory.braking, memory.declared_m
     return foreseen(config, *before, measurement.position_m, math.sqrt(measurement.variance_m2))
+
+
+def _may_slide(memory: Memory) -> bool:
+    """Whether an axle may slide; where its speed is all there is, it is believed while nothing tells of a brake."""
+    return memory.braked or (memory.untold and memory.is_placed)
 
 
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:

@@ -53,6 +53,8 @@ class Memory(NamedTuple):
     axles: Axles = Axles()
     wheels: WheelsSeen = WheelsSeen()
     braking: Braking = Braking(0.0)
+    untold: bool = False
+    """Whether nothing tells if a brake is applied: wheels may slide."""
     since_s: float = 0.0
     """Since it was last asked what has changed."""
     known: Rail = Rail(0.0, 1.0, 0.0)

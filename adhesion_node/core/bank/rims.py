@@ -55,7 +55,8 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
     if not measurement.wheels:
         return memory
-    pressed, axles, wheels, newest = memory.is_pressed(config), memory.axles, memory.wheels, measurement.wheels[-1]
+    pressed = memory.is_pressed(config) or memory.untold
+    axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
     rim, std = rim_speed(memory.bank)
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
