@@ -192,7 +192,7 @@ class Config:
     pressure_wait_s: float = _intake(
         0.2, "How long, by the stamps, a position waits for the pressure and the speed of its time", "s", 0.0, 60.0
     )
-    pressure_age_s: float = _intake(1.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
+    pressure_age_s: float = _intake(2.0, "Age from which a measured pressure counts as none", "s", 1e-3, 60.0)
     used_ripple: float = _unsure(
         0.025,
         "By how much the adhesion that a train of 200 m uses swings within a second, as slide protection works in "

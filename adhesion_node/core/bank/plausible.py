@@ -41,7 +41,7 @@ RECEIVER = 1
 BRAKE_ERROR, RESISTANCE_ERROR = 1.15, 1.2
 """Factors on the full brake and the running resistance that are still possible."""
 
-ALIKE_S, FAR, ALIKE, SAMPLES = 1.0, 4.0, 2.5, 4.0
+ALIKE_S, FAR, ALIKE, SAMPLES = 1.0, 3.2, 2.5, 4.0
 """Over such a time the product of deviations that follow each other, in standard deviations by the hypothesis nearest
 and counted as no more than this, is above so much in the mean of so many at least: errors that come by chance, however
 large, do not follow each other so, and those that wander are foreseen."""

@@ -34,6 +34,9 @@ FIRST_SIGMA, MEAN_SIGMA, ALIKE_SIGMA = 2.5, 2.3, 3.5
 ABRUPT = 0.6
 """Share of it that the position before may have been off: what grows is motion."""
 
+BACK = 0.3
+"""A step takes the one before back if it is as large to within this share: what reflects a satellite's signal goes by."""
+
 LARGEST = 4.0
 """Size of a step over `position_step_std_m` at most."""
 
@@ -48,22 +51,26 @@ class Stepping(NamedTuple):
     last_off_m: float = 0.0
     """Of the position before."""
     stepped_m: float = -math.inf
-    """Where the positions stepped last."""
+    """Where the positions stepped last, ..."""
+    by_m: float = 0.0
+    """... and by how much."""
 
     def after(self, config: Config, memory: Memory, measurement: Measurement, off: Foreseen) -> Stepping:
         """Take in a measurement; its position, if it has one, lies so far off what `memory` had foreseen."""
         if not measurement.has_position:
             return self._replace(since=(*self.since, measurement)) if self.before is not None else self
         alike_m = ALIKE_SIGMA * math.sqrt(measurement.variance_m2)
-        if self.off_m and abs(off.metres - self.off_m[0]) < alike_m:
+        first_m = self.off_m[0] if len(self.off_m) < AGREEING and self.off_m else 0.0
+        if abs(off.metres - first_m) < min(alike_m, abs(first_m)):  # never by a first one of 0: there is none
             return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
-        calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m)
+        calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m, by_m=self.by_m)
         if not abs(off.metres) > FIRST_SIGMA * off.std_m:
             return calm
         spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
+        back = abs(off.metres + self.by_m) < max(alike_m, BACK * abs(self.by_m))
         abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
         near = abs(off.metres) <= LARGEST * config.position_step_std_m
-        if spaced and abrupt and near:
+        if (spaced or back) and abrupt and near:
             return calm._replace(before=memory, since=(measurement,), off_m=(off.metres,))
         return calm
 
@@ -83,4 +90,4 @@ class Stepping(NamedTuple):
         memory = self.before._replace(bank=bank._replace(covariance=covariance), course=Course())
         for measurement in self.since:
             memory = followed(config, memory, measurement, rail)
-        return memory, Stepping(stepped_m=self.since[-1].position_m)
+        return memory, Stepping(stepped_m=self.since[-1].position_m, by_m=size_m)

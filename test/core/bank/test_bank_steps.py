@@ -70,6 +70,18 @@ def test_steps_lie_a_spacing_apart(last_m: float, size_m: float) -> None:
     assert seen([0.1, 5.0, 5.0, 5.0], Stepping(stepped_m=last_m)).size_m(1.0) == size_m
 
 
+@pytest.mark.parametrize(("off_m", "size_m"), [(-5.0, -5.0), (-3.6, -3.6), (-3.2, 0.0), (-6.8, 0.0), (5.0, 0.0)])
+def test_a_step_may_be_taken_back_at_any_time(off_m: float, size_m: float) -> None:
+    """What reflects a satellite's signal goes by."""
+    assert seen([0.1, off_m, off_m, off_m], Stepping(stepped_m=990.0, by_m=5.0)).size_m(1.0) == pytest.approx(size_m)
+
+
+def test_a_step_behind_a_chance_error_is_one() -> None:
+    assert seen([0.1, 2.6, 2.4, 2.5, 2.4]).size_m(1.0) == 0.0  # it was decided by the third
+    assert seen([0.1, 2.6, 2.0, 0.1, 7.0, 7.0, 7.0]).size_m(1.0) == pytest.approx(7.0)
+    assert seen([0.1, -2.6, 7.0, 7.1, 6.9]).size_m(1.0) == pytest.approx(7.0)
+
+
 def test_a_step_moves_where_the_train_is_and_not_how_fast() -> None:
     memory = met(CALM, Measurement(S, 1000.0, 0.25, 0.0, 40.0))
     for k in range(1, 30):
@@ -77,7 +89,7 @@ def test_a_step_moves_where_the_train_is_and_not_how_fast() -> None:
     since = [Measurement(S + k * S // 10, 1005.0 + 4.0 * k, 0.25, 0.0, 40.0) for k in range(30, 33)]
     stepping = Stepping(memory, tuple(since), (5.0, 5.0, 5.0))
     moved, after = stepping.taken(CALM, 5.0, lambda: Rail(0.0, 1.0, 0.0))
-    assert after == Stepping(stepped_m=since[-1].position_m)
+    assert after == Stepping(stepped_m=since[-1].position_m, by_m=5.0)
     assert moved.t_ns == since[-1].t_ns
     assert moved.bank.mean_of(POSITION) == pytest.approx(1005.0 + 4.0 * 32, abs=0.6)
     assert moved.bank.mean_of(SPEED) == pytest.approx(40.0, abs=0.1)
