@@ -29,11 +29,12 @@ class Noise(NamedTuple):
 
 NOISES = (
     Noise(1.0, 0.0, 0.0, 0.0, 1.0, 0.4),
-    Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.3),
+    Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.2),
     Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.05),
     Noise(0.03, 0.05, 1.0, 1.0, 2000.0, 0.05),
     Noise(0.05, 0.05, 1.0, 1.0, 2000.0, 0.03),
     Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
+    Noise(0.25, 0.1, 1.0, 1.0, 30.0, 0.1),
 )
 LASTS = np.array([noise.lasts_s for noise in NOISES])
 WHITE = np.array([(noise.white, noise.least_white_m) for noise in NOISES])
