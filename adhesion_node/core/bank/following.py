@@ -201,4 +201,4 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> B
     share = memory.wheels.share(now_ns)
     applied = config.train.specific_brake(brake.applied_pa)
     sliding = share if share is not None and share >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
-    return Braking(applied, sliding, brake.rising, told(share, brake.has_slid(now_ns)))
+    return Braking(applied, sliding, brake.rising, told(share, brake.has_slid(now_ns), memory.wheels.fell(now_ns)))

@@ -20,7 +20,7 @@ from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement
 from ..physics.train import GRAVITY
 from .gear.axles import ROLLS
-from .gear.wheels import LEARNING_MPS
+from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import RADIUS, SPEED, Bank
 from .memory import Memory, S
 from .motion import resistance, use
@@ -41,9 +41,6 @@ SLIDES = 0.2
 MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
 
-UNISON_S = 1.5
-"""For so long, and the brake's build-up, behind the opening all axles may begin to slide as one."""
-
 TRUSTED_NS = 450_000_000
 """How often the fastest rim is taken for the train's speed, as its errors last."""
 
@@ -55,7 +52,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
     if not measurement.wheels:
         return memory
-    pressed = memory.is_pressed(config) or memory.untold
+    pressed = memory.is_pressed(config) or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
     rim, std = rim_speed(memory.bank)
     runs = not pressed and rim - MANY * std > LEARNING_MPS
@@ -68,11 +65,19 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     rims = wheels.rims(config, newest)
     if memory.braked:
         return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns) if rims else memory
+    return _unbraked(config, memory, rims, newest.t_ns, pressed)
+
+
+def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pressed: bool) -> Memory:
+    """Take in how fast the middle rim is, unless it may slide all the same: then none is faster than the train."""
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
+    wheels, fastest = memory.wheels, memory.wheels.fastest(rims) if rims else 0.0
+    wheels = wheels.beside(fastest, t_ns) if rims else wheels
     memory = memory._replace(wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf))
-    if rims and not pressed and rim > LEARNING_MPS:
-        return memory._replace(bank=rolling(memory.bank, median(rims)).normalised())
-    return memory
+    if fastest <= LEARNING_MPS:
+        return memory
+    bank = not_slower(memory.bank, fastest) if pressed else rolling(memory.bank, median(rims))
+    return memory._replace(bank=bank.normalised())
 
 
 def _telling(memory: Memory) -> Memory:

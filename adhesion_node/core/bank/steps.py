@@ -35,7 +35,7 @@ ABRUPT = 0.6
 """Share of it that the position before may have been off: what grows is motion."""
 
 BACK = 0.3
-"""A step takes the one before back if it is as large to within this share: what reflects a satellite's signal goes by."""
+"""A step takes the one before back if it is as large to within this share: what reflects a signal passes by."""
 
 LARGEST = 4.0
 """Size of a step over `position_step_std_m` at most."""

@@ -18,6 +18,7 @@ from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, motion
 from adhesion_node.core.bank.findings import ahead
+from adhesion_node.core.bank.kernels import moving
 from adhesion_node.core.bank.labels import kinds, noises
 from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.labels.laws import SLIPPERY, WET, laws_of
@@ -115,7 +116,7 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     lasting[:, ROUGH] = np.where(_swings(kind), np.exp(-dt_s / kinds.SWING_S), np.exp(-way_m / kinds.ROUGHNESS_M))
     lasting[:, GRADE] = np.exp(-way_m / kinds.grade_m_of(config))
     lasting[:, OFFSET] = np.exp(-dt_s / noises.LASTS[bank.noise])
-    drift = np.square(kinds.DRIFT[kind] * bank.mean[:, MU]) * dt_s
+    drift = np.square(kinds.DRIFT[kind] * np.maximum(bank.mean[:, MU], moving.LEAST_MU)) * dt_s
     noise[:, POSITION] = config.motion.position_noise_rate * dt_s
     noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s
     noise[:, MU] = np.where(lasts_s > 0.0, kinds.FREE_STD**2 * (1.0 - free**2), drift)

@@ -14,6 +14,7 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
+from ...intake.plausibility import STRONGEST_MPS2
 from ...intake.samples import WheelSample
 
 if TYPE_CHECKING:
@@ -45,6 +46,17 @@ BRAKE_BELOW = 0.05
 RISEN = 1.02
 """Times its lowest speed from which the fastest rim has risen, more than by noise."""
 
+FALL_NS, FALL_SIGMA, FELL_NS, UNTOLD_NS = 2 * S // 5, 2.5, S, 120 * S
+"""Time over which it is seen how fast the fastest rim falls or rises. Where it falls faster than any brake stops a
+train, by so many standard deviations of its noise, all axles slide. They count so for the next time; where no pressure
+tells of a brake, for the last one."""
+
+FALLS = 8.0
+"""Log odds per second by which all axles slide then."""
+
+UNISON_S = 1.5
+"""For so long behind such a fall, and behind the brake's build-up, all axles may slide as one."""
+
 
 class WheelsSeen(NamedTuple):
     """What is known of the axles."""
@@ -64,7 +76,11 @@ class WheelsSeen(NamedTuple):
     lowest_mps: float = math.inf
     """Speed of the fastest rim at its lowest since the brake was applied."""
     risen: bool = False
-    """Whether it has risen since: a train under the brake does not, so it slid and rolls again."""
+    """Whether it has risen since, and rises no more: a train under the brake does not, so it slid and rolls again."""
+    recent: tuple[tuple[int, float], ...] = ()
+    """How fast it was of late, with stamps in ns, ..."""
+    fell_ns: int | None = None
+    """... and when it last fell faster than a train can."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
         """Take in the speeds of all axles while that of one which rolls is known so.
@@ -100,7 +116,8 @@ class WheelsSeen(NamedTuple):
             before + part * (middle / rim - before) if rim > 0.0 else before
             for before, rim in zip(self.radius, rims, strict=True)
         )
-        off = [(own * rim / middle - 1.0) ** 2 for own, rim in zip(self.radius, rims, strict=True) if rim > 0.0]
+        turned = (own * rim / middle - 1.0 for own, rim in zip(self.radius, rims, strict=True) if rim > 0.0)
+        off = [min(each**2, UNEQUAL**2) for each in turned]  # more is no noise: an axle slides
         noise = self.noise + max(LEARNT, 1.0 / self.learnt) * (sum(off) / len(off) - self.noise) if self.learnt else 0.0
         return self._replace(radius=radius, learnt=self.learnt + 1, noise=noise)
 
@@ -116,13 +133,24 @@ class WheelsSeen(NamedTuple):
         return max(rims) * (1.0 - 0.5 * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
 
     def beside(self, fastest_mps: float, now_ns: int) -> WheelsSeen:
-        """Note how fast the fastest rim is under the brake; once it has risen it may be trusted."""
+        """Note how fast the fastest rim is under the brake; it may be trusted once it has risen, until it falls."""
+        recent = (*(each for each in self.recent if now_ns - each[0] <= FALL_NS), (now_ns, fastest_mps))
+        then_ns, then_mps = recent[0]
+        most = STRONGEST_MPS2 * (now_ns - then_ns) / S + FALL_SIGMA * math.sqrt(2.0 * self.noise) * then_mps
+        if 2 * (now_ns - then_ns) >= FALL_NS and then_mps - fastest_mps > most:
+            trusted_ns = max(self.trusted_ns, now_ns + round(UNISON_S * S))
+            fallen = self._replace(recent=recent, fell_ns=now_ns, trusted_ns=trusted_ns)
+            return fallen._replace(lowest_mps=fastest_mps, risen=False)
         if self.risen:
-            return self
+            return self._replace(recent=recent)
         lowest = min(self.lowest_mps, fastest_mps)
-        risen = fastest_mps > RISEN * lowest
+        risen = RISEN * lowest < fastest_mps <= then_mps
         trusted_ns = min(self.trusted_ns, now_ns) if risen else self.trusted_ns
-        return self._replace(trusted_ns=trusted_ns, lowest_mps=lowest, risen=risen)
+        return self._replace(recent=recent, trusted_ns=trusted_ns, lowest_mps=lowest, risen=risen)
+
+    def fell(self, now_ns: int, within_ns: int = FELL_NS) -> bool:
+        """Whether all axles slide, as the fastest rim has fallen faster than a train can."""
+        return self.fell_ns is not None and now_ns - self.fell_ns < within_ns
 
     def share(self, now_ns: int) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
@@ -134,12 +162,14 @@ class WheelsSeen(NamedTuple):
         return sum(slid) / known if known and 2 * known >= len(slid) else None
 
 
-def told(share: float | None, dumping: bool) -> float:
+def told(share: float | None, dumping: bool, fell: bool = False) -> float:
     """Log odds per second by which axles are known to slide: wheels say it, else the dumps of the slide protection.
 
-    >>> told(0.8, False), told(0.0, False), told(None, True), told(None, False)
-    (4.0, -4.0, 4.0, 0.0)
+    >>> told(0.8, False), told(0.0, False), told(None, True), told(None, False), told(0.8, False, fell=True)
+    (4.0, -4.0, 4.0, 0.0, 8.0)
     """
+    if fell:
+        return FALLS
     if share is None:
         return 4.0 if dumping else 0.0
     return 4.0 if share >= 0.25 else -4.0 if share < BRAKE_BELOW else math.copysign(0.0, 1.0)

@@ -29,6 +29,8 @@ ModelNumbers = tuple[
 StepNumbers = tuple[float, float, float, bool, float, float]
 
 GRAVITY = 9.8
+LEAST_MU = 0.03
+"""Adhesion drifts in proportion to itself, from this on: else one that was believed to be 0 would stay so."""
 POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, RADIUS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10, 11
 
 
@@ -152,7 +154,7 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         else:
             bent = _law(model, law[h], slower) / _law(model, law[h], v)
             lasting[MU] = bent * math.exp(model.kinds[k, 4] * dt) if model.kinds[k, 0] > 0.0 else 1.0
-            added[MU] = (model.kinds[k, 1] * x[MU]) ** 2 * dt
+            added[MU] = (model.kinds[k, 1] * max(x[MU], LEAST_MU)) ** 2 * dt
         lasting[ROUGH] = math.exp(-way_m * model.fading[k, 0] - dt * model.fading[k, 1])
         lasting[GRADE], lasting[OFFSET] = math.exp(-way_m / model.grade_m), math.exp(-dt / n[4])
         added[SPEED] = model.kinds[k, 3] ** 2 * dt
