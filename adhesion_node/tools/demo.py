@@ -16,21 +16,19 @@ import argparse
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager, suppress
 from functools import partial
-from itertools import count, pairwise
+from itertools import chain, count, pairwise
 from pathlib import Path
-from shutil import copytree
-from tempfile import TemporaryDirectory
+from shlex import join
+from shutil import rmtree
 from typing import Any
 
 import numpy as np
 from rclpy.executors import SingleThreadedExecutor
 from scipy.ndimage import uniform_filter1d
 
-from sim_node.real import known
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
-from sim_node.real.sensors import centre_line
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.settings import SENSORS
 from sim_node.train.scenario import SCENARIOS
@@ -55,6 +53,7 @@ from ..wire.messages.parts import NS
 from ..wire.settings.setup import setup_of
 from ..wire.topics import ATP_STATUS
 from .line import UNASKED, Pace, Task, executor_of_line, parameters, play
+from .staged import PARAMS, task_of
 
 EXAMPLES = (
     "demo",
@@ -66,18 +65,6 @@ EXAMPLES = (
 
 SHOWN_EVERY_S = 5.0
 """Simulated time between two lines of progress."""
-
-TRACK_LINE = "track.geojson"
-"""File with the centre line of a real train's track, where it is fitted with `fix`."""
-
-TARGET_MPS2 = 0.18
-"""A real train's target to stop at: as far as this deceleration takes, or half of what its full brake should give."""
-
-TARGET_M, STOP_M = 14500.0, 16000.0
-"""The target, for a speed or a stop: as near as brakes that come after 20 s at 300 km/h allow on an unknown rail."""
-
-NEARER_M = {"approach": 6300.0}
-"""Targets of scenarios that brake too late on purpose."""
 
 POLL_S = 0.05
 """Longest time until a signal is seen."""
@@ -157,42 +144,24 @@ def _run(
     options: argparse.Namespace, executor: SingleThreadedExecutor, pace: Pace, ended: Callable[[], None] = lambda: None
 ) -> int:
     """Play the scenario, call `ended`, evaluate the recording and report; the exit code."""
-    output, started_s = _free(options.output), time.monotonic()
-    with TemporaryDirectory() as folder:  # a run that cannot begin leaves nothing behind
-        task = _task(options, Path(folder) / TRACK_LINE)
+    started_s = time.monotonic()
+    with _folder(options.output) as output:
+        task = task_of(options.scenario, options.sensors, options.seed, output)
         target_kmh, train = task.monitor["target_speed_kmh"], setup_of(task.estimator).config.train
         played = play(executor, task, output / "bag", pace)
-        ended()
-        with BagReader(output / "bag") as reader:
-            result, run = _evaluate(reader, task), read_run(reader)
-        copytree(folder, output, dirs_exist_ok=True)
+    ended()
+    with BagReader(output / "bag") as reader:
+        result, run = _evaluate(reader, task), read_run(reader)
     truth = _true_bands(played.regimes, run)
     fitted = f", {options.sensors}" if options.scenario in REAL else ""
     draw(run, [output / "run.png"], f"{options.scenario}{fitted}, seed {options.seed}", target_kmh, train, truth)
     if options.scenario in REAL:
         result |= _found(truth, run)
     result |= {"live_digest": played.digest, "live_equals_offline": played.digest == result["digest"]}
-    result |= {"bag": str(output / "bag"), "picture": str(output / "run.png")}
+    result |= {name: str(output / file) for name, file in (("bag", "bag"), ("params", PARAMS), ("picture", "run.png"))}
     result["seconds"] = round(time.monotonic() - started_s, 1)
     report(options.json, result, "\n".join(["", table(run, target_kmh, train), "", *_said(result)]))
     return DONE if result["live_equals_offline"] else FAILED
-
-
-def _task(options: argparse.Namespace, line: Path) -> Task:
-    """What the nodes are to do; a real train stops. Where it is fitted with `fix`, the file `line` is written."""
-    simulator = {"scenario": options.scenario, "sensors": options.sensors}
-    if options.scenario in REAL:
-        real = REAL[options.scenario]
-        stopping_m = real.speed_mps**2 / 2 / min(TARGET_MPS2, real.nominal.deceleration_mps2 / 2)
-        target_m = real.speed_mps * real.demands[-1][0] + stopping_m
-        estimator = known.parameters(real, FITTED[options.sensors])
-        if "fix" in FITTED[options.sensors].sensors:
-            line.write_text(centre_line.geojson(), encoding="utf-8")
-            estimator |= {"track_line": str(line), "track_start_m": centre_line.BEGINS_M}
-        return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": 0.0}, estimator)
-    target_mps = SCENARIOS[options.scenario].end_speed_mps or 0.0
-    target_m = NEARER_M.get(options.scenario, TARGET_M if target_mps else STOP_M)
-    return Task(options.seed, simulator, {"target_position_m": target_m, "target_speed_kmh": target_mps / KMH})
 
 
 def _true_bands(regimes: Sequence[tuple[int, str]], run: Run) -> list[Band]:
@@ -235,15 +204,33 @@ def _said(result: dict[str, Any]) -> Iterator[str]:
     if "ms_per_window_p50" in result:
         yield f"an estimate takes {result['ms_per_window_p50']:.1f} ms (median of {result['windows']})"
     same = "gives the same numbers to the last bit" if result["live_equals_offline"] else "GIVES OTHER NUMBERS"
-    yield f"an offline replay of the recording {same} (digest {result['digest'][:16]}...)"
+    yield f"an offline replay of the recording {same} (digest {result['digest'][:16]}...):"
+    yield f"  {join(['replay', result['bag'], '--offline', '--params', result['params']])}"
     yield f"ATP monitor: {result['atp']}"
     yield f"recording: {result['bag']}    picture: {result['picture']}    ({result['seconds']} s)"
 
 
-def _free(wanted: Path) -> Path:
-    """The wanted folder, or with the first number behind it that is not taken."""
+@contextmanager
+def _folder(wanted: Path) -> Iterator[Path]:
+    """Take the wanted folder, or with the first number behind it that is not taken, before another demo can.
+
+    A run that cannot begin leaves nothing behind.
+    """
     numbered = (wanted.with_name(f"{wanted.name}_{number}") for number in count(2))
-    return wanted if not wanted.exists() else next(path for path in numbered if not path.exists())
+    folder = next(path for path in chain([wanted], numbered) if _taken(path))
+    try:
+        yield folder
+    except ValueError:
+        rmtree(folder)
+        raise
+
+
+def _taken(path: Path) -> bool:
+    """Whether the folder was not there and is this program's now."""
+    with suppress(FileExistsError):
+        path.mkdir(parents=True)
+        return True
+    return False
 
 
 def _say(text: str) -> None:

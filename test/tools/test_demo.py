@@ -11,6 +11,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -30,7 +32,7 @@ from adhesion_node.core import Estimate
 from adhesion_node.core.physics.adhesion import DRY, WET
 from adhesion_node.core.physics.track import LEVEL
 from adhesion_node.nodes import replay
-from adhesion_node.tools import demo, line
+from adhesion_node.tools import demo, line, staged
 from adhesion_node.tools.line import executor_of_line
 from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH
 from sim_node.nodes import simulator
@@ -49,7 +51,7 @@ def short(monkeypatch: pytest.MonkeyPatch) -> None:
     full = SCENARIOS["tunnel_entry"]
     rail = Rail(((0.0, DRY), (full.speed_mps * (CRUISE_S - 0.05), WET)))
     cut = replace(full, rail=rail, brake=Brake(CRUISE_S), track=LEVEL, end_s=END_S)
-    for module in (scenario, demo):
+    for module in (scenario, demo, staged):
         monkeypatch.setattr(module, "SCENARIOS", {**SCENARIOS, "tunnel_entry": cut})
 
 
@@ -88,8 +90,15 @@ def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
     assert "nothing is claimed" in err.splitlines()[1], "the first estimate is of a train that cruises"
     assert "Traceback" not in err
 
-    assert replay.main([result["bag"], "--offline", "--seed", "3", "--json", str(tmp_path / "again.json")]) == 0
-    assert json.loads((tmp_path / "again.json").read_text())["digest"] == result["live_digest"]
+    assert digest_of_what_it_says(out, tmp_path) == result["live_digest"]
+
+
+def digest_of_what_it_says(out: str, folder: Path) -> str:
+    """The digest of the offline replay by the command that a demo prints."""
+    (command,) = [line for line in out.splitlines() if line.startswith("  replay ")]
+    replay.main([*shlex.split(command)[1:], "--json", str(folder / "again.json")])  # a short run may identify nothing
+    again: str = json.loads((folder / "again.json").read_text())["digest"]
+    return again
 
 
 def _check_bag(path: Path) -> None:
@@ -110,12 +119,13 @@ def _check_bag(path: Path) -> None:
 @pytest.mark.parametrize("sensors", ["fix", "full"])
 def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_known_when(
     sensors: str,
+    tmp_path: Path,
     run_demo: Callable[..., dict[str, Any]],
     monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
     short = replace(REAL["metro_leaves"], speed_mps=6.0, demands=((3.0, 1.0),))
-    for module in (simulator, demo):
+    for module in (simulator, demo, staged):
         monkeypatch.setattr(module, "REAL", {"metro_leaves": short})
     result = run_demo("--scenario", "metro_leaves", "--sensors", sensors)
     out, _ = capfd.readouterr()
@@ -126,7 +136,8 @@ def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_k
     assert result["mean_relative_error_percent"] > 0.0  # of today's estimator; how good it is is not the matter here
     assert imread(result["picture"]).shape[:2] == (1320, 1210)
     left = {path.name for path in Path(result["picture"]).parent.iterdir()}
-    assert left == {"bag", "run.png"} | ({"track.geojson"} if sensors == "fix" else set())
+    assert left == {"bag", "params.yaml", "run.png"} | ({"track.geojson"} if sensors == "fix" else set())
+    assert digest_of_what_it_says(out, tmp_path) == result["live_digest"]
 
 
 def test_equal_runs_leave_equal_bytes_however_busy_the_machine_is(tmp_path: Path) -> None:
@@ -164,6 +175,25 @@ def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable
     assert Path(result["bag"]) == tmp_path / "demo_3" / "bag"
     for name in ("demo", "demo_2"):
         assert [path.name for path in (tmp_path / name).iterdir()] == ["mine.txt"]
+
+
+def test_two_at_once_take_two_folders(
+    tmp_path: Path, run_demo: Callable[..., dict[str, Any]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen_as_free = {tmp_path / "demo"}  # by this one, while another takes it
+    exists = Path.exists
+    monkeypatch.setattr(Path, "exists", lambda path: path not in seen_as_free and exists(path))
+    (tmp_path / "demo").mkdir()
+    assert Path(run_demo()["bag"]) == tmp_path / "demo_2" / "bag"
+
+
+def test_its_folder_may_be_read_by_whom_the_umask_lets(tmp_path: Path, run_demo: Callable[..., dict[str, Any]]) -> None:
+    before = os.umask(0o027)
+    try:
+        run_demo()
+    finally:
+        os.umask(before)
+    assert (tmp_path / "demo").stat().st_mode & 0o777 == 0o750
 
 
 def test_one_scenario_shows_every_level_of_the_supervision(run_demo: Callable[..., dict[str, Any]]) -> None:

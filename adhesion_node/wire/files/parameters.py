@@ -111,6 +111,19 @@ def _value(text: str) -> Any:
         return text
 
 
+def text_of(node: str, values: Mapping[str, Any]) -> str:
+    """The parameters of a node as the text of such a file.
+
+    >>> print(text_of("estimator", {"seed": 1}))
+    estimator:
+      ros__parameters:
+        seed: 1
+    <BLANKLINE>
+    """
+    text: str = yaml.safe_dump({node: {"ros__parameters": dict(values)}}, allow_unicode=True, sort_keys=False)
+    return text
+
+
 def load(path: str) -> Any:
     """What a YAML file holds. Raises OSError, ValueError or YAMLError where it is not readable."""
     return yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
