@@ -17,6 +17,7 @@ import sys
 import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -118,9 +119,25 @@ def run_tool(
 ) -> int:
     """Parse the command line, do the work and return the exit code.
 
-    A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback.
-    Bad usage ends the program with 2 (SystemExit). Asked by a shell, it says how the command line may go on and ends.
+    A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback, and
+    none at all where nobody reads on, as behind `| head`. Bad usage ends the program with 2 (SystemExit). Asked by a
+    shell, it says how the command line may go on and ends.
     """
+    try:
+        try:
+            return _worked(parser, work, args)
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        with suppress(io.UnsupportedOperation):  # what waits to be written would complain at the program's end
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+
+
+def _worked(
+    parser: argparse.ArgumentParser, work: Callable[[argparse.Namespace], int], args: Sequence[str] | None
+) -> int:
+    """As `run_tool`, as long as somebody reads the output."""
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=ESCAPED)
@@ -131,6 +148,8 @@ def run_tool(
         return work(options)
     except ValueError as error:
         return _complain(parser, str(error), BAD_INPUT)
+    except BrokenPipeError:
+        raise
     except OSError as error:
         remedy = REMEDIES.get(type(error), "")
         return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}", FAILED)

@@ -11,6 +11,8 @@
 import argparse
 import io
 import os
+import subprocess
+import sys
 
 import pytest
 
@@ -31,6 +33,20 @@ def interrupted_in_a_kernel(_: argparse.Namespace) -> int:
 def test_a_ctrl_c_within_a_kernel_is_one(capsys: pytest.CaptureFixture[str]) -> None:
     assert run_tool(argparse.ArgumentParser("tool"), interrupted_in_a_kernel, []) == FAILED
     assert capsys.readouterr().err == "tool: interrupted\n"
+
+
+@pytest.mark.parametrize("lines", [1, 100_000])
+def test_nothing_is_said_where_nobody_reads_on(lines: int) -> None:
+    program = (
+        "import argparse, sys; from adhesion_node.command.options import run_tool\n"
+        f"sys.exit(run_tool(argparse.ArgumentParser(), lambda _: print('line\\n' * {lines}) or 0, []))"
+    )
+    reading, writing = os.pipe()
+    os.close(reading)
+    with os.fdopen(writing, "w") as unread:
+        command = [sys.executable, "-c", program]
+        ended = subprocess.run(command, check=False, stdout=unread, stderr=subprocess.PIPE, text=True)
+    assert (ended.returncode, ended.stderr) == (FAILED, "")
 
 
 def broken(_: argparse.Namespace) -> int:
