@@ -40,7 +40,7 @@ class Live(SettingsNode):
     """
 
     def __init__(self, host: str, port: int, **kwargs: Any) -> None:
-        """Serve at once. Raises OSError when the address is taken, ValueError when aiohttp is missing."""
+        """Serve at once. Raises ValueError when the address is taken, or aiohttp is missing."""
         super().__init__("live", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, TELLING, quiet=True)
         self.view = View()

@@ -12,6 +12,8 @@ Web sockets, as a browser opens no more than six streams of events to one host i
 """
 
 import asyncio
+import errno
+import os
 import threading
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
@@ -44,7 +46,7 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 class Server:
     """Serves the page; all viewers are sent every `period_s` what has changed of the `parts`.
 
-    `parts` is called from the server's thread and must not block. Raises OSError when the address is taken.
+    `parts` is called from the server's thread and must not block. Raises ValueError when the address is taken.
     """
 
     def __init__(self, host: str, port: int, parts: Parts, period_s: float) -> None:
@@ -80,7 +82,7 @@ class Server:
         try:
             listening = await loop.create_server(self._guard, host, port)
         except OSError as error:
-            started.set_exception(OSError(error.errno, f"{host}:{port}: {error.strerror}"))
+            started.set_exception(ValueError(_refused(error, host, port)))
         else:
             number = listening.sockets[0].getsockname()[1]
             started.set_result((loop, f"http://{f'[{host}]' if ':' in host else host}:{number}/"))
@@ -130,6 +132,15 @@ class Server:
         if not allowed(request.host, self._host) or (origin and origin != request.host):
             raise web.HTTPForbidden(text=f"Host = {request.host!r}: ask for {self.url} or by an address\n")
         return await handler(request)
+
+
+def _refused(error: OSError, host: str, port: int) -> str:
+    """Why nothing can be served at the address, and what to do."""
+    number = error.errno or 0
+    why = os.strerror(number) if number > 0 else error.strerror
+    if number in (errno.EADDRINUSE, errno.EACCES):
+        return f"port = {port}: {host}:{port}: {why}: give another --port, or --port 0 for any that is free"
+    return f"host = {host}: {why}: give --host an address of this machine"
 
 
 def _give(queue: asyncio.Queue[str | None], message: str | None) -> None:

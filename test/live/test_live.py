@@ -16,7 +16,7 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,7 @@ from adhesion_node.live.__main__ import main
 from adhesion_node.live.node import Live
 from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.types import new
+from adhesion_node.tools import demo
 from adhesion_node.wire import topics
 from adhesion_node.wire.topic import Topic
 
@@ -166,14 +167,24 @@ def test_a_closed_page_gives_its_address_back(context: Context) -> None:
     second.destroy_node()
 
 
-def test_a_taken_address_is_one_line_and_code_2(capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("program", [main, lambda options: demo.main(["--live", *options])])
+def test_a_taken_address_is_one_line_with_a_remedy_and_code_2(
+    program: Callable[[list[str]], int], capfd: pytest.CaptureFixture[str]
+) -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = taken.getsockname()[1]
-        assert main(["--port", str(port)]) == 2
+        assert program(["--port", str(port)]) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert f"127.0.0.1:{port}: " in line
+    said = f"port = {port}: 127.0.0.1:{port}: Address already in use: give another --port, or --port 0"
+    assert said in line
+
+
+def test_a_host_of_another_machine_is_one_line_with_a_remedy(capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["--host", "192.0.2.1", "--port", "0"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("host = 192.0.2.1: Cannot assign requested address: give --host an address of")
 
 
 def test_without_aiohttp_it_says_what_to_install(
