@@ -14,6 +14,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
 
@@ -63,10 +64,21 @@ STUDIES = {
 """Module, what it shows, and options of an example. A module is loaded where its study is asked for."""
 
 
+class _Study(argparse.ArgumentParser):
+    """The parser of one study: what it does not know it refuses itself, with its own usage."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As every parser does; what is left over is an error."""
+        known, rest = super().parse_known_args(args, namespace)
+        if rest:
+            self.error(f"unrecognized arguments: {' '.join(rest)}")
+        return known, rest
+
+
 def main(args: Sequence[str] | None = None) -> int:
     """Run one study."""
     parser = argparse.ArgumentParser("study", **help_texts(PURPOSE, *(f"study {name}" for name in STUDIES)))
-    studies = parser.add_subparsers(metavar="NAME", required=True)
+    studies: Any = parser.add_subparsers(metavar="NAME", required=True, parser_class=_Study)
     asked = {*(sys.argv[1:] if args is None else args), *os.environ.get("COMP_LINE", "").split()}
     for name, (module, summary, options) in STUDIES.items():
         study = import_module(f".{module}", __package__) if name in asked else None

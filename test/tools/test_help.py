@@ -20,7 +20,7 @@ from conftest import ROOT
 from forked import ended
 from test_package import console_scripts
 
-from adhesion_node.study.__main__ import STUDIES
+from adhesion_node.study.__main__ import STUDIES, main
 
 
 @pytest.mark.parametrize(
@@ -45,8 +45,18 @@ def test_help_says_the_purpose_and_gives_examples(
     assert all(line.startswith(f"  {called}") for line in examples)
 
 
+def test_what_a_study_does_not_know_is_answered_with_its_own_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["creep", "--seeds", "0"])
+    err = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert err.startswith("usage: study creep ")
+    assert err.endswith("study creep: error: unrecognized arguments: --seeds 0\n")
+
+
 COMPLETED = [
     ("study ", set(STUDIES)),
+    ("study creep --r", {"--runs"}),
     ("demo --scenario tunnel_e", {"tunnel_entry", "tunnel_exit"}),
     ("replay my_run --off", {"--offline"}),
     ("recorder --out", {"--output"}),
