@@ -99,14 +99,26 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument("--live", action="store_true", help="at real time, with a page in the browser")
     parser.add_argument("--scenario", default="tunnel_entry", choices=(*SCENARIOS, *REAL), help="what happens")
     fitted = f"of a real train, which has the scenarios from {next(iter(REAL))} on (default: {SENSORS.default})"
-    parser.add_argument("--sensors", default=SENSORS.default, choices=tuple(FITTED), help=fitted)
+    parser.add_argument("--sensors", choices=tuple(FITTED), help=fitted)
     parser.add_argument("--seed", type=int, default=1, help="seed of the noise (default: 1)")
     folder = "default: adhesion_demo, numbered"
     parser.add_argument("--output", type=Path, default=Path("adhesion_demo"), metavar="DIR", help=folder)
-    return run_tool(parser, _demo, args)
+    usual = address_options().parse_args([])
+    return run_tool(parser, lambda options: _demo(options, usual), args)
 
 
-def _demo(options: argparse.Namespace) -> int:
+def _demo(options: argparse.Namespace, usual: argparse.Namespace) -> int:
+    """Run it; ValueError where an option would mean nothing."""
+    for name, value in vars(usual).items():
+        given = getattr(options, name)
+        if not options.live and given != value:
+            raise ValueError(f"--{name} {given}: there is no page without --live: add that, or leave this out")
+    if options.scenario not in REAL and options.sensors:
+        real = f"a scenario of a real train: {', '.join(REAL)}"
+        raise ValueError(
+            f"--sensors {options.sensors}: {options.scenario} has its own: leave them out, or choose {real}"
+        )
+    options.sensors = options.sensors or SENSORS.default
     progress = _Progress()
     with executor_of_line() as executor:
         return _live(options, executor, progress) if options.live else _run(options, executor, progress.show)

@@ -212,6 +212,23 @@ def test_bad_usage_ends_with_code_2(capsys: pytest.CaptureFixture[str]) -> None:
     assert "tunnel_exit" in err
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--sensors", "full"], "demo: --sensors full: tunnel_entry has its own: leave them out, or choose a scenario"),
+        (["--port", "9000"], "demo: --port 9000: there is no page without --live"),
+        (["--host", "0.0.0.0"], "demo: --host 0.0.0.0: there is no page without --live"),
+    ],
+)
+def test_an_option_that_means_nothing_is_one_line_and_code_2_and_leaves_nothing(
+    options: list[str], said: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    assert demo.main(["--output", str(tmp_path / "demo"), *options]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith(said)
+    assert not (tmp_path / "demo").exists()
+
+
 def test_a_bad_seed_is_one_line_and_code_2_and_leaves_nothing(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
