@@ -37,6 +37,9 @@ HEADER_WITHOUT_TRUTH = (
 TRUTH = (1, 4)
 """Columns that only a simulation has."""
 
+LEAST_USED = 5e-5
+"""A true adhesion that the table would write as 0.0000 is none."""
+
 NO_ROWS = "No rows: the train did not slow down by 10 km/h while it was faster than the target by as much."
 
 FORMS = ("{:.0f}", "{:.4f}", "{:.4f}", "{:.4f}", "{:.0f}", "{:.0f}", "{:.0f}", "{:.0f}")
@@ -47,7 +50,8 @@ WIDTHS = (9, 7, 11, 10, 8, 11, 10, 10)
 def rows(run: Run, target_kmh: float, train: Train = CRH3, absent: str = "–") -> Iterator[list[str]]:
     """Yield rows as texts, from 10 km/h below the highest speed before down to 10 km/h above the target.
 
-    `absent` stands for what is not known: the truth at its end, and an adhesion that is only believed.
+    `absent` stands for what is not known: the truth at its end or while the train uses none of it, and an adhesion that
+    is only believed.
     Without any truth its columns are left out.
     """
     speeds, target_mps = np.abs(run.speed.values), target_kmh * KMH
@@ -56,10 +60,12 @@ def rows(run: Run, target_kmh: float, train: Train = CRH3, absent: str = "–") 
         within = within[np.linspace(0, within.size - 1, ROWS).round().astype(int)]
     mu, lower = run.mu.at(run.speed.t_ns), run.mu_lower.at(run.speed.t_ns)
     planned, is_anything_known = distances(run, target_mps, train), why_not(run) is None
+    regimes = run.regimes_at(run.speed.t_ns)
     for i in within:
         true_mu, true_m = _truth(run, int(run.speed.t_ns[i]), target_mps)
         nominal, longest, fixed = (float(column[i]) for column in (planned.identified, planned.longest, planned.fixed))
-        identified = (float(mu[i]), nominal) if is_anything_known and is_known(mu[i], lower[i]) else (None, None)
+        is_one = is_anything_known and is_known(mu[i], lower[i], regimes[i])
+        identified = (float(mu[i]), nominal) if is_one else (None, None)
         row = (float(speeds[i]) / KMH, true_mu, identified[0], float(lower[i]), true_m, identified[1], longest, fixed)
         texts = (absent if value is None else form.format(value) for form, value in zip(FORMS, row, strict=True))
         yield shown(run, list(texts))
@@ -85,4 +91,5 @@ def _truth(run: Run, t_ns: int, target_mps: float) -> tuple[float | None, float 
     if not run.true_mu.t_ns.size or not slow.size:
         return None, None
     left = run.true_position.values[slow[0]] - run.true_position.at(now)[0]
-    return float(run.true_mu.at(now)[0]), float(left)
+    used = float(run.true_mu.at(now)[0])  # of a train that coasts none
+    return used if used > LEAST_USED else None, float(left)

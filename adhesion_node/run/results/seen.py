@@ -35,13 +35,15 @@ KNOWN_PART, KNOWN_MU = 0.4, 1.25 * Config().lowest_mu
 """A bound that is no more than this part of the adhesion, or this, says nothing but what was believed before."""
 
 
-def is_known(mu: float, mu_lower: float) -> bool:
+def is_known(mu: float, mu_lower: float, regime: str = "") -> bool:
     """Whether an estimate and its bound say more than what was believed before anything was seen.
 
-    >>> is_known(0.08, 0.07), is_known(0.08, 0.02)
-    (True, False)
+    An adhesion that limits does, however low it is.
+
+    >>> is_known(0.08, 0.07), is_known(0.08, 0.02), is_known(0.0225, 0.021, "ADHESION_LIMITED")
+    (True, False, True)
     """
-    return mu_lower > max(KNOWN_PART * mu, KNOWN_MU)
+    return regime == Regime.ADHESION_LIMITED.name or mu_lower > max(KNOWN_PART * mu, KNOWN_MU)
 
 
 class Seen:
@@ -101,7 +103,8 @@ class Seen:
     @property
     def identified(self) -> bool:
         """Whether the adhesion limited, or may have for more than the first moments of a braking."""
-        is_open = self._limited > 0 or self._told > MANY * self._at_brake
+        told = 0 if self.most_pa is None else self._told  # without any pressure it may be a brake that is seen
+        is_open = self._limited > 0 or told > MANY * self._at_brake
         return is_open and not (self._runs_back or self._runs_on or self._fastest_mps > FASTEST_MPS)
 
     @property

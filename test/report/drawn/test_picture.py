@@ -288,15 +288,26 @@ def test_the_table_leaves_the_truth_out_where_there_is_none(tmp_path: Path) -> N
     assert {tuple(row[1:3]) for row in body} == {(0.09, 0.08)}
 
 
+def test_a_train_that_uses_no_adhesion_has_no_true_one(recorded: Run) -> None:
+    coasting = recorded._replace(true_mu=recorded.true_mu.map(np.zeros_like))
+    body = [line.split() for line in table(coasting, 180.0, FREE).splitlines()[2:]]
+    assert {row[1] for row in body} == {"–"}
+    assert "–" not in {row[4] for row in body}, "the way that it went is known"
+
+
 def test_a_run_that_never_slows_down_has_no_rows(tmp_path: Path) -> None:
     assert table(read(record(tmp_path / "bag", seconds=1)), 100.0) == NO_ROWS
 
 
 def test_an_adhesion_that_is_only_believed_is_not_called_identified(recorded: Run) -> None:
-    believed = recorded._replace(mu_lower=recorded.mu_lower.map(lambda bound: np.full_like(bound, 0.02)))
+    at_least = recorded.mu_lower.map(lambda bound: np.full_like(bound, 0.02))
+    coasting = recorded.regime.map(lambda regimes: np.full_like(regimes, "COASTING"))
+    believed = recorded._replace(mu_lower=at_least, regime=coasting)
     body = [line.split() for line in table(believed, 180.0, FREE).splitlines()[2:]]
     assert {(row[2], row[5]) for row in body} == {("–", "–")}
     assert {row[3] for row in body} == {"0.0200"}, "the bound is counted on all the same"
+    claimed = [line.split() for line in table(believed._replace(regime=recorded.regime), 180.0, FREE).splitlines()[2:]]
+    assert {row[2] for row in claimed if float(row[0]) < 250} == {"0.0900"}, "the adhesion limits: however low it is"
     backwards = recorded._replace(
         speed=recorded.speed.map(np.negative)
     )  # so the report says that nothing is identified

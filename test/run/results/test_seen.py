@@ -44,6 +44,7 @@ def creeping() -> Seen:
         (run(0.2, 4e5), "no braking harder than 0.3 m/s^2: the hardest was 0.20"),
         (run(0.9, 4e5, "BRAKE_LIMITED", mu_lower=0.114), "the brake limited throughout: the adhesion is at least 0.11"),
         (run(0.9, None), "no brake pressure and no demand came"),
+        (run(0.9, None, mu_lower=0.08), "no brake pressure and no demand came"),
         (run(0.9, 4.1), "the brake pressure is 4.1 Pa at most: is its unit right"),
         (run(0.0, 5e5, seconds=40), "the train runs on under brake pressure: is it the brake pipe's"),
         (creeping(), "the train was never faster than 0.00072 m/s: are its positions degrees, or km?"),
