@@ -15,10 +15,19 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from ...core import Config
-from ...core.physics.train import KMH
+from ...core.physics.train import GRAVITY, KMH, Train
 
 CONVERGED_AFTER_MPS = 30.0 * KMH
 """Speed lost under the brake after which the paper's estimates count as converged."""
+
+
+LESS, LEAST_LESS = 0.15, 0.01
+"""A train that uses so much less than the true adhesion, as a part of it and at least, is limited by its brake: what a
+grade or an error of the believed resistance does is less."""
+
+
+SMOOTH_S = 2.0
+"""The motion of a simulated train is noisy, too."""
 
 
 class Identified(Protocol):
@@ -55,6 +64,17 @@ class Truth:
         resistance = config.train.specific_resistance(np.asarray(speed))
         return bool(config.train.used_adhesion(mu, config.brake(pressure), resistance) == mu)
 
+    def used(self, train: Train) -> dict[int, float]:
+        """What the train made use of, as its true speed fell over `SMOOTH_S`, by stamp; empty of less than two."""
+        if len(self.speed_mps) < 2:
+            return {}
+        stamps = sorted(self.speed_mps)
+        speeds = np.array([self.speed_mps[t_ns] for t_ns in stamps])
+        time_s = 1e-9 * (np.array(stamps) - stamps[0])
+        early, late = (np.clip(time_s + by, 0.0, time_s[-1]) for by in (-SMOOTH_S / 2, SMOOTH_S / 2))
+        slows = (np.interp(early, time_s, speeds) - np.interp(late, time_s, speeds)) / (late - early)
+        return dict(zip(stamps, (slows / GRAVITY - train.specific_resistance(speeds)).tolist(), strict=True))
+
     def converged_speed(self, config: Config) -> float:
         """Speed, m/s, below which estimates count: that of the first braking less 30 km/h."""
         braked = (t_ns for t_ns, pressure in self.pressure_pa.items() if config.brake(pressure) > 0.0)
@@ -64,12 +84,15 @@ class Truth:
 def mean_relative_error_percent(config: Config, truth: Truth, estimates: Iterable[Identified]) -> float | None:
     """Mean of abs(mu - true mu)/true mu in % over all estimates while adhesion limits, after the first 30 km/h.
 
-    Every estimate counts, whatever regime it claims. None where there is no truth to compare with.
+    Every estimate counts, whatever regime it claims; none where the train in truth uses less, as by worn pads. None
+    where there is no truth to compare with.
     """
-    slow_enough = truth.converged_speed(config)
+    slow_enough, used = truth.converged_speed(config), truth.used(config.train)
     errors = [
         abs(estimate.mu - truth.mu[estimate.t_ns]) / truth.mu[estimate.t_ns]
         for estimate in estimates
-        if truth.limits(config, estimate.t_ns) and truth.speed_mps.get(estimate.t_ns, np.inf) < slow_enough
+        if truth.limits(config, estimate.t_ns)
+        and truth.speed_mps.get(estimate.t_ns, np.inf) < slow_enough
+        and truth.mu[estimate.t_ns] - used.get(estimate.t_ns, np.inf) < max(LESS * truth.mu[estimate.t_ns], LEAST_LESS)
     ]
     return 100.0 * float(np.mean(errors)) if errors else None

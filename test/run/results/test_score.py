@@ -71,6 +71,15 @@ def test_half_a_brake_limits_more() -> None:
     assert mean_relative_error_percent(CONFIG, half, [at(2, 0.5), at(3, 0.05)]) == pytest.approx(25.0)
 
 
+@pytest.mark.parametrize(("force", "counts"), [(0.6, False), (1.0, True)])
+def test_a_brake_weaker_than_believed_limits_in_truth(force: float, counts: bool) -> None:
+    """On a rail of 0.08 the full brake, 0.0952, would slide; worn pads give 0.6 of it."""
+    slows = CONFIG.train.deceleration(0.08, force * CONFIG.brake(FULL_PA), CONFIG.train.specific_resistance(60.0))
+    speeds = (300.0, *(260.0 - 3.6 * slows * second for second in range(5)))
+    truth = truth_of(*((0.08, speed, FULL_PA) for speed in speeds))
+    assert (mean_relative_error_percent(CONFIG, truth, [at(3, 0.1)]) is not None) is counts
+
+
 def test_a_second_braking_does_not_start_the_30_kmh_anew() -> None:
     twice = truth_of((0.08, 300, FULL_PA), (0.08, 265, 0.0), (0.08, 265, FULL_PA), (0.08, 260, FULL_PA))
     assert mean_relative_error_percent(CONFIG, twice, [at(3, 0.1)]) == pytest.approx(25.0)
