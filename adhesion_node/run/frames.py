@@ -33,7 +33,7 @@ from ..core import (
 from ..core.physics.train import Array
 from .pipeline import BACK_M, Pipeline
 from .results.rows import COLUMNS, Row, row_of
-from .results.seen import Seen, pressure_of
+from .results.seen import Seen, heading_of, pressure_of
 
 MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "brake_demand", "acceleration")
 """Columns beside `time` and those of the axles; m, m^2, m/s, Pa above the atmosphere, m/s^2."""
@@ -80,7 +80,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     pipeline, rows, seen = Pipeline(config, seed), list[Row](), Seen()
     for made in _predictions(pipeline, _samples(t_ns, columns, std_m)):
         e = made.estimate
-        seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, e.speed_mps, pressure_of(pipeline))
+        seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
         rows.append(row_of(pipeline, made))
     used = {name: getattr(pipeline, name) for name in ("measurements", "accepted", "dropped", "digest")}
     if not rows:
@@ -102,7 +102,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
             warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
     result.insert(0, "time", _like(result["t_ns"].to_numpy(), frame["time"]))
-    result.attrs.update(used, why=seen.why_not())
+    result.attrs.update(used, why=seen.why_not(pipeline.repeated))
     return result
 
 

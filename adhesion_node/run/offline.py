@@ -35,7 +35,7 @@ from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
 from .results.rows import row_of, rows_to
 from .results.score import Identified, Point, Truth, mean_relative_error_percent
-from .results.seen import MANY, Seen, pressure_of
+from .results.seen import MANY, Seen, heading_of, pressure_of
 
 Recorded = tuple[str, Any, int]
 """Our name of a message's topic; the message, what was read of it, or why it is refused; its log time in ns."""
@@ -62,7 +62,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         for made in predictions(pipeline, truth, recorded, setup.line, window_ms):
             write(row_of(pipeline, made, setup.line.sign))
             e = made.estimate
-            seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, e.speed_mps, pressure_of(pipeline))
+            seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
             if truth is not None:
                 compared.append(Point(made.estimate.t_ns, made.estimate.mu))
     result = {"train": setup.train, **summary(pipeline, window_ms, truth, compared)}
@@ -70,7 +70,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         result["out"] = options.out
     if pipeline.back_m > BACK_M:
         result["back_m"] = pipeline.back_m
-    why = seen.why_not()
+    why = seen.why_not(pipeline.repeated)
     if why is not None:
         result["why"] = why
     for remark in _remarks(pipeline, why):

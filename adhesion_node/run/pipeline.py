@@ -13,7 +13,8 @@ import struct
 from functools import partial
 from typing import final
 
-from ..core import Config, Estimate, Outcome, Prediction, State, estimator, predict
+from ..core import Config, Estimate, Outcome, Prediction, Sample, State, estimator, predict
+from ..core.intake.samples import PositionSample
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.track import Track
 from ..wire.topics import POSITIONS
@@ -21,6 +22,9 @@ from .engine import EstimatorPipeline, Verbs
 
 BACK_MPS, BACK_M = 3.0, 10.0
 """A train that runs back faster and further than this does not roll back: its positions fall along the run."""
+
+JUMP_M = 2.0
+"""So far on a train did not stand while its position was repeated."""
 
 SURE_SIGMA = 2.0
 """Standard deviations by which it surely does: one that nothing is heard of may be foreseen to run back."""
@@ -58,6 +62,12 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         """Where it began to run back."""
         self.back_m = 0.0
         """How far it has run back at most, without a break, faster than `BACK_MPS`."""
+        self._doubts = 0
+        """Positions that were doubted, and new beginnings."""
+        self.is_shown = True
+        """Whether what the newest estimate says of the train's direction was measured, not only foreseen."""
+        self._held_m, self._repeats, self._repeated = math.nan, 0, 0
+        """The newest position, how often it came again, and how often others did that the train had left."""
         self._ran_m = (math.inf, -math.inf)
 
     def _output(self, estimate: Estimate) -> Prediction:
@@ -71,12 +81,23 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         return self.last is not None and self._back_m(self.last) > BACK_M
 
     def _note_way(self, estimate: Estimate) -> None:
-        if estimate.speed_mps + SURE_SIGMA * estimate.speed_std_mps > -BACK_MPS:
+        self.is_shown = self._shows()
+        if not self.is_shown or estimate.speed_mps + SURE_SIGMA * estimate.speed_std_mps > -BACK_MPS:
             self._back_from_m = None
         elif self._back_from_m is None or estimate.position_m > self._back_from_m:
             self._back_from_m = estimate.position_m
         self.back_m = max(self.back_m, self._back_m(estimate))
         self._ran_m = min(self._ran_m[0], estimate.position_m), max(self._ran_m[1], estimate.position_m)
+
+    def _shows(self) -> bool:
+        """Whether what came since the estimate before shows where the train runs to.
+
+        It does unless positions were doubted, and always by a speed below 0.
+        """
+        doubts = sum(self.state.counts.get(outcome, 0) for outcome in (Outcome.OUTLIER, Outcome.STUCK, Outcome.RESET))
+        doubts, self._doubts = doubts - self._doubts, doubts
+        newest = self.state.newest
+        return not doubts or (newest is not None and (newest.speed_mps or 0.0) < 0.0)
 
     @property
     def off_track(self) -> str | None:
@@ -90,6 +111,24 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     def ticks(self) -> int:
         """Times without a position at which the other sensors were used."""
         return self._counts()[Outcome.TICK.name]
+
+    @property
+    def repeated(self) -> float:
+        """Part of the positions that repeat the one before although the train moves on."""
+        return self._repeated / self.measurements if self.measurements else 0.0
+
+    def push(self, sample: Sample) -> list[Prediction]:
+        """Take one sample of any sensor and return what it completes."""
+        if isinstance(sample, PositionSample):
+            self._note_repeats(sample.position_m)
+        return super().push(sample)
+
+    def _note_repeats(self, position_m: float) -> None:
+        if position_m == self._held_m:
+            self._repeats += 1
+            return
+        self._repeated += self._repeats if abs(position_m - self._held_m) > JUMP_M else 0
+        self._held_m, self._repeats = position_m, 0
 
     @property
     def tally(self) -> str:

@@ -30,6 +30,7 @@ from test_offline import (
 
 from adhesion_node.bag import deserialize, serialize
 from adhesion_node.nodes import replay
+from adhesion_node.report import __main__ as report
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
@@ -53,6 +54,26 @@ def test_a_falling_chainage_is_run_as_a_rising_one_or_told(tmp_path: Path, bag: 
     unannounced = offline(tmp_path / "down")
     assert unannounced.result["back_m"] > 500.0
     assert any("set direction to what the chainage does along the run" in line for line in unannounced.err)
+
+
+def test_positions_that_are_held_do_not_fall(tmp_path: Path, offline: Offline) -> None:
+    """One position in a second, written ten times: what is foreseen in between may run anywhere."""
+    held = [samples(10.0)[index - index % 10][1].position_m for index in range(len(samples(10.0)))]
+
+    def sampled(topic: Topic, index: int, cdr: bytes) -> bytes:
+        if topic is not POSITION:
+            return cdr
+        message = deserialize(cdr, topic.type)
+        message.pose.pose.position.x = held[index]
+        return serialize(message, topic.type)
+
+    write_run(tmp_path / "held", samples(10.0), edit=sampled, names=NO_TRUTH)
+    said = offline(tmp_path / "held")
+    assert "back_m" not in said.result
+    assert " % of the positions repeat the one before" in said.result["why"]
+    json_file = tmp_path / "report.json"
+    report.main([str(tmp_path / "held"), "--output", str(tmp_path / "report"), "--json", str(json_file)])
+    assert said.result["why"] in json_file.read_text()
 
 
 def test_a_track_that_lies_elsewhere_is_told(bag: Path, offline: Offline) -> None:

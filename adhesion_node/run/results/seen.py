@@ -12,7 +12,7 @@ import math
 from collections import deque
 from collections.abc import Iterator
 
-from ...core import Config, Regime
+from ...core import Config, Estimate, Regime
 from ...core.physics.train import KMH
 from ..pipeline import BACKWARDS, Pipeline
 
@@ -123,12 +123,15 @@ class Seen:
         """Whether the brake seems to do nothing."""
         return self._held > MANY * self._pressed
 
-    def why_not(self) -> str | None:
-        """Say why nothing is identified; None where something is."""
-        return None if self.identified else next(self._reasons())
+    def why_not(self, repeated: float = 0.0) -> str | None:
+        """Say why nothing is identified, where a part of the positions is `repeated`; None where something is."""
+        return None if self.identified else next(self._reasons(repeated))
 
-    def _reasons(self) -> Iterator[str]:
+    def _reasons(self, repeated: float) -> Iterator[str]:
         """What may be the reason, the one that explains most first."""
+        if repeated > MANY:
+            part = f"{100.0 * repeated:.0f} %"
+            yield f"{part} of the positions repeat the one before: leave repeats empty, as import_csv does"
         if not self._estimates:
             yield "no estimate came of it; see what was dropped, and why"
         if self._runs_back:
@@ -151,6 +154,11 @@ class Seen:
             f"braked by up to {self.hardest_mps2:.2f} m/s^2, and a weaker brake would look the same as a slippery rail:"
             " wheel speeds tell, a speed by radar or Doppler (speed_source), or a brake known better (brake_std)"
         )
+
+
+def heading_of(pipeline: Pipeline, estimate: Estimate) -> float:
+    """The speed of the newest estimate, below 0 only where that is measured and not only foreseen, m/s."""
+    return estimate.speed_mps if pipeline.is_shown else abs(estimate.speed_mps)
 
 
 def pressure_of(pipeline: Pipeline) -> float | None:

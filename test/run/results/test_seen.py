@@ -70,6 +70,14 @@ def test_positions_that_fall_come_first() -> None:
     assert seen.why_not() == BACKWARDS
 
 
+def test_positions_that_repeat_come_before_all_that_follows_from_them() -> None:
+    seen = Seen()
+    for i in range(40):
+        seen.note(i * S // 2, "COASTING", 0.1, 0.02, -140.0, 4e5)
+    assert str(seen.why_not(0.83)).startswith("83 % of the positions repeat the one before: leave repeats empty")
+    assert seen.why_not(0.1) == BACKWARDS
+
+
 @pytest.mark.parametrize(("open_s", "identified"), [(1, False), (8, True)])
 def test_the_first_moments_at_the_limit_of_the_brake_are_no_identification(open_s: int, identified: bool) -> None:
     seen = Seen()
