@@ -33,6 +33,7 @@ from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_MU, TRUTH_
 from .engine import EstimatorPipeline
 from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
+from .results.brake import odd_brake
 from .results.rows import row_of, rows_to
 from .results.score import Identified, Point, Truth, mean_relative_error_percent
 from .results.seen import MANY, Seen, heading_of, pressure_of
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     truth = Truth() if TRUTH_MU.name in selection.values() else None
     recorded = progress(messages(reader, selection, setup.line), "messages")
     compared: list[Point] = []
-    seen = Seen()
+    seen = Seen(setup.config.train.full_pressure_pa)
     with rows_to(options.out) as write:
         # nothing is kept of an estimate but what is compared with the truth: a day takes no more memory than an hour
         for made in predictions(pipeline, truth, recorded, setup.line, window_ms):
@@ -70,17 +71,18 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         result["out"] = options.out
     if pipeline.back_m > BACK_M:
         result["back_m"] = pipeline.back_m
-    why = seen.why_not(pipeline.repeated)
+    brake = odd_brake(seen, pipeline)
+    why = seen.why_not(pipeline.repeated, brake)
     if why is not None:
         result["why"] = why
-    for remark in _remarks(pipeline, why):
+    for remark in _remarks(pipeline, why, brake):
         print(f"replay: {remark}", file=sys.stderr)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return DONE if seen.identified else FAILED
 
 
-def _remarks(pipeline: Pipeline, why: str | None) -> Iterator[str]:
-    """What a person must hear: that nothing is identified, much was dropped, the train runs back, or elsewhere."""
+def _remarks(pipeline: Pipeline, why: str | None, brake: str | None) -> Iterator[str]:
+    """What a person must hear: nothing is identified, much was dropped, its brake, that it runs back, or elsewhere."""
     for reason, count in pipeline.dropped.items():
         if count > MANY * pipeline.measurements:
             known = [kind[reason].value for kind in (Outcome, Reason) if reason in kind.__members__]
@@ -89,6 +91,8 @@ def _remarks(pipeline: Pipeline, why: str | None) -> Iterator[str]:
         yield f"nothing is identified: {why}"
     elif pipeline.back_m > BACK_M:
         yield BACKWARDS
+    if brake is not None and brake != why:
+        yield brake
     if pipeline.off_track is not None:
         yield pipeline.off_track
 

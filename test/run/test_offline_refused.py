@@ -76,6 +76,14 @@ def test_positions_that_are_held_do_not_fall(tmp_path: Path, offline: Offline) -
     assert said.result["why"] in json_file.read_text()
 
 
+def test_a_brake_that_is_not_the_trains_is_told(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    """One that is told to have more than twice its mass brakes more than twice as hard as its papers promise."""
+    heavy, right = (offline(bag, "--set", f"train.mass_kg={mass}") for mass in (1.2e6, 536e3))
+    (said,) = [line for line in heavy.err if "its full brake gives" in line]
+    assert "check the units of speed and pressure, and the train (--train)" in said
+    assert not any("brake gives" in line for line in right.err)
+
+
 def test_a_track_that_lies_elsewhere_is_told(bag: Path, offline: Offline) -> None:
     told = [
         offline(bag, "--set", f"track=grade {at}").err for at in ("1000 9000 10", "100000 120000 10", "-900 -800 1")

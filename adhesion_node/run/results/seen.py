@@ -22,6 +22,9 @@ BRAKES_MPS2, SPAN_S = 0.3, 3.0
 BRAKED_PA = 20e3
 """From this pressure on the brake works."""
 
+FULL = 0.8
+"""From this part of its pressure on the brake counts as full."""
+
 PIPE_PA, RUNS_MPS2, RUNS_MPS = 2.5e5, 0.05, 5.0
 """A train with such a pressure in its cylinders does not run on, slowing down by less than this, at such a speed."""
 
@@ -49,7 +52,11 @@ def is_known(mu: float, mu_lower: float, regime: str = "") -> bool:
 class Seen:
     """Takes the estimates of a run as they come; keeps no more than what the newest seconds need."""
 
-    def __init__(self) -> None:
+    def __init__(self, full_pa: float = math.inf) -> None:
+        """Begin; at `full_pa`, gauge, the brake is full."""
+        self._full_pa = full_pa
+        self._full_mps2, self._full = 0.0, 0
+        """Decelerations under the full brake, summed and counted."""
         self._limited = self._at_brake = self._told = self._open = 0
         """Estimates while the adhesion limited, while the brake did, while either may and what is used is known, and
         while either may in a braking."""
@@ -78,6 +85,9 @@ class Seen:
             self._told += slows_mps2 >= BRAKES_MPS2 and is_known(mu, mu_lower)
             self._open += (pressure_pa or 0.0) >= BRAKED_PA and abs(speed_mps) > RUNS_MPS
         self.hardest_mps2 = max(self.hardest_mps2, 0.0 if math.isnan(slows_mps2) else slows_mps2)
+        if pressure_pa is not None and pressure_pa >= FULL * self._full_pa and not math.isnan(slows_mps2):
+            self._full_mps2 += slows_mps2
+            self._full += 1
         if pressure_pa is not None:
             self.most_pa = max(pressure_pa, self.most_pa or 0.0)
         self._fastest_mps = max(abs(speed_mps), self._fastest_mps)
@@ -108,6 +118,11 @@ class Seen:
         return is_open and not (self._runs_back or self._runs_on or self._fastest_mps > FASTEST_MPS)
 
     @property
+    def full_mps2(self) -> float | None:
+        """Mean deceleration under the full brake; None without one."""
+        return self._full_mps2 / self._full if self._full else None
+
+    @property
     def too_fast(self) -> str | None:
         """That no train is so fast; None of one that may be."""
         fast = f"{self._fastest_mps:.0f} m/s, {self._fastest_mps / KMH:.0f} km/h"
@@ -123,11 +138,11 @@ class Seen:
         """Whether the brake seems to do nothing."""
         return self._held > MANY * self._pressed
 
-    def why_not(self, repeated: float = 0.0) -> str | None:
+    def why_not(self, repeated: float = 0.0, odd_brake: str | None = None) -> str | None:
         """Say why nothing is identified, where a part of the positions is `repeated`; None where something is."""
-        return None if self.identified else next(self._reasons(repeated))
+        return None if self.identified else next(self._reasons(repeated, odd_brake))
 
-    def _reasons(self, repeated: float) -> Iterator[str]:
+    def _reasons(self, repeated: float, odd_brake: str | None) -> Iterator[str]:
         """What may be the reason, the one that explains most first."""
         if repeated > MANY:
             part = f"{100.0 * repeated:.0f} %"
@@ -138,6 +153,8 @@ class Seen:
             yield BACKWARDS
         if self.too_fast is not None:
             yield self.too_fast
+        if odd_brake is not None:
+            yield odd_brake
         if self.most_pa is None:
             yield "no brake pressure and no demand came: without them it is not told whether the adhesion limits"
         elif self.most_pa < BRAKED_PA:

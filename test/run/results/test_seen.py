@@ -78,6 +78,15 @@ def test_positions_that_repeat_come_before_all_that_follows_from_them() -> None:
     assert seen.why_not(0.1) == BACKWARDS
 
 
+def test_the_deceleration_under_the_full_brake_is_its_mean() -> None:
+    seen = Seen(4e5)
+    for i in range(60):
+        braked_s = max(i / 2 - 10.0, 0.0)
+        seen.note(i * S // 2, "COASTING", 0.1, 0.02, 60.0 - 0.8 * braked_s, 3.8e5 if braked_s > 4.0 else 1e5)
+    assert seen.full_mps2 == pytest.approx(0.8)
+    assert Seen(4e5).full_mps2 is None
+
+
 @pytest.mark.parametrize(("open_s", "identified"), [(1, False), (8, True)])
 def test_the_first_moments_at_the_limit_of_the_brake_are_no_identification(open_s: int, identified: bool) -> None:
     seen = Seen()
