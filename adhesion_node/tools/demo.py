@@ -86,7 +86,7 @@ class _Progress:
         if estimate is not None and estimate.t_ns >= self._due_ns:
             self._due_ns = estimate.t_ns + round(SHOWN_EVERY_S * 1e9)
             _say(
-                f"{estimate.t_ns * 1e-9:5.0f} s {estimate.speed_mps / KMH:5.0f} km/h {estimate.mu:7.4f} "
+                f"{estimate.t_ns * 1e-9:5.0f} s {abs(estimate.speed_mps) / KMH:5.0f} km/h {estimate.mu:7.4f} "
                 f"{estimate.mu_lower:9.4f}  {IN_WORDS[estimate.regime.name]}"
             )
         return True

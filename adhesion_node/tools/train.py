@@ -64,7 +64,8 @@ class Likely(NamedTuple):
     @property
     def told(self) -> str:
         """The number, what is usual, and what may be wrong with it."""
-        return f"{self.what} = {self.value:.4g} {self.unit}, usual is {self.low:g} to {self.high:g}: {self.hint}"
+        value = f"{self.value:.4g} {self.unit}".rstrip()
+        return f"{self.what} = {value}, usual is {self.low:.4g} to {self.high:.4g}: {self.hint}"
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -71,7 +71,8 @@ function chart(host, { view = shared(), onPick = null } = {}) {
   }
   const pan = (share) => { const [from, to] = range(), by = share * (to - from); zoomTo(from + by, to + by); };
 
-  function under(u) {
+  // Bands below the grid, `write` their names on it: a line of the grid through a letter makes another one.
+  const bands = (write) => (u) => {
     const { ctx, bbox } = u, px = uPlot.pxRatio;
     ctx.save();
     ctx.beginPath();
@@ -81,13 +82,12 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     for (const band of spec.bands ?? []) {
       const left = Math.max(u.valToPos(band.from, "x", true), bbox.left), right = Math.min(u.valToPos(band.to, "x", true), bbox.left + bbox.width);
       if (right <= left) continue;
-      ctx.fillStyle = ink(`band ${band.kind}`);
-      ctx.fillRect(left, bbox.top, right - left, bbox.height);
-      ctx.fillStyle = ink("soft");
-      if (right - left > ctx.measureText(band.label).width + 8 * px) ctx.fillText(band.label, left + 4 * px, bbox.top + 12 * px);
+      ctx.fillStyle = ink(write ? "soft" : `band ${band.kind}`);
+      if (!write) ctx.fillRect(left, bbox.top, right - left, bbox.height);
+      else if (right - left > ctx.measureText(band.label).width + 8 * px) ctx.fillText(band.label, left + 4 * px, bbox.top + 12 * px);
     }
     ctx.restore();
-  }
+  };
 
   function over(u) {
     const { ctx, bbox } = u, px = uPlot.pxRatio, bottom = bbox.top + bbox.height;
@@ -157,7 +157,7 @@ function chart(host, { view = shared(), onPick = null } = {}) {
       cursor: { sync: { key: spec.x.label, scales: ["x", null] }, drag: { x: true, y: false, setScale: false }, points: { size: 6 },
                 bind: { dblclick: () => () => view.show(null),
                         mousedown: (u, _, handler) => (event) => (event.shiftKey ? drag(event) : handler(event)) } },
-      hooks: { drawClear: [under], draw: [over], setSelect: [select] },
+      hooks: { drawClear: [bands(false)], drawAxes: [bands(true)], draw: [over], setSelect: [select] },
     }, table(), area);
     pointer = plot.over.appendChild(element("div", { class: "present" }));
     const wrap = plot.root.querySelector(".u-wrap");

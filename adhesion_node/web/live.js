@@ -16,7 +16,8 @@ const nothing = () => ({ taken: {}, heard: {}, inputs: {}, history: [], passed: 
 let state = nothing(), ahead_s = null, heard_s = seconds(), heardAt = new Date(), dirty = true;
 
 const silent = () => seconds() - heard_s > SILENT_S;
-const now_s = () => (state.ended ? state.now : seconds() + ahead_s);
+// A run that has ended stays as it is, a program that has gone does not.
+const now_s = () => (state.ended && !silent() ? state.now : seconds() + ahead_s);
 const since = (time) => (time == null ? Infinity : Math.max(now_s() - time, 0));
 // Of what is shown, a refused message is no news.
 const age = (topic) => since(topic in state.taken ? state.taken[topic] : state.heard[topic]);

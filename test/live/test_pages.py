@@ -125,6 +125,17 @@ def test_a_value_that_is_old_is_blank_and_the_others_stay() -> None:
         assert shown.page.locator("#limits td:last-child").all_inner_texts() == ["–"] * 7
 
 
+def test_what_a_run_that_has_ended_has_left_grows_old_once_the_program_has_gone() -> None:
+    with line() as shown:
+        estimate(shown.view, 0)
+        shown.hear()
+        shown.view.end(1.0)
+        shown.wait("the run has ended")
+        shown.served.close()
+        shown.wait("NO DATA since")
+        shown.wait("the last value is 3 s old")
+
+
 def test_a_program_that_says_nothing_for_a_second_is_no_data_and_one_that_comes_back_begins_anew() -> None:
     with line() as shown:
         estimate(shown.view, 0)

@@ -75,6 +75,11 @@ def test_the_dry_stopping_distance_is_that_of_the_deceleration(
         ("full_pressure_pa: 380.0e+3", "full_pressure_pa: 3800", "full pressure = 0.038 bar"),
         ("{empty: 170.0e+3, loaded: 250.0e+3}", "{empty: 17.0e+3, loaded: 25.0e+3}", "mass per length = 0.1944 t/m"),
         ("c2: 0.00026", "c2: 0.0099", "resistance at top speed = 65.21 N/kN"),
+        (
+            "deceleration_mps2: 1.3",
+            "deceleration_mps2: 0.1",
+            "adhesion that the full brake uses = 0.0102, usual is 0.015 to 0.1971: ",
+        ),
         ("known_to: {mass: 0.1", "known_to: {mass: 10", "known_to mass = 10 of it, usual is 0.001 to 1: per cent?"),
         ("max_speed_kmh: 80", "max_speed_kmh: 400", "adhesion that the full brake uses"),
     ],

@@ -19,6 +19,9 @@ from ..found.distances import FIXED_MU, distances, true_way
 from ..read.run import Run
 from ..read.series import NONE, Series
 
+NOTHING = 1e-6
+"""A chart whose values differ by less is one of zeros: its axis would have the same number at every tick."""
+
 
 class Line(NamedTuple):
     """A line of a chart; its kind says how it is drawn.
@@ -44,8 +47,9 @@ class Chart(NamedTuple):
         """From the lowest value, or 0, to the highest; a bound near 0 is far from all that it may be compared with."""
         others = [line.series.values for line in self.lines if line.kind != "bound"]
         far = 2.0 * np.nanmax(np.abs(np.concatenate([[0.0], *others])))
-        values = np.concatenate([[0.0, 1e-6], *(np.clip(line.series.values, -far, far) for line in self.lines)])
-        return 1.08 * float(np.nanmin(values)), 1.08 * float(np.nanmax(values))
+        values = np.concatenate([[0.0], *(np.clip(line.series.values, -far, far) for line in self.lines)])
+        low, high = 1.08 * float(np.nanmin(values)), 1.08 * float(np.nanmax(values))
+        return (low, high) if high - low > NOTHING else (0.0, 1.0)
 
 
 def charts(run: Run, target_kmh: float, train: Train) -> Iterator[Chart]:

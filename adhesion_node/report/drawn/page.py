@@ -135,7 +135,7 @@ def _jump(row: Mapping[str, Any]) -> str:
 
 
 def _told(row: Mapping[str, Any]) -> Iterator[str]:
-    yield f"{row['from_kmh']:.0f} → {row['to_kmh']:.0f}"
+    yield f"{row['from_kmh']:.0f}\u00a0→\u00a0{row['to_kmh']:.0f}"
     shares = (("adhesion", row["adhesion_share"]), ("the brake", row["brake_share"]))
     yield ", ".join(f"{name} {share:.0%}" for name, share in shares if share) or "nothing is claimed"
     yield "–" if row["mu_low"] is None else f"{row['mu_low']:.4f} to {row['mu_high']:.4f}"
@@ -174,7 +174,8 @@ def _diagnostics(subject: Subject) -> str:
 
 def _events(subject: Subject) -> str:
     run, found = subject.run, events(subject.run)
-    body = [[f"{(t_ns - run.origin_ns) * 1e-9:.1f} s", kind, escape(text)] for t_ns, kind, text in found[:MOST_CHANGES]]
+    told = [((t_ns - run.origin_ns) * 1e-9, kind, escape(text)) for t_ns, kind, text in found[:MOST_CHANGES]]
+    body = [[f"{at_s:.1f}\u00a0s", kind, text] for at_s, kind, text in told]
     more = f"<p>and {len(found) - MOST_CHANGES} more</p>" if len(found) > MOST_CHANGES else ""
     return (table_html(["time", "kind", "what"], body) + more) if body else "<p>None recorded.</p>"
 

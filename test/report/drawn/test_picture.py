@@ -29,12 +29,13 @@ from adhesion_node.bag.types import serialize
 from adhesion_node.core.physics.braking import BrakingCurve
 from adhesion_node.core.physics.train import Train
 from adhesion_node.report.drawn import picture
+from adhesion_node.report.drawn.charts import Chart, Line
 from adhesion_node.report.drawn.table import NO_ROWS, ROWS, table
 from adhesion_node.report.found.distances import distance_to_target, distances, true_way
 from adhesion_node.report.found.regimes import Band
 from adhesion_node.report.read.recorded import read_run
 from adhesion_node.report.read.run import Run
-from adhesion_node.report.read.series import NONE
+from adhesion_node.report.read.series import NONE, Series
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,
@@ -247,6 +248,13 @@ def test_distances_are_those_of_the_recorded_curves_and_of_the_present_mu_where_
     assert not np.any([faster.identified, faster.longest]), "no way to a speed that the train is below"
     shown = {line.split()[0]: line.split()[5:7] for line in table(run, 180.0, FREE).splitlines()[2:]}
     assert shown["259"] == ["208", "400"]
+
+
+def test_a_chart_of_zeros_has_an_axis_with_different_numbers() -> None:
+    zeros = Series(np.array([0, S]), np.zeros(2))
+    assert Chart("Forces, kN", 1, [Line("brake B", "fixed", zeros)]).range == (0.0, 1.0)
+    some = zeros.map(lambda values: values - [0.0, 5.0])
+    assert Chart("saved, m", 1, [Line("by μ̂", "nominal", some)]).range == pytest.approx((-5.4, 0.0))
 
 
 def test_a_train_that_stands_may_seem_to_roll_back(recorded: Run) -> None:

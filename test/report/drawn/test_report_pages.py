@@ -105,8 +105,9 @@ def test_the_headline_is_of_all_brakings_and_each_has_a_row(hour: str) -> None:
         assert not any("saved" in name.lower() for name in told)
         assert brakings.locator("tbody tr").count() == 7
         second = brakings.locator("tbody tr").nth(1).locator("td").all_inner_texts()
-        assert second[1:3] == ["288 → 79", "adhesion 80%, the brake 7%"]
+        assert second[1:3] == ["288\u00a0→\u00a079", "adhesion 80%, the brake 7%"]
         assert second[7] == "1: at 620.0 s"
+        assert page.get_by_role("cell", name="620.0\u00a0s", exact=True).count() >= 1, "a time is not broken"
         saved = [int(row.split()[0]) for row in brakings.locator("td:last-child").all_inner_texts()[:2]]
         assert saved[1] < saved[0] - 100, "a promise that the change of the rail has taken back"
         assert troubles == []
