@@ -102,7 +102,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
             warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
     result.insert(0, "time", _like(result["t_ns"].to_numpy(), frame["time"]))
-    result.attrs.update(used, why=seen.why_not(pipeline.repeated))
+    result.attrs.update(used, why=seen.why_not())
     return result
 
 

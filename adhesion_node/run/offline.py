@@ -72,7 +72,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     if pipeline.back_m > BACK_M:
         result["back_m"] = pipeline.back_m
     brake = odd_brake(seen, pipeline)
-    why = seen.why_not(pipeline.repeated, brake)
+    why = seen.why_not(brake)
     if why is not None:
         result["why"] = why
     for remark in _remarks(pipeline, why, brake):

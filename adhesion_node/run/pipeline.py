@@ -13,8 +13,7 @@ import struct
 from functools import partial
 from typing import final
 
-from ..core import Config, Estimate, Outcome, Prediction, Sample, State, estimator, predict
-from ..core.intake.samples import PositionSample
+from ..core import Config, Estimate, Outcome, Prediction, State, estimator, predict
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.track import Track
 from ..wire.topics import POSITIONS
@@ -22,9 +21,6 @@ from .engine import EstimatorPipeline, Verbs
 
 BACK_MPS, BACK_M = 3.0, 10.0
 """A train that runs back faster and further than this does not roll back: its positions fall along the run."""
-
-JUMP_M = 2.0
-"""So far on a train did not stand while its position was repeated."""
 
 SURE_SIGMA = 2.0
 """Standard deviations by which it surely does: one that nothing is heard of may be foreseen to run back."""
@@ -66,8 +62,6 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         """Positions that were doubted, and new beginnings."""
         self.is_shown = True
         """Whether what the newest estimate says of the train's direction was measured, not only foreseen."""
-        self._held_m, self._repeats, self._repeated = math.nan, 0, 0
-        """The newest position, how often it came again, and how often others did that the train had left."""
         self._ran_m = (math.inf, -math.inf)
 
     def _output(self, estimate: Estimate) -> Prediction:
@@ -111,24 +105,6 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     def ticks(self) -> int:
         """Times without a position at which the other sensors were used."""
         return self._counts()[Outcome.TICK.name]
-
-    @property
-    def repeated(self) -> float:
-        """Part of the positions that repeat the one before although the train moves on."""
-        return self._repeated / self.measurements if self.measurements else 0.0
-
-    def push(self, sample: Sample) -> list[Prediction]:
-        """Take one sample of any sensor and return what it completes."""
-        if isinstance(sample, PositionSample):
-            self._note_repeats(sample.position_m)
-        return super().push(sample)
-
-    def _note_repeats(self, position_m: float) -> None:
-        if position_m == self._held_m:
-            self._repeats += 1
-            return
-        self._repeated += self._repeats if abs(position_m - self._held_m) > JUMP_M else 0
-        self._held_m, self._repeats = position_m, 0
 
     @property
     def tally(self) -> str:

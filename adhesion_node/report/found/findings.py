@@ -85,7 +85,7 @@ def why_not(run: Run) -> str | None:
     columns = times, run.regimes_at(times), run.mu.at(times), run.mu_lower.at(times), run.speed.values, pressure
     for t_ns, regime, mu, bound, speed, pressure_pa in in_rows(*columns):
         seen.note(t_ns, regime, mu, bound, speed, None if math.isnan(pressure_pa) else pressure_pa)
-    return seen.why_not(float(run.counts.get("repeated", "0")))
+    return seen.why_not()
 
 
 def _error(run: Run, config: Config) -> float | None:

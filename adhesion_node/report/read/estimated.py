@@ -65,7 +65,6 @@ def estimate_run(
             "measurements": str(pipeline.measurements),
             "accepted": str(pipeline.accepted),
             "windows": str(pipeline.windows),
-            **({"repeated": f"{pipeline.repeated:.2f}"} if pipeline.repeated else {}),
             **{f"dropped.{reason}": str(count) for reason, count in pipeline.dropped.items()},
             "confidence": f"{pipeline.config.confidence:g}",
             "digest": pipeline.digest,

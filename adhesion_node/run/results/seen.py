@@ -138,15 +138,12 @@ class Seen:
         """Whether the brake seems to do nothing."""
         return self._held > MANY * self._pressed
 
-    def why_not(self, repeated: float = 0.0, odd_brake: str | None = None) -> str | None:
-        """Say why nothing is identified, where a part of the positions is `repeated`; None where something is."""
-        return None if self.identified else next(self._reasons(repeated, odd_brake))
+    def why_not(self, odd_brake: str | None = None) -> str | None:
+        """Say why nothing is identified; None where something is."""
+        return None if self.identified else next(self._reasons(odd_brake))
 
-    def _reasons(self, repeated: float, odd_brake: str | None) -> Iterator[str]:
+    def _reasons(self, odd_brake: str | None) -> Iterator[str]:
         """What may be the reason, the one that explains most first."""
-        if repeated > MANY:
-            part = f"{100.0 * repeated:.0f} %"
-            yield f"{part} of the positions repeat the one before: leave repeats empty, as import_csv does"
         if not self._estimates:
             yield "no estimate came of it; see what was dropped, and why"
         if self._runs_back:

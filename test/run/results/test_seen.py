@@ -70,14 +70,6 @@ def test_positions_that_fall_come_first() -> None:
     assert seen.why_not() == BACKWARDS
 
 
-def test_positions_that_repeat_come_before_all_that_follows_from_them() -> None:
-    seen = Seen()
-    for i in range(40):
-        seen.note(i * S // 2, "COASTING", 0.1, 0.02, -140.0, 4e5)
-    assert str(seen.why_not(0.83)).startswith("83 % of the positions repeat the one before: leave repeats empty")
-    assert seen.why_not(0.1) == BACKWARDS
-
-
 def test_the_deceleration_under_the_full_brake_is_its_mean() -> None:
     seen = Seen(4e5)
     for i in range(60):
