@@ -24,7 +24,7 @@ from .log.checks import odd
 from .log.format import Format
 from .log.options import add_options, format_of
 from .log.text import BLOCK
-from .log.told import Refused, ranges, read_as
+from .log.told import Refused, ranges, read_as, units_read
 from .log.whole import Log, read_log
 
 EXAMPLES = (
@@ -151,7 +151,7 @@ def _work(options: argparse.Namespace) -> int:
         lines = [f"{summary['rows']} rows, {summary['written']} written to {summary['output']}"]
     else:
         raise ValueError("output: name the recording with --output DIR, or look first with --dry-run")
-    lines += [read_as(log.form), *log.notes, *ranges(log)]
+    lines += [read_as(log.form), *units_read(log.form), *log.notes, *ranges(log)]
     lines += [f"{count} refused: {reason}" for reason, count in summary["refused"].items()]
     lines += [f"{count} without {column}" for column, count in summary["empty"].items()]
     for text in summary["odd"]:

@@ -11,17 +11,17 @@
 Means over a second are judged, so that neither noise nor the rate of the rows matters.
 """
 
-import math
 from collections.abc import Iterator
-from itertools import chain, product
+from itertools import chain
 
 import numpy as np
 
 from ...core.physics.train import KMH, Array
 from ...run.results.seen import FASTEST_MPS
-from .format import PLACES, POSITION_UNITS, PRESSURE_UNITS, PRESSURES, SPEED_UNITS, TIME_UNITS, Format, option
-from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, SAME, Motion, motion_of
+from .format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
+from .motion import BRAKES_MPS2, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
+from .ways import slow_or_falling, speed_against_positions
 from .whole import Log, moment
 
 HARDEST_MPS2, HARD_S = 3.0, 3
@@ -29,9 +29,6 @@ HARDEST_MPS2, HARD_S = 3.0, 3
 
 SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
 """Between two rows of a recorder."""
-
-MOVES_MPS, ONE_WAY = 2.0, 0.9
-"""Where a train moves its positions rise, or fall, for so much of its way; slower ones are noise."""
 
 SILENT, WEAKEST_PA, FULL_PA = 0.1, 15e3, (5e4, 1.5e6)
 """Up to the first nothing is measured; no brake's greatest pressure is below the second; mostly it is in the third."""
@@ -48,11 +45,19 @@ def odd(log: Log) -> list[str]:
     t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
     of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *_pressures(log)]
     if of_time or t_s[-1] < LEAST_S:
-        return of_time + texts
+        return [*log.columns.doubts, *of_time, *texts]
     motion = motion_of(log, t_s)
-    of_way = [*(_speed_against_positions(motion, log.form) if motion.is_compared else _slow_or_falling(motion))]
+    of_way = [*(speed_against_positions(motion, log.form) if motion.is_compared else slow_or_falling(motion))]
     of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion)]
-    return [*texts, *of_way, *_pipe(motion), *felt(motion, log.form), *rolling(motion, log.form), *_clock(log, t_s)]
+    return [
+        *log.columns.doubts,
+        *texts,
+        *of_way,
+        *_pipe(motion),
+        *felt(motion, log.form),
+        *rolling(motion, log.form),
+        *_clock(log, t_s),
+    ]
 
 
 def _rows_too_far(t_s: Array, form: Format) -> Iterator[str]:
@@ -73,7 +78,7 @@ def _pressures(log: Log) -> Iterator[str]:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
 
     if "brake_pipe" in log.columns.names and log.form.pipe_released is not None:
-        yield from _other_unit("brake_pipe", log.form.pipe_released * PRESSURE_UNITS[log.form.pressure_unit])
+        yield from _other_unit("brake_pipe", log.form.pipe_released * PRESSURE_UNITS[log.form.unit("brake_pipe")])
 
 
 def _other_unit(name: str, most_pa: float) -> Iterator[str]:
@@ -88,53 +93,6 @@ def _empty(log: Log) -> Iterator[str]:
     for name in (*chain.from_iterable(PLACES), *PRESSURES):
         if name in log.rows and log.rows[name].isna().all():
             yield f"no row has a {name}: name another column with {option(name)} COL"
-
-
-def _speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
-    """Positions and speeds tell the same way; if not, what the one is of the other tells why."""
-    course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
-    ratio = float((np.abs(course) * speed).sum() / (speed * speed).sum())
-    yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
-    if course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
-        yield "the speed is below 0 while the positions rise: change its sign, it counts forward along the run"
-    told = f"the positions move at {ratio:.3g} times the speed"
-    for (place, place_m), (pace, pace_mps) in product(POSITION_UNITS.items(), SPEED_UNITS.items()):
-        other = pace_mps / SPEED_UNITS[form.speed_unit] / (place_m / POSITION_UNITS[form.position_unit])
-        if abs(math.log(max(ratio, 1e-30) / other)) < SAME:
-            cures = [f"--position-unit {place}"] * (place != form.position_unit)
-            cures += [f"--speed-unit {pace}"] * (pace != form.speed_unit)
-            if cures:
-                yield f"{told}: another unit? {' '.join(cures)}"
-            return
-    if ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
-        yield f"{told}: are they degrees? --lat COL --lon COL"
-    else:
-        yield f"{told}: are both units right, is the speed that of a wheel which slid?"
-
-
-def _slow_or_falling(motion: Motion) -> Iterator[str]:
-    """Positions alone: do they rise, and as fast as a train runs?"""
-    course = motion.course_mps[np.isfinite(motion.course_mps)]
-    if len(course) < LEAST_S:
-        return
-    most, is_steady = float(np.abs(course).max()), abs(course.sum()) > 0.8 * np.abs(course).sum()
-    if is_steady and 0.0 < most < 2e-3:
-        yield f"the train creeps at {most:.2g} m/s: are the positions degrees? --lat COL --lon COL"
-    elif is_steady and 0.0 < most < 0.15:
-        yield f"the train creeps at {most:.2g} m/s: are the positions in km? --position-unit km"
-    else:
-        yield from _against_chainage(motion, course[np.abs(course) > MOVES_MPS], LEAST_M)
-
-
-def _against_chainage(motion: Motion, course: Array, least_m: float) -> Iterator[str]:
-    """Whether the positions of a train that moves fall, or do both, by more than `least_m`."""
-    way_m = np.abs(course).sum()
-    fallen_m = -course[course < 0.0].sum()
-    if fallen_m > max(ONE_WAY * way_m, least_m):
-        first, last = motion.place_m[np.isfinite(motion.place_m)][[0, -1]]
-        yield f"the positions fall, from {first:.6g} to {last:.6g} m: --direction down turns them"
-    elif fallen_m > max((1.0 - ONE_WAY) * way_m, least_m):
-        yield "the positions rise and fall: cut the log, and import the way back with --direction down"
 
 
 def _hard(motion: Motion) -> Iterator[str]:
@@ -153,7 +111,7 @@ def _too_fast(motion: Motion, form: Format) -> Iterator[str]:
         measured = bool(np.isfinite(motion.speed_mps).any())
         cure = (
             "km/h? --speed-unit kmh"
-            if measured and form.speed_unit == "mps"
+            if measured and form.unit("speed") == "mps"
             else "another --position-unit, --time-unit?"
         )
         yield f"the train runs {fast:.0f} m/s, {fast / KMH:.0f} km/h: {cure}"

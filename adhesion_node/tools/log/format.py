@@ -11,7 +11,7 @@
 import codecs
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
@@ -32,7 +32,7 @@ TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "excel": 86_400 * 1
 EXCEL_1970 = 25_569
 """The day of a spreadsheet on which the epoch begins."""
 
-POSITION_UNITS = {"m": 1.0, "km": 1e3}
+POSITION_UNITS = {"m": 1.0, "km": 1e3, "ft": 0.3048}
 PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757}
 SPEED_UNITS = {"mps": 1.0, "kmh": KMH, "mph": 0.44704}
 ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665}
@@ -49,6 +49,20 @@ OPTIONAL = (
     *(*PRESSURES, "speed", "speed_std", "acceleration"),
 )
 """All columns but the time and the axles."""
+
+FAMILIES = {
+    **{name: name for name in ("time", "position", "speed", "acceleration")},
+    **{"speed_std": "speed", "wheel_speed": "wheel"},
+    **dict.fromkeys(PRESSURES, "pressure"),
+}
+"""By column of what its unit is: so the option is called that says it, `--speed-unit`."""
+
+UNITS: Mapping[str, Sequence[str]] = {
+    **{"time": tuple(TIME_UNITS), "position": tuple(POSITION_UNITS), "speed": tuple(SPEED_UNITS)},
+    **{"pressure": tuple(PRESSURE_UNITS), "acceleration": tuple(ACCELERATION_UNITS), "wheel": WHEEL_UNITS},
+    **{"lat": ("deg",), "lon": ("deg",), "height": ("m",), "variance": ("m2",)},
+}
+"""By family, the first one where nothing is said; the last ones by column, of which there is no other."""
 
 _IS_PRESSURE = "Pa absolute: is the --pressure-unit, --pressure-kind or --ambient-pressure another?"
 _ABSOLUTE = (MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA, _IS_PRESSURE)
@@ -93,8 +107,10 @@ class Format:
     decimal: str | None = None
     skip_rows: int | None = None
     """Lines above the header."""
-    units_rows: int = 0
-    """Lines between the header and the first row, such as units."""
+    units: Sequence[str] | None = None
+    """Cells of the line of units between the header and the first row, where there is one."""
+    told: Mapping[str, str] = field(default_factory=dict)
+    """Units of columns, as the log itself names them; an option counts more."""
     time_unit: str | None = None
     """One of `TIME_UNITS`, or `iso`."""
     time_format: str | None = None
@@ -104,19 +120,19 @@ class Format:
     sort: bool = False
     direction: str = "up"
     """Whether the chainage rises as the train runs, or falls: `down`."""
-    position_unit: str = "m"
+    position_unit: str | None = None
     position_std_m: float | None = None
     """Stands in where the log gives no variance; None: 0.5 m along the track, unknown of latitude and longitude."""
-    pressure_unit: str = "pa"
+    pressure_unit: str | None = None
     pressure_is_gauge: bool = True
     ambient_pressure_pa: float = ATMOSPHERE_PA
     pipe_released: float | None = None
     """Pressure of the brake pipe, in the unit of pressures, where the brake is released; None: its 9th decile."""
     full_pressure_pa: float = CRH3.full_pressure_pa
     """What a full brake demands of the cylinders, gauge."""
-    speed_unit: str = "mps"
-    acceleration_unit: str = "mps2"
-    wheel_unit: str = "radps"
+    speed_unit: str | None = None
+    acceleration_unit: str | None = None
+    wheel_unit: str | None = None
     wheel_radius_m: float = CRH3.wheel_radius_m
 
     def __post_init__(self) -> None:
@@ -137,14 +153,25 @@ class Format:
             raise ValueError(f"full-pressure = {self.full_pressure_pa!r}: give 100000 to 1000000 Pa, gauge")
         Line(ambient_pressure_pa=self.ambient_pressure_pa)
 
+    def given(self, column: str) -> str | None:
+        """The unit of a column that an option says; the axles together are `wheel_speed`."""
+        unit: str | None = getattr(self, f"{FAMILIES[column]}_unit", None) if column in FAMILIES else None
+        return unit
+
+    def unit(self, column: str) -> str:
+        """The unit of a column: that of the option, else as the log says of it or of its like, else SI."""
+        family = FAMILIES.get(column, column)
+        of_family = (unit for other, unit in self.told.items() if FAMILIES.get(other) == family)
+        return self.given(column) or self.told.get(column) or next(of_family, UNITS[family][0])
+
     def factors(self) -> Mapping[str, float]:
         """What one unit of a column is in SI, where it is not 1."""
         return {
-            "position": POSITION_UNITS[self.position_unit],
-            **dict.fromkeys(PRESSURES, PRESSURE_UNITS[self.pressure_unit]),
-            **dict.fromkeys(("speed", "speed_std"), SPEED_UNITS[self.speed_unit]),
-            "acceleration": ACCELERATION_UNITS[self.acceleration_unit],
-            "wheel_speed": wheel_units(self.wheel_radius_m)[self.wheel_unit],
+            "position": POSITION_UNITS[self.unit("position")],
+            **{name: PRESSURE_UNITS[self.unit(name)] for name in PRESSURES},
+            **{name: SPEED_UNITS[self.unit(name)] for name in ("speed", "speed_std")},
+            "acceleration": ACCELERATION_UNITS[self.unit("acceleration")],
+            "wheel_speed": wheel_units(self.wheel_radius_m)[self.unit("wheel_speed")],
         }
 
 

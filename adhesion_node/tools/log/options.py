@@ -33,6 +33,8 @@ OF_TRAIN = ("wheel_radius_m", "full_pressure_pa")
 
 _GUESSED = "when it is not as guessed"
 
+_TOLD = "default: as the header says, else"
+
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Add them to a parser."""
@@ -76,10 +78,10 @@ def _text_options(add: Callable[..., Any]) -> None:
 def _unit_options(add: Callable[..., Any]) -> None:
     turned = "down: the chainage falls as the train runs, and is turned (default: up)"
     add("--direction", choices=["up", "down"], default="up", help=turned)
-    add("--position-unit", choices=list(POSITION_UNITS), default="m", help="default: m; variance is in m^2")
+    add("--position-unit", choices=list(POSITION_UNITS), help=f"{_TOLD} m; variance is in m^2")
     std = "of all positions, where there is no variance (default: 0.5; of latitude and longitude: unknown)"
     add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
-    add("--pressure-unit", choices=list(PRESSURE_UNITS), default="pa", help="default: pa")
+    add("--pressure-unit", choices=list(PRESSURE_UNITS), help=f"{_TOLD} pa")
     add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="default: gauge")
     air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
     air += f" (default: {AMBIENT.default:g})"
@@ -88,9 +90,9 @@ def _unit_options(add: Callable[..., Any]) -> None:
     add("--pipe-released", type=float, metavar="P", help=released)
     full = f"of the cylinders that a full brake by the pipe demands, gauge (default: {CRH3.full_pressure_pa:g})"
     add("--full-pressure", dest="full_pressure_pa", type=float, metavar="PA", help=full)
-    add("--speed-unit", choices=list(SPEED_UNITS), default="mps", help="default: mps")
-    add("--acceleration-unit", choices=list(ACCELERATION_UNITS), default="mps2", help="default: mps2")
-    add("--wheel-unit", choices=WHEEL_UNITS, default="radps", help="default: radps; mps and kmh: of the rim")
+    add("--speed-unit", choices=list(SPEED_UNITS), help=f"{_TOLD} mps")
+    add("--acceleration-unit", choices=list(ACCELERATION_UNITS), help=f"{_TOLD} mps2")
+    add("--wheel-unit", choices=WHEEL_UNITS, help=f"{_TOLD} radps; mps and kmh: of the rim")
     radius = f"of the wheels, for those (default: {CRH3.wheel_radius_m:g})"
     add("--wheel-radius", dest="wheel_radius_m", type=float, metavar="M", help=radius)
     add(

@@ -9,7 +9,7 @@
 """Rows of a log as measurements in SI units, and a reason with a remedy for each row that is none."""
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -19,11 +19,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .cells import NO_TIME, numbers, time_format, time_unit, times_ns
-from .format import LIMITS, OPTIONAL, PLACES, PRESSURES, Format, option
+from .columns import Columns, columns_of, in_doubt, units_told
+from .format import LIMITS, PRESSURES, Format
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
-
-AXLE = re.compile(r"wheel_speed_\d+")
-"""What the columns of the axles are called where none is named."""
+from .units import known
 
 ZONED = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
 """How a date ends that names its zone."""
@@ -36,14 +35,6 @@ NO_NUMBER = (
 )
 
 Flags = NDArray[np.bool_]
-
-
-class Columns(NamedTuple):
-    """Names in the header by ours, those of the axles, and those that mean nothing."""
-
-    names: dict[str, str]
-    axles: tuple[str, ...]
-    unread: tuple[str, ...] = ()
 
 
 class Source(NamedTuple):
@@ -64,9 +55,14 @@ def open_log(path: Path, form: Format) -> Source:
         form = understood(path, form)
         names = names_of(path, form)
         rows = blocks(path, form, names)
-    columns = _columns(names, str(path), form)
+    columns = columns_of(names, str(path), form)
+    told = units_told(columns, names, form)
+    form = replace(form, told={ours: unit for ours, text in told.items() if (unit := known(text, ours))})
     first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
-    return Source(_timed(form, first.cells[columns.names["time"]]), columns, _again(first, rows))
+    timed = _timed(form, first.cells[columns.names["time"]])
+    if timed.time_format is not None:
+        told.pop("time", None)  # [UTC] or [hh:mm:ss]: dates are in no unit
+    return Source(timed, columns._replace(doubts=tuple(in_doubt(told, form))), _again(first, rows))
 
 
 def measured(source: str, log: Source) -> Iterator[tuple[pd.DataFrame, list[Refusal]]]:
@@ -78,7 +74,7 @@ def measured(source: str, log: Source) -> Iterator[tuple[pd.DataFrame, list[Refu
 
 def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
     """What a block has measured: the first reason against a row counts."""
-    form, (names, axles, _), factors = log.form, log.columns, log.form.factors()
+    form, (names, axles, *_), factors = log.form, log.columns, log.form.factors()
     kinds = {name: name for name in names if name != "time"} | dict.fromkeys(axles, "wheel_speed")
     theirs = {name: cells[names.get(name, name)] for name in ("time", *kinds)}
     theirs |= _without_fix(theirs, form.decimal or ".")
@@ -156,38 +152,9 @@ def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
         return form
     sample = [str(cell) for cell in cells.head(SAMPLE)]
     written = "ISO8601" if form.time_unit == "iso" else time_format(sample)
-    unit = None if written else form.time_unit or time_unit(sample, form.decimal or ".")
+    unit = None if written else form.time_unit or form.told.get("time") or time_unit(sample, form.decimal or ".")
     zone = "UTC" if written == "ISO8601" and any(map(ZONED.search, sample)) else form.time_zone
     return replace(form, time_format=written, time_unit=unit, time_zone=zone)
-
-
-def _columns(header: Sequence[str], source: str, form: Format) -> Columns:
-    """Return the columns in use; ValueError names the first that is missing or there twice."""
-    named = {ours: form.named.get(ours, ours) for ours in ("time", *OPTIONAL)}
-    names = {ours: name for ours, name in named.items() if ours in form.named or name not in form.named.values()}
-    axles = tuple(form.axles) or tuple(name for name in header if AXLE.fullmatch(name))
-    for name in (*names.values(), *axles):
-        if header.count(name) > 1:
-            raise ValueError(f"{source}: column {name!r} is there {header.count(name)} times: rename one")
-    needed = {name: option(ours) for ours, name in names.items() if ours in form.named or ours == "time"}
-    for name, how in (needed | dict.fromkeys(form.axles, "--wheel-speeds")).items():
-        if name not in header:
-            raise ValueError(f"{source}: column {name!r} is missing: it has {_listed(header)}; name one with {how} COL")
-    used = {ours: name for ours, name in names.items() if name in header}
-    if len({"lat", "lon"} & set(used)) == 1:
-        used = {ours: name for ours, name in used.items() if ours not in ("lat", "lon")}
-    if not any(set(group) <= set(used) for group in PLACES):
-        remedy = "name one with --position COL, or --lat COL and --lon COL, or --speed COL"
-        raise ValueError(f"{source}: columns {_listed(header)}: has neither position, lat and lon, nor speed: {remedy}")
-    if {"brake_pipe", "brake_demand"} <= set(used):
-        raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")
-    unread = tuple(name for name in header if name and name not in (*used.values(), *axles))
-    return Columns(used, axles, unread)
-
-
-def _listed(header: Sequence[str]) -> str:
-    text = str(list(header))
-    return text if len(text) <= 400 else f"{text[:400]}..."
 
 
 def _parquet(path: Path) -> pd.DataFrame:

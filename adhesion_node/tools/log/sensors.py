@@ -36,8 +36,8 @@ def felt(motion: Motion, form: Format) -> Iterator[str]:
     ratio = float((felt_mps2 * slows)[braking].sum() / np.square(slows[braking]).sum())
     told = f"the acceleration is {ratio:.2g} times what the speed changes by while the train brakes"
     for unit, mps2 in ACCELERATION_UNITS.items():
-        other = ACCELERATION_UNITS[form.acceleration_unit] / mps2
-        if unit != form.acceleration_unit and abs(math.log(max(abs(ratio), 1e-9) / other)) < 2.0 * SAME:
+        other = ACCELERATION_UNITS[form.unit("acceleration")] / mps2
+        if unit != form.unit("acceleration") and abs(math.log(max(abs(ratio), 1e-9) / other)) < 2.0 * SAME:
             yield f"{told}: another unit? --acceleration-unit {unit}"
             return
     if ratio < -0.5:
@@ -55,8 +55,8 @@ def rolling(motion: Motion, form: Format) -> Iterator[str]:
     if abs(math.log(radius_m / form.wheel_radius_m)) < SAME:
         return
     for unit, radps in units.items():
-        off = abs(math.log(radius_m * units[form.wheel_unit] / radps / form.wheel_radius_m))
-        if unit != form.wheel_unit and off < (JUST if is_a_trains else SAME):
+        off = abs(math.log(radius_m * units[form.unit("wheel_speed")] / radps / form.wheel_radius_m))
+        if unit != form.unit("wheel_speed") and off < (JUST if is_a_trains else SAME):
             yield f"the wheels turn as if their radius were {radius_m:.2g} m: another unit? --wheel-unit {unit}"
             return
     if not is_a_trains:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from .format import PLACES, Format
+from .units import meant
 
 DELIMITERS = (",", ";", "\t", "|")
 
@@ -45,7 +46,7 @@ BLOCK = 2_000
 
 NO_HEADER = "has no header line: begin with the names of the columns, their quotes closed; or is --skip-rows another?"
 
-_NUMBERED = re.compile("[+-]?[.,]?[0-9]")
+_NUMBERED = re.compile("[+-]?[.,]?[0-9](?!/[a-z])")  # 1/min is a unit
 
 _WITH_COMMA, _WITH_POINT = (re.compile(rf"[+-]?[0-9]*{sign}[0-9]+([eE][+-]?[0-9]+)?") for sign in (",", "[.]"))
 
@@ -78,7 +79,7 @@ def understood(path: Path, form: Format) -> Format:
         form,
         delimiter=delimiter,
         skip_rows=header,
-        units_rows=int(any(map(str.isalpha, "".join(first))) and not any(map(_NUMBERED.match, first))),
+        units=first if any(map(str.isalpha, "".join(first))) and not any(map(_NUMBERED.match, first)) else None,
         decimal=form.decimal or _decimal(cell for cells in rows for cell in cells),
     )
 
@@ -93,7 +94,7 @@ def names_of(path: Path, form: Format) -> list[str]:
 
 def blocks(path: Path, form: Format, names: Sequence[str]) -> Iterator[Block]:
     """Yield the rows below the header. A line is a row: an unclosed quote spoils its own line only."""
-    first = (form.skip_rows or 0) + 1 + form.units_rows
+    first = (form.skip_rows or 0) + 1 + (form.units is not None)
     numbered = islice(enumerate(_lines(path, form), start=1), first, None)
     while lines := list(islice(numbered, BLOCK)):
         yield _block(path, form, names, lines)
@@ -177,13 +178,13 @@ def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:
     if form.skip_rows is not None:
         below = lines[form.skip_rows : form.skip_rows + 1] or [""]
         return max(delimiters, key=below[0].count), form.skip_rows
-    wanted = {form.named.get("time", "time"), *form.named.values(), *form.axles}
-    places = [{form.named.get(ours, ours) for ours in group} for group in PLACES]
+    wanted = [*({"time": "time"} | dict(form.named)).items(), *(("wheel_speed", name) for name in form.axles)]
+    places = [[(ours, form.named.get(ours, ours)) for ours in group] for group in PLACES]
     split_up = {delimiter: [_cells(text, delimiter) for text in lines] for delimiter in delimiters}
     for number in range(len(lines)):
         for delimiter in delimiters:
-            names = set(split_up[delimiter][number])
-            if wanted <= names and any(place <= names for place in places):
+            cells = split_up[delimiter][number]
+            if any(all(meant(name, ours, cells) for ours, name in (*wanted, *place)) for place in places):
                 return delimiter, number
     widths = {delimiter: Counter(map(len, split_up[delimiter])) for delimiter in delimiters}
 

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...core.physics.train import KMH
-from .format import LIMITS, PRESSURES, Format, option
+from .format import FAMILIES, LIMITS, PRESSURES, Format, option
 from .text import Refusal
 from .whole import Log, moment
 
@@ -44,7 +44,7 @@ def read_as(form: Format) -> str:
     """Say how a log was understood, and what says otherwise."""
     header = (form.skip_rows or 0) + 1
     text = f"{form.encoding}, delimiter {form.delimiter!r}, decimal {form.decimal!r}, header in line {header}"
-    text += f", line {header + 1} left out as units" if form.units_rows else ""
+    text += f", line {header + 1} left out as units" if form.units is not None else ""
     time = (
         f"times in {form.time_unit}" if form.time_format is None else f"times {form.time_format!r} of {form.time_zone}"
     )
@@ -52,6 +52,15 @@ def read_as(form: Format) -> str:
         "--encoding, --delimiter, --decimal, --skip-rows, --time-unit, --time-format and --time-zone say otherwise"
     )
     return f"read as {time}" if form.encoding is None else f"read as {text}, {time}; {otherwise}"
+
+
+def units_read(form: Format) -> Iterator[str]:
+    """Say which units the log itself names, and what says otherwise."""
+    told = {ours: unit for ours, unit in form.told.items() if form.given(ours) in (None, unit)}
+    options = dict.fromkeys(f"--{FAMILIES[ours]}-unit" for ours in told if ours in FAMILIES)
+    if told:
+        units = ", ".join(f"{ours} in {unit}" for ours, unit in told.items())
+        yield f"units that the log names: {units}" + (f"; {', '.join(options)} say otherwise" if options else "")
 
 
 def ranges(log: Log) -> Iterator[str]:

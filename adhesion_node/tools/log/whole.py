@@ -18,8 +18,9 @@ import pandas as pd
 
 from ...core.physics.train import Array
 from .cells import is_clock
+from .columns import Columns
 from .format import PRESSURE_UNITS, Format
-from .rows import Columns, Flags, measured, open_log
+from .rows import Flags, measured, open_log
 from .text import Refusal
 
 DAY_NS = 86_400 * 10**9
@@ -144,7 +145,7 @@ def _out_of_time(rows: pd.DataFrame, index: int, source: str, why: str) -> Refus
 
 def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, str]:
     """The rows with the demand that the pressure of the brake pipe is, and from where on it is released."""
-    pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.pressure_unit
+    pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.unit("brake_pipe")
     scale = PRESSURE_UNITS[unit]
     released = pipe.quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
     share = ((released - pipe) / FULL_DROP_PA).clip(0.0, 1.0)

@@ -1,0 +1,78 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Units as a log itself names them: behind the name of a column, `v [km/h]`, `speed_kmh`, or in a line below."""
+
+import re
+import unicodedata
+from collections.abc import Sequence
+
+from .format import FAMILIES, UNITS
+
+_SPELT = {
+    "s": ("sec", "second", "seconds", "sekunden"),
+    "ms": ("msec", "millisecond", "milliseconds"),
+    "us": ("μs", "microseconds"),
+    "ns": ("nanoseconds",),
+    "m": ("metre", "metres", "meter", "meters"),
+    "km": ("kilometre", "kilometres", "kilometer", "kilometers"),
+    "ft": ("feet", "foot"),
+    "mps": ("m/s", "ms", "ms-1", "m/sec"),
+    "kmh": ("km/h", "kph", "kmph", "km/hr", "kmh-1"),
+    "mph": ("mi/h", "miles/h"),
+    "pa": ("pascal",),
+    "bar": ("barg", "bar(g"),
+    "mbar": ("hpa",),
+    "psi": ("psig", "lbf/in2"),
+    "mps2": ("m/s2", "ms-2", "m/s/s"),
+    "radps": ("rad/s", "rads-1", "rad/sec"),
+    "rpm": ("1/min", "min-1", "r/min", "u/min", "rev/min"),
+    "deg": ("°", "degree", "degrees"),
+}
+"""How units are written; in `min^-1` and `m s⁻²` what raises and what divides is left out."""
+
+_BRACKETS = re.compile(r"(.*?)[\s_]*[\[(<{]\s*(.*?)\s*[\])>}]+")
+
+
+def known(text: str, column: str) -> str | None:
+    """Return the unit of a column that a text means, as its option calls it; None for what is none.
+
+    >>> known("km/h", "speed"), known("m s⁻²", "acceleration"), known("MPa", "brake_pipe"), known("kn", "speed")
+    ('kmh', 'mps2', 'mpa', None)
+    >>> known("ms", "time"), known("ms", "speed"), known("(1/min)", "wheel_speed")
+    ('ms', 'mps', 'rpm')
+    """
+    plain = unicodedata.normalize("NFKC", text).replace("\u2212", "-").casefold().strip("[](){}<> ")
+    plain = re.sub(r"\^1$|[\s^*·⋅]", "", plain)
+    of_column = UNITS[FAMILIES.get(column, column)]
+    return next((unit for unit in of_column if plain == unit or plain in _SPELT.get(unit, ())), None)
+
+
+def parted(name: str, column: str) -> tuple[str, str]:
+    """Return the name of a column of ours without its unit, and the unit as it is written, or nothing.
+
+    >>> parted("v [km/h]", "speed"), parted("speed_kmh", "speed"), parted("speed_std", "speed")
+    (('v', 'km/h'), ('speed', 'kmh'), ('speed_std', ''))
+    """
+    if match := _BRACKETS.fullmatch(name):
+        return match[1], match[2]
+    stem, _, unit = name.rpartition("_")
+    return (stem, unit) if stem and known(unit, column) else (name, "")
+
+
+def meant(name: str, column: str, header: Sequence[str]) -> list[str]:
+    """Return the names in a header that mean a column of ours: this one, else those that differ in case and unit.
+
+    >>> meant("speed", "speed", ["Time", "Speed (mph)", "speed_std"])
+    ['Speed (mph)']
+    """
+    return [name] if name in header else [each for each in header if _plain(each, column) == _plain(name, column)]
+
+
+def _plain(name: str, column: str) -> str:
+    return re.sub(r"[\s_-]+", "_", parted(name, column)[0].strip().casefold())

@@ -1,0 +1,76 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Whether the positions of a log tell of a train's way: in which unit, which way, and what the speed says of it."""
+
+import math
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from ...core.physics.train import Array
+from .format import POSITION_UNITS, SPEED_UNITS, Format
+from .motion import LEAST_M, LEAST_S, SAME, Motion
+
+MOVES_MPS, ONE_WAY = 2.0, 0.9
+"""Where a train moves its positions rise, or fall, for so much of its way; slower ones are noise."""
+
+
+def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
+    """Positions and speeds tell the same way; if not, what the one is of the other tells why."""
+    course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
+    ratio = float((np.abs(course) * speed).sum() / (speed * speed).sum())
+    yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
+    if course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
+        yield "the speed is below 0 while the positions rise: change its sign, it counts forward along the run"
+    told = f"the positions move at {ratio:.3g} times the speed"
+    if abs(math.log(max(ratio, 1e-30))) < SAME:
+        return
+
+    def off(units: tuple[str, str]) -> float:
+        """By how much the ratio differs from that of these units."""
+        place_m, pace_mps = POSITION_UNITS[units[0]], SPEED_UNITS[units[1]]
+        other = pace_mps / SPEED_UNITS[form.unit("speed")] / (place_m / POSITION_UNITS[form.unit("position")])
+        return abs(math.log(max(ratio, 1e-30) / other))
+
+    nearest = place, pace = min(product(POSITION_UNITS, SPEED_UNITS), key=off)
+    if off(nearest) < SAME:
+        cures = [f"--position-unit {place}"] * (place != form.unit("position"))
+        cures += [f"--speed-unit {pace}"] * (pace != form.unit("speed"))
+        yield f"{told}: another unit? {' '.join(cures)}"
+        return
+    if ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
+        yield f"{told}: are they degrees? --lat COL --lon COL"
+    else:
+        yield f"{told}: are both units right, is the speed that of a wheel which slid?"
+
+
+def slow_or_falling(motion: Motion) -> Iterator[str]:
+    """Positions alone: do they rise, and as fast as a train runs?"""
+    course = motion.course_mps[np.isfinite(motion.course_mps)]
+    if len(course) < LEAST_S:
+        return
+    most, is_steady = float(np.abs(course).max()), abs(course.sum()) > 0.8 * np.abs(course).sum()
+    if is_steady and 0.0 < most < 2e-3:
+        yield f"the train creeps at {most:.2g} m/s: are the positions degrees? --lat COL --lon COL"
+    elif is_steady and 0.0 < most < 0.15:
+        yield f"the train creeps at {most:.2g} m/s: are the positions in km? --position-unit km"
+    else:
+        yield from _against_chainage(motion, course[np.abs(course) > MOVES_MPS], LEAST_M)
+
+
+def _against_chainage(motion: Motion, course: Array, least_m: float) -> Iterator[str]:
+    """Whether the positions of a train that moves fall, or do both, by more than `least_m`."""
+    way_m = np.abs(course).sum()
+    fallen_m = -course[course < 0.0].sum()
+    if fallen_m > max(ONE_WAY * way_m, least_m):
+        first, last = motion.place_m[np.isfinite(motion.place_m)][[0, -1]]
+        yield f"the positions fall, from {first:.6g} to {last:.6g} m: --direction down turns them"
+    elif fallen_m > max((1.0 - ONE_WAY) * way_m, least_m):
+        yield "the positions rise and fall: cut the log, and import the way back with --direction down"
