@@ -20,6 +20,7 @@ from ...core.physics.train import Array
 from .cells import is_clock
 from .columns import Columns
 from .format import PRESSURE_UNITS, Format
+from .held import without_held
 from .rows import Flags, measured, open_log
 from .text import Refusal
 
@@ -58,6 +59,8 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     rows, refused = _rising(rows.sort_values("t_ns", kind="stable") if form.sort else rows, str(path))
     for each in refused:
         tell(each)
+    rows, held = without_held(rows)
+    notes += held
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
         notes.append(
