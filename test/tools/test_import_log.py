@@ -180,17 +180,29 @@ def test_what_stands_for_no_value_is_none(importing: Import, missing: str) -> No
 @pytest.mark.parametrize(
     ("factor", "told"),
     [
-        (1e-5, "is 3 Pa at most: is it in bar? --pressure-unit bar"),
-        (1e-6, "is it in mpa? --pressure-unit mpa"),
-        (1e-2, "is it in mbar? --pressure-unit mbar"),
-        (1.0 / 6894.757, "is it in psi? --pressure-unit psi; per cent of a full brake are not read: give its pressure"),
-        (100.3 / 3e5, "is it in kpa or psi? --pressure-unit kpa; per cent of a full brake are not read"),
+        (1e-5, "is 3 pa at most: is it in bar? --pressure-unit bar: 3 bar"),
+        (1e-6, "is it in mpa? --pressure-unit mpa: 3 bar"),
+        (1e-2, "is it in mbar? --pressure-unit mbar: 3 bar"),
+        (
+            1.0 / 6894.757,
+            "is it in psi? --pressure-unit psi: 3 bar; per cent of a full brake are not read: give its pressure",
+        ),
+        (
+            100.3 / 3e5,
+            "is it in kpa or psi? --pressure-unit kpa: 1 bar; --pressure-unit psi: 6.9 bar; per cent of a full brake are",
+        ),
     ],
 )
 def test_pressures_in_another_unit_are_told(importing: Import, factor: float, told: str) -> None:
     rows = ride()
     assert importing(text(rows.assign(brake_pressure=(factor * rows.brake_pressure).round(6)))) == 1
     assert [said for said in importing.summary["odd"] if told in said]
+
+
+def test_a_pressure_in_another_unit_than_the_option_says_is_told(importing: Import) -> None:
+    rows = ride()
+    assert importing(text(rows.assign(brake_pressure=rows.brake_pressure / 1e5)), "--pressure-unit", "kpa") == 1
+    assert "brake_pressure is 3 kpa at most: is it in bar? --pressure-unit bar: 3 bar" in importing.summary["odd"]
 
 
 @pytest.mark.parametrize("factor", [1.0, 1.0 / 9.80665, -1.0])

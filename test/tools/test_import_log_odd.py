@@ -79,7 +79,7 @@ ODD: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], str, list[str]]] = 
     (
         "pipe in bar",
         lambda r: r.rename(columns={"brake_pressure": "brake_pipe"}).assign(brake_pipe=5.0 - r.brake_pressure / 2e5),
-        "brake_pipe is 5 Pa at most",
+        "brake_pipe is 5 pa at most",
         ["--pressure-unit", "bar"],
     ),
     (

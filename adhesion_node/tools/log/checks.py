@@ -73,20 +73,25 @@ def _pressures(log: Log) -> Iterator[str]:
             continue
         gauge = log.rows[name] - log.form.ambient_pressure_pa
         least, most = gauge.min(), gauge.max()
-        yield from _other_unit(name, most)
+        yield from _other_unit(name, most, log.form)
         if 80e3 < least < 108e3:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
 
     if "brake_pipe" in log.columns.names and log.form.pipe_released is not None:
-        yield from _other_unit("brake_pipe", log.form.pipe_released * PRESSURE_UNITS[log.form.unit("brake_pipe")])
+        released_pa = log.form.pipe_released * PRESSURE_UNITS[log.form.unit("brake_pipe")]
+        yield from _other_unit("brake_pipe", released_pa, log.form)
 
 
-def _other_unit(name: str, most_pa: float) -> Iterator[str]:
+def _other_unit(name: str, most_pa: float, form: Format) -> Iterator[str]:
+    """A greatest pressure that no brake has: each unit in which it were one, with what it would be."""
     if SILENT < most_pa < WEAKEST_PA:
-        units = [unit for unit, pa in PRESSURE_UNITS.items() if FULL_PA[0] < most_pa * pa <= FULL_PA[1]]
-        is_share = PERCENT[0] < most_pa < PERCENT[1]
+        read_in = form.unit(name)
+        most = most_pa / PRESSURE_UNITS[read_in]
+        would_be = {unit: most * pa for unit, pa in PRESSURE_UNITS.items() if FULL_PA[0] < most * pa <= FULL_PA[1]}
+        cures = "; ".join(f"--pressure-unit {unit}: {pa / 1e5:.2g} bar" for unit, pa in would_be.items())
+        is_share = PERCENT[0] < most < PERCENT[1]
         cure = "; per cent of a full brake are not read: give its pressure" if is_share else ""
-        yield f"{name} is {most_pa:g} Pa at most: is it in {' or '.join(units)}? --pressure-unit {units[0]}{cure}"
+        yield f"{name} is {most:.6g} {read_in} at most: is it in {' or '.join(would_be) or 'another unit'}? {cures}{cure}"
 
 
 def _empty(log: Log) -> Iterator[str]:
