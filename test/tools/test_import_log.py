@@ -189,7 +189,7 @@ def test_what_stands_for_no_value_is_none(importing: Import, missing: str) -> No
         ),
         (
             100.3 / 3e5,
-            "is it in kpa or psi? --pressure-unit kpa: 1 bar; --pressure-unit psi: 6.9 bar; per cent of a full brake are",
+            "is it in kpa or psi? --pressure-unit kpa: 1 bar; --pressure-unit psi: 6.9 bar; per cent of a full",
         ),
     ],
 )
@@ -258,6 +258,34 @@ def test_the_end_of_summer_time_is_no_step_of_the_clock(importing: Import) -> No
     log = "time,speed\n27.10.2024 02:59:58,1\n27.10.2024 02:59:59,1\n27.10.2024 02:00:00,1\n27.10.2024 02:00:01,1\n"
     assert importing(log, "--time-zone", "Europe/Berlin") == 0
     assert np.diff([SPEED.read(message).t_ns for message in importing.messages("speed")]).tolist() == [S] * 3
+
+
+@pytest.mark.parametrize("written", ["%H%M%S.%f", "%H%M%S"])
+@pytest.mark.parametrize("begin", ["08:15:33", "12:59:30", "23:59:30"])
+def test_digits_of_a_clock_are_no_seconds(importing: Import, begin: str, written: str) -> None:
+    """As of NMEA: 081559 is followed by 081600."""
+    moments = pd.Timestamp(f"2024-11-21 {begin}") + pd.to_timedelta(range(150), unit="s")
+    rows = pd.DataFrame({"time": moments.strftime(written), "position": 40.0 * np.arange(150) + 1000.0})
+    assert importing(text(rows)) == 0, importing.errors
+    of_day_s = (pd.Timestamp(f"1970-01-01 {begin}") - pd.Timestamp(0)).total_seconds()
+    assert [sample.t_ns / S for sample in importing.positions()] == [of_day_s + i for i in range(150)]
+    importing.output = importing.output.with_name("seconds")
+    importing(text(rows), "--time-unit", "s")
+    told = "--time-format %H%M%S where the times are hhmmss, %H%M%S.%f with a fraction" in str(importing.errors)
+    assert told == (begin == "12:59:30"), "a step of 40 s is none among rows of a second"
+    importing.output = importing.output.with_name("format")
+    assert importing(text(rows), "--time-format", written) == 0
+
+
+@pytest.mark.parametrize(
+    "times", [range(200), range(1000, 1060), [*range(1000, 1060), *range(1100, 1130)], range(81530, 81730)], ids=str
+)
+def test_seconds_are_no_digits_of_a_clock(importing: Import, times: list[int]) -> None:
+    importing("time,speed\n" + "".join(f"{time},20\n" for time in times))
+    expected = list(times)
+    if expected[-1] == 1129:  # 16:59 is followed by 11:00
+        expected = [*range(600, 690)]
+    assert [SPEED.read(message).t_ns // S for message in importing.messages("speed")] == expected
 
 
 def test_unsorted_rows_are_sorted_on_demand_and_the_option_is_named(importing: Import, tmp_path: Path) -> None:

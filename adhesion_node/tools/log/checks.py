@@ -33,6 +33,8 @@ SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
 SILENT, WEAKEST_PA, FULL_PA = 0.1, 15e3, (5e4, 1.5e6)
 """Up to the first nothing is measured; no brake's greatest pressure is below the second; mostly it is in the third."""
 
+HHMMSS = "--time-format %H%M%S where the times are hhmmss, %H%M%S.%f with a fraction"
+
 PERCENT = 15.0, 120.0
 """What the greatest demand may be that is told in per cent of the full one."""
 
@@ -91,7 +93,8 @@ def _other_unit(name: str, most_pa: float, form: Format) -> Iterator[str]:
         cures = "; ".join(f"--pressure-unit {unit}: {pa / 1e5:.2g} bar" for unit, pa in would_be.items())
         is_share = PERCENT[0] < most < PERCENT[1]
         cure = "; per cent of a full brake are not read: give its pressure" if is_share else ""
-        yield f"{name} is {most:.6g} {read_in} at most: is it in {' or '.join(would_be) or 'another unit'}? {cures}{cure}"
+        units = " or ".join(would_be) or "another unit"
+        yield f"{name} is {most:.6g} {read_in} at most: is it in {units}? {cures}{cure}"
 
 
 def _empty(log: Log) -> Iterator[str]:
@@ -155,6 +158,7 @@ def _clock(log: Log, t_s: Array) -> Iterator[str]:
         if slowest > 5.0 and abs(place[i + 1] - place[i]) < 0.5 * slowest * steps[i]:
             is_date = log.form.time_format is not None and log.form.time_zone == "UTC"
             cure = "--time-zone where summer time began, else " if is_date and abs(steps[i] - 3600.0) < LEAST_S else ""
+            cure += f"{HHMMSS}, else " if not is_date and round(steps[i] - np.median(steps)) in (40, 4040) else ""
             yield (
                 f"the clock goes on by {steps[i]:.0f} s at {moment(t_ns[i])} and the train does not: "
                 f"{cure}cut the log there, or correct the times behind"

@@ -17,14 +17,12 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import Array
-from .cells import is_clock
+from .clock import in_digits, in_zone, over_midnight
 from .columns import Columns
 from .format import PRESSURE_UNITS, Format
 from .held import without_held
 from .rows import Flags, measured, open_log
 from .text import Refusal
-
-DAY_NS = 86_400 * 10**9
 
 FULL_DROP_PA = 1.5e5
 """The pipe's pressure falls by so much for a full brake (UIC 540)."""
@@ -55,43 +53,23 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         parts.append(rows)
         for each in refused:
             tell(each)
-    rows, notes = _in_zone(_over_midnight(pd.concat(parts), source.form), source.form)
+    rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
+    rows, notes = in_zone(over_midnight(rows, timed), timed)
     rows, refused = _rising(rows.sort_values("t_ns", kind="stable") if form.sort else rows, str(path))
     for each in refused:
         tell(each)
     rows, held = without_held(rows)
-    notes += held
+    notes += digits + held
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
         notes.append(
             "direction: positions are minus the chainage, so are those of track; else: replay --set direction=down"
         )
-    form = source.form
+    form = timed
     if "brake_pipe" in rows:
         rows, form, note = _demanded(rows, form)
         notes.append(note)
     return Log(form, source.columns, rows, tuple(notes))
-
-
-def _over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
-    """The times of a clock go on after midnight."""
-    if is_clock(form.time_format) and not form.sort:
-        days = np.cumsum(np.diff(rows["t_ns"], prepend=rows["t_ns"].iloc[:1]) < -DAY_NS / 2)
-        rows["t_ns"] += days * DAY_NS
-    return rows
-
-
-def _in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
-    """The times of a zone as UTC; where an hour is there twice and the rows do not tell which, it is summer time."""
-    if form.time_format is None or form.time_zone == "UTC" or is_clock(form.time_format):
-        return rows, []
-    local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
-    try:
-        utc = local.tz_localize(zone, ambiguous="infer", nonexistent="shift_forward")
-    except ValueError:
-        utc = local.tz_localize(zone, ambiguous=np.ones(len(local), dtype=bool), nonexistent="shift_forward")
-    rows["t_ns"] = utc.as_unit("ns").asi8
-    return rows, [f"time: local of {zone}"]
 
 
 def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal]]:

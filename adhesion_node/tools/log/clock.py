@@ -1,0 +1,59 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""The times of a log as a whole: of a clock that goes on after midnight, written in digits alone, or in a zone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from .cells import is_clock
+from .format import Format
+
+DAY_NS, S = 86_400 * 10**9, 10**9
+
+
+def in_digits(rows: pd.DataFrame, form: Format, asked: Format) -> tuple[pd.DataFrame, Format, list[str]]:
+    """The times of numbers that are hhmmss, as NMEA has them: no minute has more than 60 s, and none of 40 is missing.
+
+    As seconds they would go on by 40 s whenever a minute begins; `asked` is the format with what is open.
+    """
+    t_ns = rows["t_ns"].to_numpy()
+    hours, minutes, seconds = t_ns // (10_000 * S), t_ns // (100 * S) % 100, t_ns // S % 100
+    is_clock_time = bool(((hours < 24) & (minutes < 60) & (seconds < 60)).all())
+    if asked.time_unit is not None or (form.time_format, form.time_unit) != (None, "s") or not is_clock_time:
+        return rows, form, []
+    of_day_ns = ((hours * 60 + minutes) * 60 + seconds) * S + t_ns % S
+    steps, of_day_steps = np.diff(t_ns), np.diff(of_day_ns) % DAY_NS
+    begins = steps != of_day_steps
+    if not begins.any() or begins.all() or np.median(of_day_steps[begins]) > 3 * np.median(steps[~begins]):
+        return rows, form, []
+    note = "time: hhmmss, as no minute has more than 60 s; --time-unit s says otherwise"
+    return rows.assign(t_ns=of_day_ns), replace(form, time_format="%H%M%S.%f", time_unit=None), [note]
+
+
+def over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
+    """The times of a clock go on after midnight."""
+    if is_clock(form.time_format) and not form.sort:
+        days = np.cumsum(np.diff(rows["t_ns"], prepend=rows["t_ns"].iloc[:1]) < -DAY_NS / 2)
+        rows["t_ns"] += days * DAY_NS
+    return rows
+
+
+def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
+    """The times of a zone as UTC; where an hour is there twice and the rows do not tell which, it is summer time."""
+    if form.time_format is None or form.time_zone == "UTC" or is_clock(form.time_format):
+        return rows, []
+    local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
+    try:
+        utc = local.tz_localize(zone, ambiguous="infer", nonexistent="shift_forward")
+    except ValueError:
+        utc = local.tz_localize(zone, ambiguous=np.ones(len(local), dtype=bool), nonexistent="shift_forward")
+    rows["t_ns"] = utc.as_unit("ns").asi8
+    return rows, [f"time: local of {zone}"]
