@@ -183,3 +183,21 @@ def test_a_stop_of_ten_minutes_without_rows_is_no_step_of_the_clock(importing: I
     rows = ride(89)
     rows = pd.concat([rows, ride().assign(time=rows.time + 700.0, position=rows.position.iloc[-1] + ride().position)])
     assert importing(text(rows)) == 0, importing.errors
+
+
+@pytest.mark.parametrize("drop", [[], ["speed"]])
+@pytest.mark.parametrize(("ends_m", "times"), [(3000.0, ""), (1000.0, ", 2 times so")])
+def test_an_odometer_that_begins_anew_is_no_way_back(
+    importing: Import, ends_m: float, times: str, drop: list[str]
+) -> None:
+    rows = ride()
+    assert importing(text(rows.assign(position=rows.position % ends_m).drop(columns=drop))) == 1
+    (odd,) = importing.summary["odd"]
+    assert odd.startswith("the positions fall at once from ")
+    assert f"{times}: an odometer that begins anew: cut the log there, or add to what is behind what it fell by" in odd
+
+
+def test_a_place_that_jumps_there_and_back_is_no_reset(importing: Import) -> None:
+    rows = ride()
+    importing(text(rows.assign(position=rows.position.where(rows.index % 50 != 7, 0.0))))
+    assert "odometer" not in str(importing.summary["odd"])

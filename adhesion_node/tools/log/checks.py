@@ -21,7 +21,7 @@ from ...run.results.seen import FASTEST_MPS
 from .format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from .motion import BRAKES_MPS2, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
-from .ways import slow_or_falling, speed_against_positions
+from .ways import resets, slow_or_falling, speed_against_positions
 from .whole import Log, moment
 
 HARDEST_MPS2, HARD_S = 3.0, 3
@@ -49,7 +49,8 @@ def odd(log: Log) -> list[str]:
     if of_time or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *of_time, *texts]
     motion = motion_of(log, t_s)
-    of_way = [*(speed_against_positions(motion, log.form) if motion.is_compared else slow_or_falling(motion))]
+    of_way = [*resets(log, t_s)]
+    of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else slow_or_falling(motion))]
     of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion)]
     return [
         *log.columns.doubts,

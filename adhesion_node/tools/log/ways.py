@@ -15,11 +15,29 @@ from itertools import product
 import numpy as np
 
 from ...core.physics.train import Array
+from ...run.results.seen import FASTEST_MPS
 from .format import POSITION_UNITS, SPEED_UNITS, Format
 from .motion import LEAST_M, LEAST_S, SAME, Motion
+from .whole import Log, moment
 
 MOVES_MPS, ONE_WAY = 2.0, 0.9
 """Where a train moves its positions rise, or fall, for so much of its way; slower ones are noise."""
+
+
+def resets(log: Log, t_s: Array) -> Iterator[str]:
+    """Single falls of the positions, faster than any train and not made good again: those of an odometer."""
+    known = log.rows["position"].notna().to_numpy() if "position" in log.rows else np.zeros(len(t_s), dtype=bool)
+    place, t_ns, steps_s = log.rows.get("position", t_s)[known], log.rows["t_ns"][known], np.diff(t_s[known])
+    steps = np.diff(place)
+    leaps = (np.abs(steps) > LEAST_M) & (np.abs(steps) > FASTEST_MPS * steps_s)
+    fallen = np.flatnonzero(leaps & (steps < 0.0))
+    if 2 * len(fallen) > leaps.sum() and 10 * len(fallen) < len(steps) and steps[~leaps].sum() > 0.0:
+        i, times = int(fallen[0]), f", {len(fallen)} times so" if len(fallen) > 1 else ""
+        before, behind, when = place.iloc[i], place.iloc[i + 1], moment(t_ns.iloc[i + 1])
+        yield (
+            f"the positions fall at once from {before:.6g} to {behind:.6g} m at {when}{times}: an odometer that begins anew: "
+            "cut the log there, or add to what is behind what it fell by"
+        )
 
 
 def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
