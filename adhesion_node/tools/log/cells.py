@@ -71,6 +71,9 @@ def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype
     """
     if pd.api.types.is_datetime64_any_dtype(cells):
         return _stamps(cells)
+    if pd.api.types.is_timedelta64_dtype(cells):
+        since = pd.TimedeltaIndex(cells).as_unit("ns").asi8
+        return np.where((since >= 0) & (since < END_OF_STAMPS_NS), since, NO_TIME)
     if form.time_format is None:
         unit, sign = form.time_unit or "s", form.decimal or "."
         return np.array([_count(text.replace(sign, "."), unit) for text in map(str, cells)], dtype=np.int64)

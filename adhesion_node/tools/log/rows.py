@@ -49,7 +49,7 @@ def open_log(path: Path, form: Format) -> Source:
     """Look how a log is written. Raises ValueError when it is empty or a column is missing."""
     if path.suffix.lower() in (".parquet", ".pq"):
         table = _parquet(path)
-        names, rows = [str(name) for name in table.columns], iter([Block(table.set_axis(table.index + 1), [])])
+        names, rows = list(table), iter([Block(table.set_axis(table.index + 1), [])])
         form = replace(form, decimal=".")
     else:
         form = understood(path, form)
@@ -148,6 +148,8 @@ def _filled(cells: "pd.Series[Any]") -> Flags:
 
 def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
     """The format with that of the times."""
+    if pd.api.types.is_timedelta64_dtype(cells):
+        return replace(form, time_format=None, time_unit="ns")
     if form.time_format is not None or form.time_unit in ("s", "ms", "us", "ns"):
         return form
     sample = [str(cell) for cell in cells.head(SAMPLE)]
@@ -158,12 +160,18 @@ def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
 
 
 def _parquet(path: Path) -> pd.DataFrame:
+    """The table, its index as columns where it is named or a time."""
     try:
-        return pd.read_parquet(path)
+        table = pd.read_parquet(path)
     except ImportError:
         raise ValueError(f"{path}: Parquet needs pyarrow: pip install '.[parquet]'") from None
     except (OSError, ValueError) as error:
         raise ValueError(f"{path}: is no Parquet file ({error})") from None
+    if isinstance(table.index, pd.DatetimeIndex | pd.TimedeltaIndex):
+        table.index.name = table.index.name or "time"
+    levels = [name for name in table.index.names if name is not None and name not in table]
+    table = table.reset_index(level=levels).reset_index(drop=True) if levels else table.reset_index(drop=True)
+    return table.set_axis(list(map(str, table)), axis=1)
 
 
 def _again(first: Block, rest: Iterator[Block]) -> Iterator[Block]:

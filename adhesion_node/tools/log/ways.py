@@ -35,8 +35,8 @@ def resets(log: Log, t_s: Array) -> Iterator[str]:
         i, times = int(fallen[0]), f", {len(fallen)} times so" if len(fallen) > 1 else ""
         before, behind, when = place.iloc[i], place.iloc[i + 1], moment(t_ns.iloc[i + 1])
         yield (
-            f"the positions fall at once from {before:.6g} to {behind:.6g} m at {when}{times}: an odometer that begins anew: "
-            "cut the log there, or add to what is behind what it fell by"
+            f"the positions fall at once from {before:.6g} to {behind:.6g} m at {when}{times}: an odometer that "
+            "begins anew: cut the log there, or add to what is behind what it fell by"
         )
 
 
