@@ -15,9 +15,12 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from ...core.physics.train import Array
 from .format import EXCEL_1970, TIME_UNITS, Format
+
+Flags = NDArray[np.bool_]
 
 NO_TIME = -1
 """Stands for a cell that is no time, and for one before 1970."""
@@ -44,24 +47,40 @@ _EPOCH, _END = (pd.Timestamp(seconds, unit="s", tz="UTC") for seconds in (0, 2**
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 
-def numbers(cells: "pd.Series[Any]", decimal: str) -> Array:
+def numbers(cells: "pd.Series[Any]", decimal: str, thousands: bool = False) -> Array:
     """Return the numbers of cells, shape (n,), exactly as Python reads them; NaN for what is no finite number.
 
-    Separators of thousands are understood where the decimal sign stands behind them: 12.345,6.
+    Separators of thousands are understood where the decimal sign stands behind them, 12.345,6; with `thousands` in
+    whole numbers, too.
 
-    >>> numbers(pd.Series(["12,5", "1.234,5", "1.234", "nan", "1_0"]), ",").tolist()
-    [12.5, 1234.5, nan, nan, nan]
+    >>> cells = pd.Series(["12,5", "1.234,5", "1.234", "nan", "1_0"])
+    >>> numbers(cells, ",").tolist(), numbers(cells, ",", thousands=True).tolist()
+    ([12.5, 1234.5, nan, nan, nan], [12.5, 1234.5, 1234.0, nan, nan])
     """
     if pd.api.types.is_numeric_dtype(cells):
         read = cells.to_numpy(dtype=np.float64, na_value=np.nan)
     else:
-        text, thousands = cells.astype(str), "." if decimal == "," else ","
-        grouped = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{thousands}][0-9]{{3}})+[{decimal}][0-9]+")
-        text = text.mask(grouped, text.str.replace(thousands, "", regex=False))
+        text, separator = cells.astype(str), "." if decimal == "," else ","
+        in_groups = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{separator}][0-9]{{3}})+[{decimal}][0-9]+")
+        in_groups |= grouped(text, decimal) & thousands
+        text = text.mask(in_groups, text.str.replace(separator, "", regex=False))
         if decimal == ",":
             text = text.str.replace(".", "no number", regex=False).str.replace(",", ".", regex=False)
         read = text.where(text.str.fullmatch(_NUMBER), "nan").to_numpy(dtype=object).astype(np.float64)
     return np.where(np.isfinite(read), read, np.nan)
+
+
+def grouped(cells: "pd.Series[Any]", decimal: str) -> Flags:
+    """Return which cells look like whole numbers in groups of thousands.
+
+    >>> grouped(pd.Series(["20.000", "1.234.567", "0.250", "999", "20.5"]), ",").tolist()
+    [True, True, False, False, False]
+    """
+    if pd.api.types.is_numeric_dtype(cells):
+        return np.zeros(len(cells), dtype=np.bool_)
+    groups = rf"[+-]?[1-9][0-9]{{0,2}}(?:[{'.' if decimal == ',' else ','}][0-9]{{3}})+"
+    found: Flags = cells.astype(str).str.fullmatch(groups).to_numpy(dtype=np.bool_)
+    return found
 
 
 def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype[np.int64]]":

@@ -105,6 +105,8 @@ class Format:
     encoding: str | None = None
     delimiter: str | None = None
     decimal: str | None = None
+    thousands: bool = False
+    """Whether whole numbers may be in groups of thousands, 20.000: where the decimal sign is sure to be the other."""
     skip_rows: int | None = None
     """Lines above the header."""
     units: Sequence[str] | None = None

@@ -16,9 +16,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from .cells import NO_TIME, numbers, time_format, time_unit, times_ns
+from .cells import NO_TIME, Flags, grouped, numbers, time_format, time_unit, times_ns
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, PRESSURES, Format
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
@@ -34,7 +33,8 @@ NO_NUMBER = (
     "or is the --decimal another?"
 )
 
-Flags = NDArray[np.bool_]
+
+IN_GROUPS = "is it in groups of thousands? Export it without them; or is the --decimal another?"
 
 
 class Source(NamedTuple):
@@ -65,11 +65,24 @@ def open_log(path: Path, form: Format) -> Source:
     return Source(timed, columns._replace(doubts=tuple(in_doubt(told, form))), _again(first, rows))
 
 
-def measured(source: str, log: Source) -> Iterator[tuple[pd.DataFrame, list[Refusal]]]:
-    """Yield by line what was measured, `t_ns` and all columns in SI, NaN where a cell is empty; and what is refused."""
+class Measured(NamedTuple):
+    """What a block holds: by line `t_ns` and all columns in SI, NaN where a cell is empty; and what of it is said."""
+
+    rows: pd.DataFrame
+    refused: list[Refusal]
+    grouped: dict[str, str]
+    """By column a whole number in groups of thousands, where there is one."""
+
+
+def measured(source: str, log: Source) -> Iterator[Measured]:
+    """Yield what was measured, block by block."""
     for cells, refused in log.blocks:
         rows, unusable = _rows(cells, log, source)
-        yield rows, sorted([*refused, *unusable])
+        decimal = log.form.decimal or "."
+        read = {name: cells[theirs] for name, theirs in log.columns.names.items() if log.form.thousands}
+        examples = {name: column[grouped(column, decimal)] for name, column in read.items()}
+        in_groups = {name: str(found.iloc[0]) for name, found in examples.items() if len(found)}
+        yield Measured(rows, sorted([*refused, *unusable]), in_groups)
 
 
 def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
@@ -77,7 +90,8 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
     form, (names, axles, *_), factors = log.form, log.columns, log.form.factors()
     kinds = {name: name for name in names if name != "time"} | dict.fromkeys(axles, "wheel_speed")
     theirs = {name: cells[names.get(name, name)] for name in ("time", *kinds)}
-    theirs |= _without_fix(theirs, form.decimal or ".")
+    decimal = form.decimal or "."
+    theirs |= _without_fix(theirs, decimal)
     filled = {name: _filled(column) for name, column in theirs.items()}
     against: dict[int, Refusal] = {}
     good = np.ones(len(cells), dtype=np.bool_)
@@ -102,8 +116,10 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
     _refuse_times(refuse, t_ns == NO_TIME, theirs["time"], form)
     rows: dict[str, Any] = {"t_ns": t_ns}
     for name, kind in kinds.items():
-        read = numbers(theirs[name], form.decimal or ".")
-        refuse(filled[name] & np.isnan(read), "not_a_number", name, lambda _: NO_NUMBER)
+        read = numbers(theirs[name], decimal, form.thousands)
+        bad, in_groups = filled[name] & np.isnan(read), grouped(theirs[name], decimal)
+        refuse(bad & in_groups, "not_a_number", name, lambda _: IN_GROUPS)
+        refuse(bad, "not_a_number", name, lambda _: NO_NUMBER)
         factor = factors.get(kind, 1.0)
         with np.errstate(over="ignore"):  # 1e300 km are out of range
             read *= factor

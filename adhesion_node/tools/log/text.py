@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import pandas as pd
 
+from .decimals import decimal_sign
 from .format import PLACES, Format
 from .units import meant
 
@@ -48,8 +49,6 @@ NO_HEADER = "has no header line: begin with the names of the columns, their quot
 
 _NUMBERED = re.compile("[+-]?[.,]?[0-9](?!/[a-z])")  # 1/min is a unit
 
-_WITH_COMMA, _WITH_POINT = (re.compile(rf"[+-]?[0-9]*{sign}[0-9]+([eE][+-]?[0-9]+)?") for sign in (",", "[.]"))
-
 
 class Refusal(NamedTuple):
     """A row that cannot be used: its line, why, for counting, and the whole message."""
@@ -75,12 +74,14 @@ def understood(path: Path, form: Format) -> Format:
     delimiter, header = _header(lines, form)
     rows = [cells for text in lines[header + 1 :] if (cells := _cells(text, delimiter))]
     first = rows[0] if len(rows) > 1 else []
+    decimal, is_sure = decimal_sign(cell for cells in rows for cell in cells)
     return replace(
         form,
         delimiter=delimiter,
         skip_rows=header,
         units=first if any(map(str.isalpha, "".join(first))) and not any(map(_NUMBERED.match, first)) else None,
-        decimal=form.decimal or _decimal(cell for cells in rows for cell in cells),
+        decimal=form.decimal or decimal,
+        thousands=is_sure and form.decimal in (None, decimal),
     )
 
 
@@ -196,13 +197,6 @@ def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:
     width = usual(delimiter)[1] or 1
     named = (number for number, cells in enumerate(split_up[delimiter]) if sum(map(bool, cells)) >= width)
     return delimiter, next(named, next((i for i, cells in enumerate(split_up[delimiter]) if len(cells) >= width), 0))
-
-
-def _decimal(cells: Iterable[str]) -> str:
-    """The sign that more numbers have."""
-    texts = list(cells)
-    commas, points = (sum(map(bool, map(sign.fullmatch, texts))) for sign in (_WITH_COMMA, _WITH_POINT))
-    return "," if commas > points else "."
 
 
 def _shown(text: str) -> str:

@@ -8,6 +8,7 @@
 
 """A log as a whole: its times in order and in their zone, the chainage as the train runs, the demand in the pipe."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -17,11 +18,12 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import Array
+from .cells import Flags
 from .clock import in_digits, in_zone, over_midnight
 from .columns import Columns
 from .format import PRESSURE_UNITS, Format
 from .held import without_held
-from .rows import Flags, measured, open_log
+from .rows import measured, open_log
 from .text import Refusal
 
 FULL_DROP_PA = 1.5e5
@@ -48,9 +50,10 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     Raises ValueError when the file is empty or a column is missing.
     """
     source = open_log(path, form)
-    parts = []
-    for rows, refused in measured(str(path), source):
+    parts, in_groups = [], dict[str, str]()
+    for rows, refused, grouped in measured(str(path), source):
         parts.append(rows)
+        in_groups |= grouped
         for each in refused:
             tell(each)
     rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
@@ -60,6 +63,7 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         tell(each)
     rows, held = without_held(rows)
     notes += digits + held
+    notes += [f"{name}: {cell!r} is read as {re.sub('[.,]', '', cell)}" for name, cell in in_groups.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
         notes.append(
