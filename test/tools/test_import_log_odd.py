@@ -201,3 +201,37 @@ def test_a_place_that_jumps_there_and_back_is_no_reset(importing: Import) -> Non
     rows = ride()
     importing(text(rows.assign(position=rows.position.where(rows.index % 50 != 7, 0.0))))
     assert "odometer" not in str(importing.summary["odd"])
+
+
+@pytest.mark.parametrize(
+    ("column", "mark"),
+    [("position", -9999), ("position", 0), ("brake_pressure", -999), ("speed", 9999)],
+)
+def test_a_number_that_stands_for_no_value_is_said(importing: Import, column: str, mark: float) -> None:
+    rows = ride().drop(columns="position" if column == "speed" else "speed")
+    written = rows.assign(position=rows.get("position", rows.time) + 119_000.0) if column != "speed" else rows
+    gaps = (rows.index % 10 == 3) | ((rows.index > 100) & (rows.index < 150))
+    importing(text(written.assign(**{column: written[column].mask(gaps, mark)})))
+    told = f"{column} is {mark:g} in {gaps.sum()} rows, far from all others: no value? Leave those cells empty"
+    assert importing.summary["odd"] == ([told] if column != "speed" else []), "no train has such a speed: refused"
+    importing.output = importing.output.with_name("cured")
+    importing(text(written.assign(**{column: written[column].mask(gaps)})))
+    assert importing.summary["odd"] == []
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda rows: rows.assign(acceleration=np.where(rows.time < 20.0, 0.0, -0.8 + 0.01 * np.sin(rows.time))),
+        lambda rows: rows.assign(brake_pressure=np.where(rows.time < 20.0, 0.0, 3e5 + rows.time)),
+        lambda rows: rows.assign(brake_pressure=rows.brake_pressure - 3000.0),
+        lambda rows: rows.assign(position=rows.position.clip(upper=1999.0)).drop(columns="speed"),
+        lambda rows: rows.assign(position=rows.position.where(rows.index != 300, 0.0)),
+    ],
+    ids=["an accelerometer", "a brake", "a gauge below 0", "a standstill", "one outlier"],
+)
+def test_numbers_that_many_rows_have_are_values(
+    importing: Import, change: Callable[[pd.DataFrame], pd.DataFrame]
+) -> None:
+    importing(text(change(ride())))
+    assert "no value" not in str(importing.summary["odd"])

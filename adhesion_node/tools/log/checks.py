@@ -21,6 +21,7 @@ from ...run.results.seen import FASTEST_MPS
 from .format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from .motion import BRAKES_MPS2, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
+from .sentinels import sentinels
 from .ways import resets, slow_or_falling, speed_against_positions
 from .whole import Log, moment
 
@@ -45,8 +46,9 @@ RELEASED_PIPE_PA = 2.5e5
 def odd(log: Log) -> list[str]:
     """Say what is odd, with the cure."""
     t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
-    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *_pressures(log)]
-    if of_time or t_s[-1] < LEAST_S:
+    stand_ins = [*sentinels(log)]
+    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *_pressures(log)]
+    if of_time or stand_ins or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *of_time, *texts]
     motion = motion_of(log, t_s)
     of_way = [*resets(log, t_s)]

@@ -1,0 +1,54 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Numbers that stand for no value, -9999 or 65535: in many rows to the bit, and far from all others."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...core.physics.train import Array
+from .format import PRESSURES
+from .whole import Log
+
+LEAST_ROWS = 3
+"""A single number far from the others is an outlier."""
+
+FAR, FAR_MARK = 3.0, 0.01
+"""From the next number: in spreads of all others; for one of `MARKS` in its own size."""
+
+MARKS = {*(-(10.0**digits - 1.0) for digits in range(3, 8)), *(10.0**digits - 1.0 for digits in range(4, 8))}
+MARKS |= {-32768.0, 32767.0, 65535.0}
+"""What devices write where they know nothing, in the unit of the log."""
+
+
+OF_A_PLACE = ("position", "lat", "lon", "height")
+"""They change little by little, whereas a pressure or an acceleration may leave 0 at once."""
+
+
+def sentinels(log: Log) -> Iterator[str]:
+    """Say which number of a column seems to stand for no value."""
+    factors = log.form.factors()
+    for name in log.rows.columns.drop("t_ns"):
+        kind = "wheel_speed" if name in log.columns.axles else name
+        offset = log.form.ambient_pressure_pa if name in PRESSURES and log.form.pressure_is_gauge else 0.0
+        values = log.rows[name].dropna().to_numpy() - offset
+        for mark, rows in _extremes(values):
+            written = mark / factors.get(kind, 1.0)
+            others = values[values != mark]
+            away = float(np.abs(others - mark).min())
+            is_mark = float(np.round(written, 6)) in MARKS and away > FAR_MARK * abs(mark)
+            if is_mark or (name in OF_A_PLACE and away > FAR * np.ptp(others) > 0.0):
+                yield f"{name} is {written:.6g} in {rows} rows, far from all others: no value? Leave those cells empty"
+
+
+def _extremes(values: Array) -> Iterator[tuple[float, int]]:
+    """The least and the greatest number, where many rows have it, and how many."""
+    for mark in (float(values.min()), float(values.max())) if len(values) and np.ptp(values) > 0.0 else ():
+        if (rows := int(np.count_nonzero(values == mark))) >= LEAST_ROWS:
+            yield mark, rows
