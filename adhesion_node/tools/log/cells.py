@@ -99,15 +99,15 @@ def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype
     return _stamps(_parsed(cells.astype(str), form.time_format))
 
 
-def time_format(cells: Iterable[str]) -> str | None:
-    """Return the one of `FORMATS` that most cells have, the first of equals; None where none has a colon.
+def time_formats(cells: Iterable[str]) -> list[str]:
+    """Return those of `FORMATS` that most cells have, in their order; none where no cell has a colon.
 
-    >>> time_format(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_format(["0.1", "0.2"])
-    ('%d.%m.%Y %H:%M:%S.%f', None)
+    >>> time_formats(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_formats(["0.1", "0.2"])
+    (['%d.%m.%Y %H:%M:%S.%f'], [])
     """
     text = pd.Series([cell for cell in cells if ":" in cell], dtype=object).astype(str)
-    counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS}
-    return max(FORMATS, key=lambda form: counts[form]) if len(text) else None
+    counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS if len(text)}
+    return [form for form, count in counts.items() if count == max(counts.values())]
 
 
 def time_unit(cells: Iterable[str], decimal: str) -> str:

@@ -30,6 +30,16 @@ class Columns(NamedTuple):
 
 def columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
     """Return the columns in use; ValueError names the first that is missing or there twice."""
+    try:
+        return _columns_of(header, source, form)
+    except ValueError as error:
+        names = "".join(header)
+        if "\ufffd" in names or (form.encoding == "cp1252" and not names.isascii()):
+            raise ValueError(f"{error}; read as {form.encoding}, are its letters wrong? --encoding") from None
+        raise
+
+
+def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
     used = {ours: _the_one(name, ours, header, source) for ours, name in form.named.items()}
     axles = tuple(_the_one(name, "wheel_speed", header, source) for name in form.axles)
     rest = [name for name in header if name not in (*used.values(), *axles)]

@@ -65,12 +65,13 @@ UNITS: Mapping[str, Sequence[str]] = {
 """By family, the first one where nothing is said; the last ones by column, of which there is no other."""
 
 _IS_PRESSURE = "Pa absolute: is the --pressure-unit, --pressure-kind or --ambient-pressure another?"
+_NMEA = "Or ddmm.mmmm, as NMEA has it: write the degrees dd + mm.mmmm / 60, below 0 for S and W"
 _ABSOLUTE = (MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA, _IS_PRESSURE)
 
 LIMITS = {
     "position": (-MAX_POSITION_M, MAX_POSITION_M, "m: is the --position-unit another?"),
-    "lat": (-90.0, 90.0, "degrees: are latitude and longitude exchanged, or is it in 1e-7 degrees?"),
-    "lon": (-180.0, 180.0, "degrees"),
+    "lat": (-90.0, 90.0, f"degrees: are latitude and longitude exchanged, or is it in 1e-7 degrees? {_NMEA}"),
+    "lon": (-180.0, 180.0, f"degrees: is it in 1e-7 degrees? {_NMEA}"),
     "height": (-500.0, 10_000.0, "m"),
     "variance": (MIN_VARIANCE_M2, MAX_VARIANCE_M2, "m^2: leave it empty where unknown"),
     "brake_pressure": _ABSOLUTE,

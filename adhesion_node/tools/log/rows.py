@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
-from .cells import NO_TIME, Flags, grouped, numbers, time_format, time_unit, times_ns
+from .cells import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, PRESSURES, Format
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
@@ -43,6 +43,8 @@ class Source(NamedTuple):
     form: Format
     columns: Columns
     blocks: Iterator[Block]
+    notes: list[str]
+    """How a date is read that may be read otherwise."""
 
 
 def open_log(path: Path, form: Format) -> Source:
@@ -62,7 +64,9 @@ def open_log(path: Path, form: Format) -> Source:
     timed = _timed(form, first.cells[columns.names["time"]])
     if timed.time_format is not None:
         told.pop("time", None)  # [UTC] or [hh:mm:ss]: dates are in no unit
-    return Source(timed, columns._replace(doubts=tuple(in_doubt(told, form))), _again(first, rows))
+    columns = columns._replace(doubts=tuple(in_doubt(told, form)))
+    notes = [] if form.time_format else list(_read_otherwise(first.cells[columns.names["time"]], timed))
+    return Source(timed, columns, _again(first, rows), notes)
 
 
 class Measured(NamedTuple):
@@ -169,10 +173,20 @@ def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
     if form.time_format is not None or form.time_unit in ("s", "ms", "us", "ns"):
         return form
     sample = [str(cell) for cell in cells.head(SAMPLE)]
-    written = "ISO8601" if form.time_unit == "iso" else time_format(sample)
+    written = "ISO8601" if form.time_unit == "iso" else next(iter(time_formats(sample)), None)
     unit = None if written else form.time_unit or form.told.get("time") or time_unit(sample, form.decimal or ".")
     zone = "UTC" if written == "ISO8601" and any(map(ZONED.search, sample)) else form.time_zone
     return replace(form, time_format=written, time_unit=unit, time_zone=zone)
+
+
+def _read_otherwise(cells: "pd.Series[Any]", form: Format) -> Iterator[str]:
+    """Say how a date was read where another format makes another date of it: 03/04/2024."""
+    sample = cells.head(SAMPLE).astype(str)
+    for other in time_formats(sample) if form.time_format in FORMATS else []:
+        here, there = (times_ns(sample, replace(form, time_format=written)) for written in (form.time_format, other))
+        for i in np.flatnonzero(here != there)[:1]:
+            read = f"time: {sample.iloc[i]!r} is read as {pd.Timestamp(here[i]).date()}"
+            yield f"{read}, may be {pd.Timestamp(there[i]).date()}: --time-format {other!r}"
 
 
 def _parquet(path: Path) -> pd.DataFrame:

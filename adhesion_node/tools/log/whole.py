@@ -62,7 +62,7 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     for each in refused:
         tell(each)
     rows, held = without_held(rows)
-    notes += digits + held
+    notes += source.notes + digits + held
     notes += [f"{name}: {cell!r} is read as {re.sub('[.,]', '', cell)}" for name, cell in in_groups.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
