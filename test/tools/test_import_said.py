@@ -53,6 +53,11 @@ def test_a_date_that_is_no_other_is_not_said(importing: Import, capsys: pytest.C
     assert "may be" not in str(read_as(importing, capsys))
 
 
+def test_a_row_that_is_no_date_is_not_said_to_be_another(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:
+    importing("time,speed\n2024-11-21 08:15:03,1\n21.11.2024 08:15:04,1\n")
+    assert "may be" not in str(read_as(importing, capsys))
+
+
 @pytest.mark.parametrize(("lat", "lon", "name"), [("4700.53969", "8.0", "lat"), ("47.0", "00800.539", "lon")])
 def test_degrees_and_minutes_of_nmea_are_named(importing: Import, lat: str, lon: str, name: str) -> None:
     assert importing(f"time,lat,lon\n1,{lat},{lon}\n") == 2

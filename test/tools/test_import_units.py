@@ -96,6 +96,10 @@ def test_dates_are_in_no_unit(importing: Import) -> None:
     assert importing("time [UTC],speed [m/s]\n2024-11-21 08:15:03,1\n2024-11-21 08:15:04,1\n") == 0
 
 
+def test_a_header_that_is_there_twice_names_no_units(importing: Import) -> None:
+    assert importing("time,speed\ntime,speed\n1,20\n2,20\n") == 0
+
+
 def test_two_columns_of_one_name_are_not_guessed(importing: Import) -> None:
     assert importing("time,speed [km/h],speed [mph]\n1,36,20\n") == 2
     assert "column 'speed' may be ['speed [km/h]', 'speed [mph]']: name one with --speed COL" in importing.errors[0]

@@ -63,7 +63,7 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
 
 def units_told(columns: Columns, header: Sequence[str], form: Format) -> dict[str, str]:
     """Return the units as the log writes them, by column of ours, where it does; `wheel_speed` are all axles."""
-    below = dict(zip(header, form.units or (), strict=False))
+    below = {name: text for name, text in zip(header, form.units or (), strict=False) if text != name}
 
     def told(name: str, ours: str) -> str:
         return parted(name, ours)[1] or below.get(name, "").strip("[](){}<>- ")

@@ -184,7 +184,7 @@ def _read_otherwise(cells: "pd.Series[Any]", form: Format) -> Iterator[str]:
     sample = cells.head(SAMPLE).astype(str)
     for other in time_formats(sample) if form.time_format in FORMATS else []:
         here, there = (times_ns(sample, replace(form, time_format=written)) for written in (form.time_format, other))
-        for i in np.flatnonzero(here != there)[:1]:
+        for i in np.flatnonzero((here != there) & (here != NO_TIME) & (there != NO_TIME))[:1]:
             read = f"time: {sample.iloc[i]!r} is read as {pd.Timestamp(here[i]).date()}"
             yield f"{read}, may be {pd.Timestamp(there[i]).date()}: --time-format {other!r}"
 
