@@ -23,7 +23,7 @@ from test_import_csv import Import, importing
 
 from adhesion_node.tools import import_csv
 from adhesion_node.tools.log.text import SAMPLE
-from adhesion_node.wire.topics import BRAKE_DEMAND, BRAKE_PRESSURE, SPEED
+from adhesion_node.wire.topics import BRAKE_DEMAND, SPEED
 
 __all__ = ["importing"]
 
@@ -373,58 +373,3 @@ def test_a_guess_from_the_beginning_does_not_spoil_the_rest(importing: Import) -
     assert "--decimal" in importing.errors[0]
     importing.output = importing.output.with_name("cured")
     assert importing(log, "--decimal", ",") == 0
-
-
-def test_parquet_as_well(importing: Import, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("pyarrow")
-    rows = ride().assign(time=pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(ride().time, unit="s"))
-    rows.loc[3, "speed"] = np.nan
-    rows.to_parquet(tmp_path / "log.parquet")
-    assert import_csv.main([str(tmp_path / "log.parquet"), "--output", str(importing.output)]) == 0
-    assert "1 without speed" in capsys.readouterr().out
-    assert [sample.position_m for sample in importing.positions()] == rows["position"].tolist()
-    assert importing.positions()[1].t_ns == 1_732_176_903 * S + S // 10
-    assert BRAKE_PRESSURE.read(importing.messages("brake_pressure")[-1]).pressure_pa == pytest.approx(3e5)
-    (tmp_path / "none.parquet").write_bytes(b"PAR1")
-    assert import_csv.main([str(tmp_path / "none.parquet"), "--dry-run"]) == 2
-    assert "is no Parquet file" in capsys.readouterr().err
-
-
-MOMENTS = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(ride().time, unit="s")
-
-TABLES: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], int]] = [
-    ("dates in the index", lambda rows: rows.assign(time=MOMENTS).set_index("time"), 1_732_176_903 * S),
-    (
-        "dates in an index without a name",
-        lambda rows: rows.drop(columns="time").set_index(pd.DatetimeIndex(MOMENTS.array)),
-        1_732_176_903 * S,
-    ),
-    ("two levels", lambda rows: rows.set_index(["brake_pressure", "time"]), 0),
-    ("a level without a name", lambda rows: pd.concat({"A": rows}, names=["unit"]), 0),
-    ("durations", lambda rows: rows.assign(time=pd.to_timedelta(rows.time, unit="s")), 0),
-    ("durations in the index", lambda rows: rows.set_index(pd.to_timedelta(rows.pop("time"), unit="s")), 0),
-    ("an index that is a column, too", lambda rows: rows.set_index(rows.time.to_numpy()).rename_axis("time"), 0),
-]
-
-
-@pytest.mark.parametrize(("table", "first_ns"), [case[1:] for case in TABLES], ids=[case[0] for case in TABLES])
-def test_parquet_whose_time_is_the_index_or_a_duration(
-    importing: Import, tmp_path: Path, table: Callable[[pd.DataFrame], pd.DataFrame], first_ns: int
-) -> None:
-    pytest.importorskip("pyarrow")
-    log = tmp_path / "log.parquet"
-    table(ride()).to_parquet(log)
-    assert import_csv.main([str(log), "--output", str(importing.output)]) == 0
-    assert [sample.position_m for sample in importing.positions()] == ride().position.tolist()
-    assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S // 10 for i in range(600)]
-
-
-def test_durations_below_zero_and_none_are_no_times(
-    importing: Import, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    pytest.importorskip("pyarrow")
-    log = tmp_path / "log.parquet"
-    times = pd.to_timedelta([-1.0, 0.0, np.nan, 2.0], unit="s")
-    pd.DataFrame({"time": times, "speed": 1.0}).to_parquet(log)
-    assert import_csv.main([str(log), "--output", str(importing.output), "--json", "-"]) == 1
-    assert json.loads(capsys.readouterr().out)["written"] == 2

@@ -121,9 +121,10 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
     rows: dict[str, Any] = {"t_ns": t_ns}
     for name, kind in kinds.items():
         read = numbers(theirs[name], decimal, form.thousands)
-        bad, in_groups = filled[name] & np.isnan(read), grouped(theirs[name], decimal)
-        refuse(bad & in_groups, "not_a_number", name, lambda _: IN_GROUPS)
-        refuse(bad, "not_a_number", name, lambda _: NO_NUMBER)
+        bad = filled[name] & np.isnan(read)
+        if bad.any():
+            refuse(bad & grouped(theirs[name], decimal), "not_a_number", name, lambda _: IN_GROUPS)
+            refuse(bad, "not_a_number", name, lambda _: NO_NUMBER)
         factor = factors.get(kind, 1.0)
         with np.errstate(over="ignore"):  # 1e300 km are out of range
             read *= factor
