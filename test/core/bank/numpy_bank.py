@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.integrate import trapezoid
 from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching, motion
@@ -307,6 +308,10 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     speeds = float(bank.weight @ speed) * ahead.SPEEDS_AHEAD
     by_law = np.array([law(speeds[:, None]) / law(speed) for law, _ in laws_of(config)])
     rising = np.where(sliding, by_law[bank.law, :, np.arange(bank.law.size)].T, 1.0) ** ahead.COUNTED_RISE
+    fails = float(bank.weight @ (kinds.GROWTH[bank.kind] < 0.0)) >= ahead.FAILS
+    growth = np.where(sliding & fails, np.minimum(kinds.GROWTH[bank.kind], 0.0), 0.0)
+    passed = np.linspace(0.0, 1.0, 4001)  # of the time to the standstill; there the train is so much slower
+    rising *= trapezoid(2.0 * (1.0 - passed) * np.exp(np.outer(growth * time_s, passed)), passed)
     foreseen = adhesion * rising + mean[:, GRADE] * grade_kept
     std = np.sqrt(np.maximum(variance, 1e-12)) * rising
     # the whole brake may make axles slide that roll under a part of it

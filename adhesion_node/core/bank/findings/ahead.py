@@ -48,6 +48,9 @@ KNOWN_SHARE = 0.6
 """Of the chance that the bound or the safe curve may fail, what is left to all that the hypotheses know of; the rest is
 for what they do not."""
 
+FAILS = 0.7
+"""Probability from which a rail that has gone on losing adhesion is counted on to do so ahead."""
+
 PARTIAL = 0.8
 """Part of the full brake below which adhesion may be more than it shows: what was known before still holds."""
 
@@ -102,7 +105,10 @@ def counted_on(
         weight /= weight.sum()
     borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, surely(config, bank))) if partial else (1.0, 0.0)
     asked = mixture.Asked(float(missed), borne, float(least))
-    low = mixture.counted_on(_ahead_of(config), bank, weight, used, speeds, asked)
+    rule = _ahead_of(config)
+    if float(bank.weight @ (kinds.GROWTH[bank.kind] < 0.0)) < FAILS:
+        rule = rule._replace(growth=np.zeros_like(rule.growth))
+    low = mixture.counted_on(rule, bank, weight, used, speeds, asked)
     return Ahead(tuple(speeds.tolist()), tuple(low.tolist()))
 
 
@@ -163,6 +169,7 @@ def _ahead_of(config: Config) -> mixture.Ahead:
         rough=np.square(kinds.roughness_of(config)),
         fading=kinds.FADING,
         drift=np.square(np.minimum(kinds.DRIFT, DRIFT_AHEAD)),
+        growth=np.minimum(kinds.GROWTH, 0.0),
         grade_m=kinds.grade_m_of(config),
         resistance=np.array(config.train.resistance_si),
         grade_error=float(config.grade_error),

@@ -37,6 +37,8 @@ class Ahead(NamedTuple):
     """How fast that fades, per m and per s, shape (K, 2)."""
     drift: Array
     """Relative variance that adhesion gains in 1 s, shape (K,)."""
+    growth: Array
+    """What it gains in 1 s as is counted on, relative, shape (K,)."""
     grade_m: float
     """Correlation length of the grade."""
     resistance: Array
@@ -140,6 +142,14 @@ def _mean_ahead(relative: float) -> tuple[float, float]:
 
 
 @kernel
+def _grown(relative: float) -> float:
+    """Mean along the way to a standstill of what grows by e to that until then."""
+    if abs(relative) < 1e-3:
+        return 1.0 + relative / 3.0
+    return 2.0 * (math.expm1(relative) - relative) / relative**2
+
+
+@kernel
 def counted_on(
     rule: Ahead,
     bank: Bank,
@@ -181,11 +191,12 @@ def counted_on(
         if slides:
             variance += x[MU] ** 2 * (rule.rough[k] * rough_added + rule.drift[k] * time_s / 3.0)
         one, rest = math.sqrt(max(variance, 1e-12)), grade * grade_kept
-        law = _law(rule.laws, bank.law[h], speed)
+        law, grown = _law(rule.laws, bank.law[h], speed), _grown(rule.growth[k] * time_s)
         level = u - slope[ROUGH] * x[ROUGH] * (1.0 - rough_kept) - per_mps * (x[SPEED] - told)
         for row in range(speeds.size):
             if slides:
                 rising = (_law(rule.laws, bank.law[h], speeds[row]) / law) ** rule.rise
+                rising *= grown
                 foreseen, spread = level * rising + rest, one * rising
             elif asked.borne * u < asked.known:
                 foreseen, spread = asked.known, 1e-6
