@@ -38,6 +38,18 @@ _Loader.add_implicit_resolver(
 )
 
 
+class _Once(_Loader):
+    """No key may stand twice: else the last one would count, without a word."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        keys = [self.construct_object(key, deep=True) for key, _ in node.value]
+        for index, key in enumerate(keys):
+            if key in keys[:index]:
+                line = node.value[index][0].start_mark.line + 1
+                raise ValueError(f"{key} stands in line {line} once more: leave one out")
+        return super().construct_mapping(node, deep)
+
+
 class Section(NamedTuple):
     """Parameters by name, and the name of the nodes that they are for; nested namespaces are joined."""
 
@@ -124,9 +136,12 @@ def text_of(node: str, values: Mapping[str, Any]) -> str:
     return text
 
 
-def load(path: str) -> Any:
-    """What a YAML file holds. Raises OSError, ValueError or YAMLError where it is not readable."""
-    return yaml.load(Path(path).read_text(encoding="utf-8"), _Loader)
+def load(path: str, *, once: bool = False) -> Any:
+    """What a YAML file holds, where a key may stand `once` only, or again.
+
+    Raises OSError, ValueError or YAMLError where it is not readable.
+    """
+    return yaml.load(Path(path).read_text(encoding="utf-8"), _Once if once else _Loader)
 
 
 def sections(path: str) -> list[Section]:

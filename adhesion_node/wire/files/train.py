@@ -63,7 +63,7 @@ def read_train(path: str) -> TrainFile:
     source = f"train = {path}"
     shipped = SHIPPED / f"{path}.yaml"
     try:
-        content = load(str(shipped) if shipped.is_file() else path)
+        content = load(str(shipped) if shipped.is_file() else path, once=True)
     except (OSError, ValueError, yaml.YAMLError, RecursionError) as error:
         names = ", ".join(sorted(one.stem for one in SHIPPED.glob("*.yaml")))
         raise ValueError(f"{source}: not readable ({error}): give a YAML file, or one of {names}") from error

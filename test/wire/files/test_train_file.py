@@ -118,6 +118,14 @@ def test_an_import_takes_wheels_and_full_pressure_from_the_file(tmp_path: Path) 
     assert [form.full_pressure_pa for form in formats] == [410e3, 380e3, 380e3]
 
 
+def test_a_key_that_stands_twice_is_refused(tmp_path: Path) -> None:
+    """YAML takes the last one, without a word."""
+    twice = tmp_path / "twice.yaml"
+    twice.write_text(f"{Path(written(tmp_path)).read_text(encoding='utf-8')}\nlength_m: 50\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"twice\.yaml: not readable \(length_m stands in line \d+ once more"):
+        read_train(str(twice))
+
+
 BRAKE = UNIT["brake"]
 
 
