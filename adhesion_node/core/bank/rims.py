@@ -69,15 +69,15 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
 
 
 def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pressed: bool) -> Memory:
-    """Take in how fast the middle rim is, unless it may slide all the same: then none is faster than the train."""
+    """Take in how fast the middle rim is, as some may spin; where it may slide, the train is not slower than that."""
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
-    wheels, fastest = memory.wheels, memory.wheels.fastest(rims) if rims else 0.0
-    wheels = wheels.beside(fastest, t_ns) if rims else wheels
+    middle = median(rims) if rims else 0.0
+    wheels = memory.wheels.beside(middle, t_ns) if rims else memory.wheels
     memory = memory._replace(wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf))
-    if fastest <= LEARNING_MPS:
+    if middle <= LEARNING_MPS:
         return memory
-    bank = not_slower(memory.bank, fastest) if pressed else rolling(memory.bank, median(rims))
-    return memory._replace(bank=bank.normalised())
+    taken = not_slower if pressed else rolling
+    return memory._replace(bank=taken(memory.bank, middle).normalised())
 
 
 def _telling(memory: Memory) -> Memory:
