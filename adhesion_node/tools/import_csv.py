@@ -20,8 +20,8 @@ from ..bag import BagWriter, encode
 from ..command.options import DONE, FAILED, help_texts, json_option, progress, report, run_tool
 from ..wire import topics
 from ..wire.topic import Topic
-from .log.checks import odd
 from .log.format import Format
+from .log.odd.checks import odd
 from .log.options import add_options, format_of
 from .log.text import BLOCK
 from .log.told import Refused, ranges, read_as, units_read

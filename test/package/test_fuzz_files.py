@@ -35,8 +35,8 @@ from adhesion_node.core.intake.samples import MAX_POSITION_M
 from adhesion_node.tools import import_csv, recover
 from adhesion_node.tools.log import format as log_format
 from adhesion_node.tools.log.cells import END_OF_STAMPS_NS
-from adhesion_node.tools.log.checks import odd
 from adhesion_node.tools.log.format import OPTIONAL, Format
+from adhesion_node.tools.log.odd.checks import odd
 from adhesion_node.tools.log.text import Refusal
 from adhesion_node.tools.log.whole import read_log
 from adhesion_node.wire.files import parameters

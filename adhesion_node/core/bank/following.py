@@ -31,8 +31,8 @@ from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCA
 from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
-from .scatter import BRAKED_FAR, SLOW_FAR
 from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
+from .sensors.scatter import BRAKED_FAR, SLOW_FAR
 
 if TYPE_CHECKING:
     from ..config import Config

@@ -25,8 +25,8 @@ from .labels.kinds import HELD, PASSING, SLIDES
 from .layout import MU, POSITION, ROUGH, SPEED, Bank
 from .memory import Memory, S, steps
 from .motion import Braking, resistance, use
-from .plausible import Course
 from .seeing import wheels_seen
+from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config

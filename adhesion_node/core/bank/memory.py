@@ -25,10 +25,10 @@ from .gear.wheels import WheelsSeen
 from .kernels import weighing
 from .layout import POSITION, Bank
 from .motion import Braking, moved
-from .plausible import Course
-from .scatter import LASTING, Coloured
 from .seeing import Observation, corrected
-from .trust import Pointing
+from .sensors.plausible import Course
+from .sensors.pointing import Pointing
+from .sensors.scatter import LASTING, Coloured
 
 if TYPE_CHECKING:
     from ..config import Config

@@ -20,7 +20,7 @@ from .following import followed
 from .layout import POSITION
 from .memory import Memory
 from .motion import Foreseen
-from .plausible import Course
+from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config

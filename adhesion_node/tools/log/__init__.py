@@ -6,4 +6,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A train's own log, CSV or Parquet: how it is written, its rows in SI units, what is odd of it."""
+"""A train's own log, CSV or Parquet: how it is written, its rows in SI units."""

@@ -18,7 +18,7 @@ from banks import CONFIG, FULL, FULL_PA, S, bank_of
 from oracles import specific_resistance
 
 from adhesion_node.core import Measurement, Outcome, State, init, step
-from adhesion_node.core.bank import plausible
+from adhesion_node.core.bank.sensors import plausible
 from adhesion_node.core.estimate import Estimate
 from adhesion_node.core.physics.train import Array
 

@@ -17,7 +17,7 @@ from test_bank_trust import Run, assert_known, followed
 
 from adhesion_node.core import ImuSample, SpeedSample
 from adhesion_node.core.bank.findings.learnt import learnt
-from adhesion_node.core.bank.scatter import LASTING, Coloured, Scatter
+from adhesion_node.core.bank.sensors.scatter import LASTING, Coloured, Scatter
 
 H = 0.1
 

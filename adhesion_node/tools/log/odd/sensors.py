@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .format import ACCELERATION_UNITS, Format, wheel_units
+from ..format import ACCELERATION_UNITS, Format, wheel_units
 from .motion import BRAKES_MPS2, LEAST_S, OVER_S, RUNS_MPS2, SAME, Motion
 
 RUNS_MPS = 5.0

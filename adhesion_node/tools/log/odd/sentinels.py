@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...core.physics.train import Array
-from .format import PRESSURES
-from .whole import Log
+from ....core.physics.train import Array
+from ..format import PRESSURES
+from ..whole import Log
 
 LEAST_ROWS = 3
 """A single number far from the others is an outlier."""

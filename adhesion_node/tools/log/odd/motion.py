@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ...core.physics.train import Array
-from .cells import Flags
-from .whole import Log
+from ....core.physics.train import Array
+from ..cells import Flags
+from ..whole import Log
 
 LEAST_S, LEAST_M = 10.0, 100.0
 """Of less time or less way nothing is said."""

@@ -17,15 +17,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.train import GRAVITY
-from ..quick import quick
-from .kernels import parabola
-from .labels import noises
-from .layout import SPEED, Bank
-from .motion import white_variance
+from ...physics.train import GRAVITY
+from ...quick import quick
+from ..kernels import parabola
+from ..labels import noises
+from ..layout import SPEED, Bank
+from ..motion import white_variance
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 S = 1_000_000_000
 

@@ -16,14 +16,14 @@ from itertools import chain
 
 import numpy as np
 
-from ...core.physics.train import KMH, Array
-from ...run.results.seen import FASTEST_MPS
-from .format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
+from ....core.physics.train import KMH, Array
+from ....run.results.seen import FASTEST_MPS
+from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
+from ..whole import Log, moment
 from .motion import BRAKES_MPS2, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
 from .ways import resets, slow_or_falling, speed_against_positions
-from .whole import Log, moment
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
