@@ -20,6 +20,7 @@ from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement
 from ..physics.train import GRAVITY
 from .gear.axles import ROLLS
+from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import RADIUS, SPEED, Bank
 from .memory import Memory, S
@@ -73,7 +74,9 @@ def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pres
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
     middle = median(rims) if rims else 0.0
     wheels = memory.wheels.beside(middle, t_ns) if rims else memory.wheels
-    memory = memory._replace(wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf))
+    memory = memory._replace(
+        wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, wander=Wander())
+    )
     if middle <= LEARNING_MPS:
         return memory
     taken = not_slower if pressed else rolling
@@ -95,7 +98,10 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
         return memory
     bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
     if memory.t_ns >= wheels.trusted_ns:
-        bank, wheels = as_fast(bank, rim_mps), wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS)
+        wander = wheels.wander.after(memory.t_ns, rim_mps)
+        errors = wander.errors() if memory.braking.told > 0.0 else Errors()
+        bank = as_fast(_wandering(bank, errors.lasting * TRUSTED_NS / S), rim_mps, errors.quick)
+        wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
 
@@ -122,20 +128,31 @@ def not_slower(bank: Bank, rim_mps: float) -> Bank:
     return after._replace(log_weight=bank.log_weight - np.where(slower, 0.5 * squared, 0.0))
 
 
-def as_fast(bank: Bank, rim_mps: float) -> Bank:
+def _wandering(bank: Bank, variance: float) -> Bank:
+    """Creep of all rims alike has wandered by such a variance: it is as if their radii were others."""
+    if not variance:
+        return bank
+    covariance = bank.covariance.copy()
+    covariance[:, RADIUS, RADIUS] += variance
+    return bank._replace(covariance=covariance)
+
+
+def as_fast(bank: Bank, rim_mps: float, rolls: float = ROLLS) -> Bank:
     """Take in that the fastest rim under the brake is as fast as the train, or slides.
+
+    `rolls` is its error where it rolls, relative.
 
     Each Gaussian becomes the one with the moments of both (probabilistic data association, Bar-Shalom and Tse 1975).
     The weights are not normalised.
     """
-    error = ROLLS * rim_mps
+    error = rolls * rim_mps
     seen = speed_seen(bank, rim_mps * (1.0 + CREEP), error**2, RADIUS)
     gain = np.einsum("hij,hj->hi", bank.covariance, seen.slope)
     std = np.sqrt(np.einsum("hi,hi->h", gain, seen.slope) + error**2)
     off, gain = seen.innovation / std, gain / std[:, None]
-    rolls = np.exp(-0.5 * off**2) / (math.sqrt(2.0 * math.pi) * std)
-    total = rolls + SLIDES / error
-    part = rolls / total
+    rolled = np.exp(-0.5 * off**2) / (math.sqrt(2.0 * math.pi) * std)
+    total = rolled + SLIDES / error
+    part = rolled / total
     narrower = part * (1.0 - (1.0 - part) * off**2)
     return bank._replace(
         mean=bank.mean + gain * (part * off)[:, None],

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...intake.plausibility import STRONGEST_MPS2
 from ...intake.samples import WheelSample
+from .wander import Wander
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -77,6 +78,8 @@ class WheelsSeen(NamedTuple):
     """Speed of the fastest rim at its lowest since the brake was applied."""
     risen: bool = False
     """Whether it has risen since, and rises no more: a train under the brake does not, so it slid and rolls again."""
+    wander: Wander = Wander()
+    """How it errs."""
     recent: tuple[tuple[int, float], ...] = ()
     """How fast it was of late, with stamps in ns, ..."""
     fell_ns: int | None = None
