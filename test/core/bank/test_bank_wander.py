@@ -103,3 +103,8 @@ def test_the_speed_of_a_train_all_of_whose_axles_creep_is_as_sure_as_it_says() -
     off = np.concatenate([deviations(seed) for seed in range(12)])
     assert np.mean(np.abs(off) > 3.0) < 0.02
     assert math.sqrt(np.mean(np.square(off))) == pytest.approx(1.0, abs=0.25)
+
+
+def test_a_rim_that_slides_for_a_while_tells_nothing_of_those_that_roll() -> None:
+    slid = np.where((np.arange(40) > 25) & (np.arange(40) < 32), -0.3, 0.0)
+    assert shown(slid) == Errors(ROLLS, 0.0)

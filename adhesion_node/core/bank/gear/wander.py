@@ -22,7 +22,7 @@ SPAN_NS, SAMPLES = 12 * S, 16
 """Over which time a parabola is laid through its speeds, as a train brakes; through so many at least."""
 
 FAR = 0.02
-"""Farther from it, relative, is where none rolled."""
+"""Farther from it, relative, none rolled but slid: that tells nothing of those that do."""
 
 QUICK, LEAST = 2.0, 0.003
 """Times the variance of its quick error that is counted, as it never runs ahead of the train; and what there is at
@@ -64,7 +64,9 @@ class Wander(NamedTuple):
         stamps, speeds = np.array(self.taken).T
         powers = np.vander((stamps - stamps[0]) / SPAN_NS, 3)
         relative = speeds / speeds.mean()
-        off = np.clip(relative - powers @ np.linalg.lstsq(powers, relative, rcond=None)[0], -FAR, FAR)
+        off = relative - powers @ np.linalg.lstsq(powers, relative, rcond=None)[0]
+        if np.abs(off).max() > FAR:
+            return Errors()
         lasting = max(float(off[1:] @ off[:-1]) / (off.size - 1), 0.0)
         quick = QUICK * max(float(off @ off) / off.size - lasting, 0.0)
         return Errors(min(max(quick**0.5, LEAST), ROLLS), LASTING * lasting)
