@@ -25,7 +25,7 @@ from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import RADIUS, SPEED, Bank
 from .memory import Memory, S
 from .motion import resistance, use
-from .seeing import CLIPPED, corrected, speed_seen
+from .seeing import CLIPPED, corrected, fall_seen, speed_seen
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -97,6 +97,8 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
     if rim_mps <= config.slowest_mps:
         return memory
     bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
+    if wheels.fell_ns == memory.t_ns and wheels.fall_mps2 != memory.wheels.fall_mps2:
+        bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)
     if memory.t_ns >= wheels.trusted_ns:
         wander = wheels.wander.after(memory.t_ns, rim_mps)
         errors = wander.errors() if memory.braking.told > 0.0 else Errors()

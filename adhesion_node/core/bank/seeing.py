@@ -20,7 +20,7 @@ from ..physics.train import GRAVITY, Array
 from .kernels import weighing
 from .labels.kinds import SLIDES
 from .layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSITION, ROUGH, SCALE, SPEED, Bank
-from .motion import BUILDING_UP, Braking, rolling_use, use, white_variance
+from .motion import BUILDING_UP, Braking, resistance, rolling_use, use, white_variance
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -35,6 +35,11 @@ STEADY_ERROR, SWINGING = 0.002, 1.9
 ROLLED, SLID = (0.85, 1.15), (1.0, 0.9)
 """Parts of what the brake needs, and of what sliding axles use, between which adhesion lies where wheels roll or slide:
 rolling ones could use a seventh more than sliding ones, and some axles slide before the others."""
+
+PRESSED, DEEP, LEAST_LIKELY = 0.15, 0.6, 1e-4
+"""Error of the brake's force while axles begin to slide, over that of the demand; part of it up to which what falling
+rims leave to be used tells more than that they slide; and its least probability, where a hypothesis says that it is
+more."""
 
 
 class Observation(NamedTuple):
@@ -90,7 +95,7 @@ def corrected(bank: Bank, seen: Observation) -> Bank:
 def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) -> Bank:
     """Take in that wheels were seen to slide, or to roll: adhesion is below, or above, what the brake needs.
 
-    Each Gaussian becomes the one with the moments of what is left of it. The weights are not normalised.
+    The weights are not normalised.
     """
     mean, times = bank.mean, math.exp(elapsed_s * braking.told)
     part, more = SLID if braking.told > 0.0 else ROLLED
@@ -98,15 +103,40 @@ def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) 
     slope[:, BRAKE] = part * braking.applied / (1.0 + config.train.rotating_mass_fraction)
     slope[:, MU], slope[:, ROUGH] = -more * (1.0 + mean[:, ROUGH]), -more * mean[:, MU]
     short = part * rolling_use(config, bank, braking) + slope[:, MU] * mean[:, MU]
-    gain = np.einsum("hij,hj->hi", bank.covariance, slope)
-    std = np.sqrt(np.maximum(np.einsum("hi,hi->h", gain, slope), 1e-12))
-    off = short / std
     slides = np.where(SLIDES[bank.kind], times - 1.0, 0.0)
-    total = 1.0 + slides * ndtr(off)
-    pull = slides * np.exp(-0.5 * off**2) / math.sqrt(2.0 * math.pi) / total
+    return _above(bank, short, slope, 0.0, 1.0, slides)
+
+
+def fall_seen(config: Config, bank: Bank, braking: Braking, fall_mps2: float) -> Bank:
+    """Take in that all rims fall so fast: what the brake presses with beyond what the rail gives slows them down.
+
+    No more than the rest can be used: cylinders may have been let go, or other rims fall faster. It is of use where
+    that is far less than the brake asks for. The weights are not normalised.
+    """
+    turned, brake = fall_mps2 / GRAVITY, braking.applied
+    turning = config.train.rotating_mass_fraction * turned
+    if brake - turning > DEEP * brake:
+        return bank
+    used = use(config, bank, braking, resistance(config, bank))
+    slope = -used.slope
+    slope[:, BRAKE] += brake
+    variance = (config.rotating_mass_std * turned) ** 2 + (PRESSED * brake) ** 2
+    return _above(bank, bank.mean[:, BRAKE] * brake - turning - used.value, slope, variance, LEAST_LIKELY, 1.0)
+
+
+def _above(bank: Bank, value: Array, slope: Array, variance: float, else_: float, more: Array | float) -> Bank:
+    """Take in that a value, measured so well, is above 0: that is by `more` likelier than `else_`.
+
+    Each Gaussian becomes the one with the moments of what is left of it.
+    """
+    gain = np.einsum("hij,hj->hi", bank.covariance, slope)
+    std = np.sqrt(np.maximum(np.einsum("hi,hi->h", gain, slope) + variance, 1e-12))
+    off = value / std
+    total = else_ + more * ndtr(off)
+    pull = more * np.exp(-0.5 * off**2) / math.sqrt(2.0 * math.pi) / total
     gain /= std[:, None]
     return bank._replace(
-        mean=mean + gain * pull[:, None],
+        mean=bank.mean + gain * pull[:, None],
         covariance=bank.covariance - (pull * (pull + off))[:, None, None] * gain[:, :, None] * gain[:, None, :],
         log_weight=bank.log_weight + np.log(total),
     )

@@ -34,7 +34,11 @@ Gauge = tuple[float, float, float | None]
 
 
 def journey(
-    seconds: float, sensor: str, gauge: tuple[float, float, float | None], seed: int = 1
+    seconds: float,
+    sensor: str,
+    gauge: tuple[float, float, float | None],
+    seed: int = 1,
+    config: Config = CONFIG,
 ) -> tuple[Memory, float]:
     """20 s at 40 m/s, then the full brake on a rail of 0.03, on which all axles fall to 0.7 of the train's speed.
 
@@ -56,7 +60,7 @@ def journey(
             measured = measured._replace(wheels=(WheelSample(t_ns, rates),))
         else:
             measured = measured._replace(speed_mps=float(rims[0]))
-        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
+        memory = met(config, measured) if memory is None else followed(config, memory, measured, lambda: RAIL)
         slowing = SLOWING * min(max(braked_s, 0.0), 1.0)
         place, speed = place + 0.1 * speed, speed - 0.1 * slowing
     assert memory is not None
@@ -117,6 +121,18 @@ def test_where_all_axles_have_fallen_a_rail_that_gives_much_less_is_thought_of_a
     assert memory.braking.told == FALLS
     low = memory.bank.mean[:, MU] < 0.5 * memory.braking.applied
     assert float(memory.bank.weight @ low) > 0.1
+
+
+def test_how_fast_all_axles_fall_tells_how_little_the_rail_gives() -> None:
+    """They fall by 12 m/s^2: the brake needs half of its force for that, and no more than the rest is used."""
+    turning = replace(CONFIG, train=replace(CONFIG.train, rotating_mass_fraction=0.045))
+    for seed in range(4):
+        (memory, _), (blind, _) = (
+            journey(2.5, "wheels", (math.inf, math.inf, None), seed, config) for config in (turning, CONFIG)
+        )
+        brake = memory.braking.applied
+        much, before = (float(each.bank.weight @ (each.bank.mean[:, MU] > 0.75 * brake)) for each in (memory, blind))
+        assert much < 0.5 * before
 
 
 def rims(speeds: list[float], noise: float = 1e-6) -> WheelsSeen:

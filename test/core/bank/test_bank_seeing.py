@@ -10,6 +10,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from banks import FULL, bank_of
@@ -21,9 +24,12 @@ from adhesion_node.core.bank.layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSIT
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.bank.seeing import (
     CLIPPED,
+    LEAST_LIKELY,
+    PRESSED,
     Observation,
     acceleration_seen,
     corrected,
+    fall_seen,
     position_seen,
     speed_seen,
     wheels_seen,
@@ -162,3 +168,33 @@ def test_wheels_cut_the_gaussians_where_the_brake_needs_as_much(told: float, mu:
     assert unit * np.sqrt(after.covariance[0, component, component]) == pytest.approx(std, rel=5e-3)
     both = float((likely * (rail - mean) * factor).sum() / likely.sum())
     assert unit * after.covariance[0, component, BRAKE] == pytest.approx(both, abs=5e-3 * std * 0.1)
+
+
+TURNING = replace(CONFIG, train=replace(CONFIG.train, rotating_mass_fraction=0.06))
+
+
+@pytest.mark.parametrize("mu", [0.02, 0.04, 0.06, 0.09])
+@pytest.mark.parametrize("fall_mps2", [7.0, 12.0])
+def test_rims_that_fall_leave_the_rail_no_more_than_the_rest_of_the_brake(mu: float, fall_mps2: float) -> None:
+    """Against sums over a grid of adhesion and brake factor."""
+    bank = bank_of([2, 1], spread=0.0).with_fresh(MU, mu, 0.2 * mu).with_fresh(ROUGH, 0.0, 0.0)
+    bank = bank.with_fresh(BRAKE, 1.0, 0.1)
+    after = fall_seen(TURNING, bank, Braking(0.1, told=8.0), fall_mps2)
+    rail, factor = np.meshgrid(np.linspace(0.0, 2.5 * mu, 1501), np.linspace(0.4, 1.6, 1201), indexing="ij")
+    density = norm.pdf(rail, mu, 0.2 * mu) * norm.pdf(factor, 1.0, 0.1)
+    turned = fall_mps2 / 9.8
+    error = math.hypot(TURNING.rotating_mass_std * turned, PRESSED * 0.1)
+    likely = density * (LEAST_LIKELY + norm.cdf((0.1 * factor - 0.06 * turned - rail) / error))
+    assert after.log_weight[0] - bank.log_weight[0] == pytest.approx(np.log(likely.sum() / density.sum()), abs=2e-3)
+    mean = float((likely * rail).sum() / likely.sum())
+    assert after.mean[0, MU] == pytest.approx(mean, abs=2e-3 * mu)
+    std = math.sqrt(float((likely * (rail - mean) ** 2).sum() / likely.sum()))
+    assert math.sqrt(after.covariance[0, MU, MU]) == pytest.approx(std, rel=5e-3)
+    assert after.log_weight[1] - bank.log_weight[1] < after.log_weight[0] - bank.log_weight[0]  # all axles roll there
+
+
+def test_rims_that_fall_a_little_tell_no_more_than_that_they_slide() -> None:
+    assert fall_seen(TURNING, BANK, Braking(0.1, told=8.0), 5.0) is BANK
+    assert (
+        fall_seen(CONFIG, BANK, Braking(0.1, told=8.0), 50.0) is BANK
+    )  # of a train whose papers know no rotating mass

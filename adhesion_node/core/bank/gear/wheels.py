@@ -52,6 +52,9 @@ FALL_NS, FALL_SIGMA, FELL_NS, UNTOLD_NS = 2 * S // 5, 2.5, S, 120 * S
 train, by so many standard deviations of its noise, all axles slide. They count so for the next time; where no pressure
 tells of a brake, for the last one."""
 
+DEEPER = 1.3
+"""Times as fast it must fall within the time that a fall counts to tell anything anew."""
+
 FALLS = 8.0
 """Log odds per second by which all axles slide then."""
 
@@ -83,7 +86,9 @@ class WheelsSeen(NamedTuple):
     recent: tuple[tuple[int, float], ...] = ()
     """How fast it was of late, with stamps in ns, ..."""
     fell_ns: int | None = None
-    """... and when it last fell faster than a train can."""
+    """... when it last fell faster than a train can, ..."""
+    fall_mps2: float = 0.0
+    """... and how fast; it is told again once it falls so many times, `DEEPER`, as fast."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
         """Take in the speeds of all axles while that of one which rolls is known so.
@@ -142,8 +147,9 @@ class WheelsSeen(NamedTuple):
         most = STRONGEST_MPS2 * (now_ns - then_ns) / S + FALL_SIGMA * math.sqrt(2.0 * self.noise) * then_mps
         if 2 * (now_ns - then_ns) >= FALL_NS and then_mps - fastest_mps > most:
             trusted_ns = max(self.trusted_ns, now_ns + round(UNISON_S * S))
-            fallen = self._replace(recent=recent, fell_ns=now_ns, trusted_ns=trusted_ns)
-            return fallen._replace(lowest_mps=fastest_mps, risen=False)
+            fall, told = S * (then_mps - fastest_mps) / (now_ns - then_ns), self.fall_mps2 if self.fell(now_ns) else 0.0
+            fallen = self._replace(recent=recent, fell_ns=now_ns, fall_mps2=fall if fall > DEEPER * told else told)
+            return fallen._replace(trusted_ns=trusted_ns, lowest_mps=fastest_mps, risen=False)
         if self.risen:
             return self._replace(recent=recent)
         lowest = min(self.lowest_mps, fastest_mps)
