@@ -114,7 +114,7 @@ def fall_seen(config: Config, bank: Bank, braking: Braking, fall_mps2: float) ->
     that is far less than the brake asks for. The weights are not normalised.
     """
     turned, brake = fall_mps2 / GRAVITY, braking.applied
-    turning = config.train.rotating_mass_fraction * turned
+    turning = min(config.train.rotating_mass_fraction * turned, brake)
     if brake - turning > DEEP * brake:
         return bank
     used = use(config, bank, braking, resistance(config, bank))
@@ -124,15 +124,15 @@ def fall_seen(config: Config, bank: Bank, braking: Braking, fall_mps2: float) ->
     return _above(bank, bank.mean[:, BRAKE] * brake - turning - used.value, slope, variance, LEAST_LIKELY, 1.0)
 
 
-def _above(bank: Bank, value: Array, slope: Array, variance: float, else_: float, more: Array | float) -> Bank:
-    """Take in that a value, measured so well, is above 0: that is by `more` likelier than `else_`.
+def _above(bank: Bank, value: Array, slope: Array, variance: float, least: float, more: Array | float) -> Bank:
+    """Take in that a value, measured so well, is above 0: it is so with the likelihood `least` + `more`, else `least`.
 
     Each Gaussian becomes the one with the moments of what is left of it.
     """
     gain = np.einsum("hij,hj->hi", bank.covariance, slope)
     std = np.sqrt(np.maximum(np.einsum("hi,hi->h", gain, slope) + variance, 1e-12))
     off = value / std
-    total = else_ + more * ndtr(off)
+    total = least + more * ndtr(off)
     pull = more * np.exp(-0.5 * off**2) / math.sqrt(2.0 * math.pi) / total
     gain /= std[:, None]
     return bank._replace(
