@@ -75,7 +75,7 @@ def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pres
     middle = median(rims) if rims else 0.0
     wheels = memory.wheels.beside(middle, t_ns) if rims else memory.wheels
     memory = memory._replace(
-        wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, wander=Wander())
+        wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander())
     )
     if middle <= LEARNING_MPS:
         return memory

@@ -53,7 +53,7 @@ train, by so many standard deviations of its noise, all axles slide. They count 
 tells of a brake, for the last one."""
 
 DEEPER = 1.3
-"""Times as fast it must fall within the time that a fall counts to tell anything anew."""
+"""Times as fast as ever in a braking it must fall to tell anything anew: else it errs as it did before."""
 
 FALLS = 8.0
 """Log odds per second by which all axles slide then."""
@@ -88,7 +88,7 @@ class WheelsSeen(NamedTuple):
     fell_ns: int | None = None
     """... when it last fell faster than a train can, ..."""
     fall_mps2: float = 0.0
-    """... and how fast; it is told again once it falls so many times, `DEEPER`, as fast."""
+    """... and how fast at most in this braking, to within `DEEPER`."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
         """Take in the speeds of all axles while that of one which rolls is known so.
@@ -147,8 +147,9 @@ class WheelsSeen(NamedTuple):
         most = STRONGEST_MPS2 * (now_ns - then_ns) / S + FALL_SIGMA * math.sqrt(2.0 * self.noise) * then_mps
         if 2 * (now_ns - then_ns) >= FALL_NS and then_mps - fastest_mps > most:
             trusted_ns = max(self.trusted_ns, now_ns + round(UNISON_S * S))
-            fall, told = S * (then_mps - fastest_mps) / (now_ns - then_ns), self.fall_mps2 if self.fell(now_ns) else 0.0
-            fallen = self._replace(recent=recent, fell_ns=now_ns, fall_mps2=fall if fall > DEEPER * told else told)
+            fall = S * (then_mps - fastest_mps) / (now_ns - then_ns)
+            fall = fall if fall > DEEPER * self.fall_mps2 else self.fall_mps2
+            fallen = self._replace(recent=recent, fell_ns=now_ns, fall_mps2=fall)
             return fallen._replace(trusted_ns=trusted_ns, lowest_mps=fastest_mps, risen=False)
         if self.risen:
             return self._replace(recent=recent)
