@@ -56,8 +56,8 @@ class Wander(NamedTuple):
         """What they show by now.
 
         >>> steady = Wander(tuple((index * S // 2, 40.0 - 0.3 * index) for index in range(20)))
-        >>> steady.errors()
-        Errors(quick=0.003, lasting=0.0)
+        >>> steady.errors().quick
+        0.003
         """
         if len(self.taken) < SAMPLES:
             return Errors()
