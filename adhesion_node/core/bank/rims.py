@@ -97,7 +97,7 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
     if rim_mps <= config.slowest_mps:
         return memory
     bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
-    if wheels.fell_ns == memory.t_ns and wheels.fall_mps2 != memory.wheels.fall_mps2:
+    if wheels.fall_mps2 > memory.wheels.fall_mps2:
         bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)
     if memory.t_ns >= wheels.trusted_ns:
         wander = wheels.wander.after(memory.t_ns, rim_mps)

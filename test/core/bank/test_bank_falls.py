@@ -151,6 +151,15 @@ def test_a_fall_is_one_beyond_what_brakes_and_noise_explain() -> None:
     assert not rims([40.0 - 0.5 * tick for tick in range(6)]).fell(now_ns + 2 * S)
 
 
+def test_a_fall_is_told_anew_only_as_it_is_deeper_than_all_before() -> None:
+    fallen, later = [40.0 - 0.8 * tick for tick in range(8)], [40.0] * 10
+    deeper = [40.0 - 1.6 * tick for tick in range(8)]
+    first = rims(fallen).fall_mps2
+    assert first == pytest.approx(8.0, rel=0.01)
+    assert rims(fallen + later + fallen).fall_mps2 == first
+    assert rims(fallen + later + deeper).fall_mps2 > 1.3 * first
+
+
 def test_behind_a_fall_a_rim_is_trusted_once_it_rises_no_more() -> None:
     fallen = [40.0 - 0.8 * tick for tick in range(10)]
     rising = [fallen[-1] + 0.5 * tick for tick in range(1, 9)]
