@@ -36,6 +36,10 @@ ROLLING_SHARE, FASTEST_SHARE = 0.02, 0.008
 CREEP = 0.002
 """By how much the fastest rim is slower than the train while it rolls."""
 
+LAGS, HELD = 0.01, 0.12
+"""By how much the fastest rim may creep when axles begin to slide, at least and at most, relative: slide protection may
+hold all of them at some creep, and none shows it. One that is farther behind slides, and comes back."""
+
 SLIDES = 0.2
 """Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new."""
 
@@ -55,15 +59,16 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
         return memory
     pressed = memory.is_pressed(config) or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
-    rim, std = rim_speed(memory.bank)
+    rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         axles = axles.after(rims, sample.t_ns, memory.slowed_mps, runs)
         newest = sample.without(axles.lying(memory.slowed_mps))
         wheels = wheels.after(config, newest, rim, std, pressed)
-    memory = _telling(memory._replace(axles=axles, wheels=wheels))
     rims = wheels.rims(config, newest)
+    wheels = wheels.agreeing(rims, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
+    memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns) if rims else memory
     return _unbraked(config, memory, rims, newest.t_ns, pressed)
@@ -72,10 +77,11 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
 def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pressed: bool) -> Memory:
     """Take in how fast the middle rim is, as some may spin; where it may slide, the train is not slower than that."""
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
-    middle = median(rims) if rims else 0.0
+    bank, middle = as_rolled(memory.bank, memory.wheels.wander.rolled), median(rims) if rims else 0.0
     wheels = memory.wheels.beside(middle, t_ns) if rims else memory.wheels
     memory = memory._replace(
-        wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander())
+        bank=bank,
+        wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander()),
     )
     if middle <= LEARNING_MPS:
         return memory
@@ -100,9 +106,10 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
     if wheels.fall_mps2 > memory.wheels.fall_mps2:
         bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)
     if memory.t_ns >= wheels.trusted_ns:
-        wander = wheels.wander.after(memory.t_ns, rim_mps)
-        errors = wander.errors() if memory.braking.told > 0.0 else Errors()
-        bank = as_fast(_wandering(bank, errors.lasting * TRUSTED_NS / S), rim_mps, errors.quick)
+        wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
+        if memory.braking.told > 0.0:
+            bank, wander, errors = _creeping(bank, wander, rim_mps)
+        bank = as_fast(bank, rim_mps, errors.quick)
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
@@ -113,6 +120,16 @@ def rim_speed(bank: Bank) -> tuple[float, float]:
     slope = np.array([1.0 + mean[RADIUS], mean[SPEED]])
     both = covariance[np.ix_((SPEED, RADIUS), (SPEED, RADIUS))]
     return float(slope[0] * mean[SPEED]), math.sqrt(max(float(slope @ both @ slope), 0.0))
+
+
+def as_rolled(bank: Bank, rolled: tuple[float, float] | None) -> Bank:
+    """Where axles have slid: radii are again what they were, and their variance, before all of them crept."""
+    if rolled is None:
+        return bank
+    mean, covariance = bank.mean.copy(), bank.covariance.copy()
+    covariance[:, RADIUS, :] = covariance[:, :, RADIUS] = 0.0
+    mean[:, RADIUS], covariance[:, RADIUS, RADIUS] = rolled
+    return bank._replace(mean=mean, covariance=covariance)
 
 
 def rolling(bank: Bank, rim_mps: float) -> Bank:
@@ -130,13 +147,19 @@ def not_slower(bank: Bank, rim_mps: float) -> Bank:
     return after._replace(log_weight=bank.log_weight - np.where(slower, 0.5 * squared, 0.0))
 
 
-def _wandering(bank: Bank, variance: float) -> Bank:
-    """Creep of all rims alike has wandered by such a variance: it is as if their radii were others."""
-    if not variance:
-        return bank
-    covariance = bank.covariance.copy()
+def _creeping(bank: Bank, wander: Wander, rim_mps: float) -> tuple[Bank, Wander, Errors]:
+    """Axles slide, so the fastest rim may creep: it is as if all radii were others, by what wanders, and how it errs.
+
+    At first it may creep by all that it is behind.
+    """
+    mean, before = bank.moments()
+    errors, covariance = wander.errors(float(mean[RADIUS])), bank.covariance.copy()
+    variance, behind = errors.lasting * TRUSTED_NS / S, 1.0 - rim_mps / max(rim_speed(bank)[0], rim_mps)
+    if wander.rolled is None and behind < HELD:
+        wander = wander._replace(rolled=(float(mean[RADIUS]), float(before[RADIUS, RADIUS])))
+        variance = LAGS**2 + behind**2
     covariance[:, RADIUS, RADIUS] += variance
-    return bank._replace(covariance=covariance)
+    return bank._replace(covariance=covariance), wander, errors
 
 
 def as_fast(bank: Bank, rim_mps: float, rolls: float = ROLLS) -> Bank:

@@ -32,6 +32,9 @@ LASTING = 2.0
 """Variance over 1 s by which creep wanders, over the covariance of successive errors. Protection that holds all axles
 at a few per cent of creep shows 1e-5, where axles recover there is hardly any."""
 
+SWAY = 0.1
+"""By how much of itself the creep of all rims alike wanders within 1 s, at least."""
+
 
 class Errors(NamedTuple):
     """Of the fastest rim's speed, relative."""
@@ -47,26 +50,29 @@ class Wander(NamedTuple):
 
     taken: tuple[tuple[int, float], ...] = ()
     """Stamps, ns, and speeds."""
+    rolled: tuple[float, float] | None = None
+    """Radius of all, beside the expected one, and its variance when axles began to slide in this braking."""
 
     def after(self, t_ns: int, rim_mps: float) -> Wander:
         """Note the next one."""
-        return Wander((*(each for each in self.taken if t_ns - each[0] <= SPAN_NS), (t_ns, rim_mps)))
+        return self._replace(taken=(*(each for each in self.taken if t_ns - each[0] <= SPAN_NS), (t_ns, rim_mps)))
 
-    def errors(self) -> Errors:
-        """What they show by now.
+    def errors(self, radius: float = 0.0) -> Errors:
+        """What they show by now, while all rims are as if their radius were so.
 
         >>> steady = Wander(tuple((index * S // 2, 40.0 - 0.3 * index) for index in range(20)))
         >>> steady.errors().quick
         0.003
         """
+        least = Errors(lasting=(SWAY * max(self.rolled[0] - radius, 0.0)) ** 2 if self.rolled else 0.0)
         if len(self.taken) < SAMPLES:
-            return Errors()
+            return least
         stamps, speeds = np.array(self.taken).T
         powers = np.vander((stamps - stamps[0]) / SPAN_NS, 3)
         relative = speeds / speeds.mean()
         off = relative - powers @ np.linalg.lstsq(powers, relative, rcond=None)[0]
         if np.abs(off).max() > FAR:
-            return Errors()
+            return least
         lasting = max(float(off[1:] @ off[:-1]) / (off.size - 1), 0.0)
         quick = QUICK * max(float(off @ off) / off.size - lasting, 0.0)
-        return Errors(min(max(quick**0.5, LEAST), ROLLS), LASTING * lasting)
+        return Errors(min(max(quick**0.5, LEAST), ROLLS), max(LASTING * lasting, least.lasting))

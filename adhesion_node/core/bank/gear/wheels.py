@@ -52,6 +52,9 @@ FALL_NS, FALL_SIGMA, FELL_NS, UNTOLD_NS = 2 * S // 5, 2.5, S, 120 * S
 train, by so many standard deviations of its noise, all axles slide. They count so for the next time; where no pressure
 tells of a brake, for the last one."""
 
+AGREE_NS, FEWEST = 2 * S, 3
+"""Rims, so many or more, that are as fast as each other and as the train for so long roll: those that slide are not."""
+
 DEEPER = 1.3
 """Times as fast as ever in a braking it must fall to tell anything anew: else it errs as it did before."""
 
@@ -89,6 +92,8 @@ class WheelsSeen(NamedTuple):
     """... when it last fell faster than a train can, ..."""
     fall_mps2: float = 0.0
     """... and how fast at most in this braking, to within `DEEPER`."""
+    agree_ns: int | None = None
+    """Since when all of them are as fast as each other, and as the train."""
 
     def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
         """Take in the speeds of all axles while that of one which rolls is known so.
@@ -161,6 +166,13 @@ class WheelsSeen(NamedTuple):
     def fell(self, now_ns: int, within_ns: int = FELL_NS) -> bool:
         """Whether all axles slide, as the fastest rim has fallen faster than a train can."""
         return self.fell_ns is not None and now_ns - self.fell_ns < within_ns
+
+    def agreeing(self, rims: list[float], least_mps: float, t_ns: int) -> WheelsSeen:
+        """Note whether all rims are as fast as each other, and as one that rolls is at least: then no fall counts."""
+        if len(rims) < FEWEST or min(rims) < max((1.0 - UNEQUAL) * max(rims), least_mps):
+            return self._replace(agree_ns=None)
+        since_ns = t_ns if self.agree_ns is None else self.agree_ns
+        return self._replace(agree_ns=since_ns, fell_ns=self.fell_ns if t_ns - since_ns < AGREE_NS else None)
 
     def share(self, now_ns: int) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
