@@ -21,6 +21,7 @@ from .config import Config
 from .estimate import Estimate
 from .following import follow, last_estimate
 from .intake import inbox as gate
+from .intake.clock import Read
 from .intake.outcome import Event, Outcome
 from .intake.pairing import Gate, Inbox, Matched, Source, Tick
 from .intake.samples import (
@@ -82,19 +83,24 @@ def advance(config: Config, state: State, sample: Sample) -> tuple[State, tuple[
     state = state._replace(events=()) if state.events else state
     if not sample.is_valid():
         return state.told(Event(Outcome.INVALID, repr(sample))), ()
+    if isinstance(sample, PositionSample):
+        return _read(config, state, state.clock.read(sample))
     return _passed(config, state, gate.push(state.gate, state.inbox, sample))
 
 
 def settle(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """Silence: what waits for others of its time waits no longer."""
-    return _passed(config, state._replace(events=()), gate.settle(state.gate, state.inbox))
+    state, estimates = _read(config, state._replace(events=()), state.clock.settled())
+    state, others = _passed(config, state, gate.settle(state.gate, state.inbox))
+    return state, estimates + others
 
 
 def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """End of the data: take what still waits and evaluate the last, short window (step 5 of the paper)."""
-    state, estimates = _passed(config, state._replace(events=()), gate.drain(state.gate, state.inbox))
+    state, doubted = _read(config, state._replace(events=()), state.clock.settled())
+    state, estimates = _passed(config, state, gate.drain(state.gate, state.inbox))
     state, last = last_estimate(config, state)
-    return state, estimates + last
+    return state, doubted + estimates + last
 
 
 def warm_up(config: Config) -> None:
@@ -123,6 +129,15 @@ def paired(config: Config, samples: Iterable[Sample]) -> Iterator[Measurement]:
             yield _measurement(config, matched)
     for matched in gate.drain(by, inbox).matched:
         yield _measurement(config, matched)
+
+
+def _read(config: Config, state: State, read: Read) -> tuple[State, tuple[Estimate, ...]]:
+    """Use the positions whose stamps are believed."""
+    state, estimates = state._replace(clock=read.clock).told(*read.events), tuple[Estimate, ...]()
+    for sample in read.samples:
+        state, made = _passed(config, state, gate.push(state.gate, state.inbox, sample))
+        estimates += made
+    return state, estimates
 
 
 def _passed(config: Config, state: State, pushed: gate.Pushed) -> tuple[State, tuple[Estimate, ...]]:

@@ -20,6 +20,7 @@ from .bank.proving import Proving
 from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge
+from .intake.clock import Clock
 from .intake.outcome import NO_COUNTS, Event, Outcome, counted
 from .intake.pairing import Gate, Inbox
 from .intake.plausibility import Pace, Repeated
@@ -65,6 +66,8 @@ class State(NamedTuple):
     """What the sample that came last brought about, other than that samples were accepted."""
     inbox: Inbox = Inbox()
     """Samples that wait."""
+    clock: Clock = Clock()
+    """The receiver's."""
     newest: Measurement | None = None
     """The newest measurement that was accepted."""
     belief: Gaussian | None = None

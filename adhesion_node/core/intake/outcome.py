@@ -39,6 +39,7 @@ class Outcome(Enum):
     REPEATED = "a second sample of another sensor with the same stamp: dropped"
     OVERTAKEN = "came when all of its time had been used: dropped; is its clock right? Else raise pressure_wait_s"
     STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
+    SHIFTED = "against the rhythm of the positions and the way of the train: put back; check the receiver's clock"
     TOO_OFTEN = "publish at most 200 messages a second: no more are used"
     INVALID = "not finite, no positive variance or physically impossible: dropped"
     STUCK = (
@@ -66,7 +67,7 @@ class Outcome(Enum):
     RESET = "stamp or position jumped: the estimation starts anew"
 
 
-DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "TICK", "CHANGED", "RESET"))
+DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "TICK", "SHIFTED", "CHANGED", "RESET"))
 """Outcomes of a sample that is not used."""
 
 QUIET = ("ACCEPTED", "TICK", "REPEATED", "HELD", "OUTLIER", "SLOW", "IDLE", "CHANGED")
