@@ -114,7 +114,7 @@ def followed(
     for until_ns in steps(before_ns, measurement.t_ns, speeds):
         ahead = predicted.bank if predicted is not None and until_ns == measurement.t_ns else None
         bank = memory.bank_at(config, until_ns) if ahead is None or memory is not start else ahead
-        since_ns, before_ns, braking = before_ns, until_ns, memory.braking
+        since_ns, before_ns, before = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
         share = memory.wheels.share(until_ns)
         brake = memory.brake.after(config, now, demand_pa, None if share is None else share < BRAKE_BELOW)
@@ -128,6 +128,7 @@ def followed(
         )
         if imu:
             felt = [each for each in imu if since_ns < each.t_ns <= until_ns]
+            braking = memory.braking._replace(applied=0.5 * (before.applied + memory.braking.applied))
             memory = _felt(config, memory, felt, braking, (until_ns - since_ns) / S) if felt else memory
         for speed in speeds:
             if since_ns < speed.t_ns <= until_ns and not (config.speed_source == "axle" and _may_slide(memory)):
@@ -201,4 +202,7 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> B
     share = memory.wheels.share(now_ns)
     applied = config.train.specific_brake(brake.applied_pa)
     sliding = share if share is not None and share >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
-    return Braking(applied, sliding, brake.rising, told(share, brake.has_slid(now_ns), memory.wheels.fell(now_ns)))
+    fills = config.pressure_kind == "demanded" and brake.applied_pa < brake.demanded_pa
+    filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
+    slid = told(share, brake.has_slid(now_ns), memory.wheels.fell(now_ns))
+    return Braking(applied, sliding, brake.rising, slid, filling)

@@ -35,9 +35,10 @@ from .layout import BRAKE, POSITION, SPEED, Bank, Mask
 if TYPE_CHECKING:
     from ..config import Config
 
-BUILDING_UP = 0.3
-"""Error of the brake's force while it is applied harder, relative: of the speed over 1 s, and as an accelerometer feels
-it."""
+BUILDING_UP, FILLING = 0.3, 0.2
+"""Error of the brake's force, relative. While it is applied harder: of the speed over 1 s, and as an accelerometer
+feels it. While cylinders fill, over what they will press with, as how they fill nobody tells: of the speed over 1 s; an
+accelerometer feels it by the first, as it lasts."""
 
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""
@@ -57,6 +58,8 @@ class Braking(NamedTuple):
     """Whether the brake is being applied harder."""
     told: float = 0.0
     """Log odds per second by which axles are known to slide, or below 0 to roll."""
+    filling: float = 0.0
+    """B/(M g) that they will press with once they have filled; 0: they have, or it is measured."""
 
 
 class Use(NamedTuple):
@@ -155,6 +158,7 @@ def model_of(config: Config) -> moving.Model:
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),
         building_up=BUILDING_UP,
+        filling=FILLING,
     )
 
 

@@ -82,8 +82,10 @@ def acceleration_seen(
     slope = -used.slope * pitched[:, None]
     slope[:, PITCH] += felt
     slope[:, BIAS] = 1.0
+    filling = np.where(used.slope[:, BRAKE] > 0.0, BUILDING_UP * bank.mean[:, BRAKE] * braking.filling, 0.0)
     innovation = acceleration_mps2 / GRAVITY - felt * pitched - bank.mean[:, BIAS]
-    return Observation(innovation, slope, variance / GRAVITY**2 + STEADY_ERROR**2 + (error * used.value) ** 2)
+    unsteady = STEADY_ERROR**2 + np.square(error * used.value) + np.square(filling)
+    return Observation(innovation, slope, variance / GRAVITY**2 + unsteady)
 
 
 def corrected(bank: Bank, seen: Observation) -> Bank:

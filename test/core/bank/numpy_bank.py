@@ -73,6 +73,8 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     lasting, noise = _lasting(config, bank, slower, dt_s, declared_m)
     if braking.rising:
         noise[:, SPEED] += np.square(motion.BUILDING_UP * GRAVITY * used.value) * dt_s
+    held = used.slope[:, BRAKE] > 0.0
+    noise[:, SPEED] += np.square(motion.FILLING * GRAVITY * held * mean[:, BRAKE] * braking.filling) * dt_s
     means = mean * lasting
     means[:, SPEED] = slower
     means[:, POSITION] = mean[:, POSITION] + 0.5 * dt_s * (speed + slower)

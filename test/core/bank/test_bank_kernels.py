@@ -38,7 +38,10 @@ KIND, LAW, NOISE = ([label[part] for label in LABELS] for part in range(3))
 BANK = bank_of(KIND, LAW, NOISE, spread=1.0)
 TRACK = Track((Grade(0.0, 499.0, 5.0), Tunnel(499.5, 900.0), Grade(500.5, 2000.0, -8.0)))
 CONFIGS = [Config(), Config(train=replace(CRH3, rotating_mass_fraction=0.08), track=TRACK)]
-BRAKINGS = [Braking(FULL), Braking(0.4 * FULL, 0.6, True, 0.0), Braking(0.5 * FULL, 1.0, False, 4.0), Braking(0.0)]
+BRAKINGS = [
+    *(Braking(FULL), Braking(0.4 * FULL, 0.6, True, 0.0), Braking(0.5 * FULL, 1.0, False, 4.0), Braking(0.0)),
+    Braking(0.2 * FULL, filling=FULL),
+]
 MODULES = [import_module(f"{kernels.__name__}.{each.name}") for each in iter_modules(kernels.__path__)]
 
 

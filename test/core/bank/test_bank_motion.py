@@ -168,6 +168,15 @@ def test_a_brake_that_is_being_applied_is_known_worse() -> None:
     assert np.all(more == 0.0)
 
 
+def test_how_cylinders_fill_nobody_tells_where_the_brake_limits() -> None:
+    """The force that builds up may be off by a fifth of what it will be; where the rail limits, that does not count."""
+    bank = bank_of([1, 2], spread=0.0).with_fresh(MU, 0.02, 0.0)
+    config, full, fills = config_of(0.0), Braking(0.3 * FULL), Braking(0.3 * FULL, filling=FULL)
+    more = moved(config, bank, 0.1, fills, 1.0).covariance - moved(config, bank, 0.1, full, 1.0).covariance
+    assert more[0, SPEED, SPEED] == pytest.approx((0.2 * 9.8 * 1.03 * FULL) ** 2 * 0.1, rel=1e-4)
+    assert np.all(more[1] == 0.0)
+
+
 @pytest.mark.parametrize("braking", BRAKINGS)
 def test_the_spread_of_what_is_used_is_that_of_a_sample(braking: Braking) -> None:
     bank = bank_of([0, 1, 2], spread=0.0)

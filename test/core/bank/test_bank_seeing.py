@@ -81,9 +81,9 @@ def test_a_speed_with_its_scale() -> None:
 
 
 @pytest.mark.parametrize("share", [1.0, 0.5])
-@pytest.mark.parametrize("rising", [False, True])
-def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool) -> None:
-    braking, measured, variance = Braking(FULL, share, rising), -0.8, 0.05**2
+@pytest.mark.parametrize(("rising", "filling"), [(False, 0.0), (True, 0.0), (False, 1.2 * FULL)])
+def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool, filling: float) -> None:
+    braking, measured, variance = Braking(FULL, share, rising, filling=filling), -0.8, 0.05**2
 
     def felt(x: Array, index: int, resisting: float) -> tuple[float, float]:
         held = x[BRAKE] * FULL
@@ -97,7 +97,8 @@ def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool) -> Non
         foreseen, used = felt(x, index, resisting)
         step = 1e-6 * np.eye(SIZE)
         h = np.array([(felt(x + d, index, resisting)[0] - felt(x - d, index, resisting)[0]) / 2e-6 for d in step])
-        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 1.9 * 0.025) * used) ** 2
+        filled = 0.3 * x[BRAKE] * filling if abs(h[BRAKE]) > 1e-9 else 0.0
+        r = variance / 9.8**2 + 0.002**2 + ((0.3 if rising else 1.9 * 0.025) * used) ** 2 + filled**2
         rows.append((h, measured / 9.8 - foreseen, r))
     check(BANK, acceleration_seen(CONFIG, BANK, measured, variance, braking), rows)
 

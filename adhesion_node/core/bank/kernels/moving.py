@@ -24,9 +24,9 @@ Mask = NDArray[np.bool_]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 """A bank as a plain tuple, as the next two are: one with names takes numba 20 times as long to look at."""
 ModelNumbers = tuple[
-    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, float, float, float
+    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, float, float, float, float
 ]
-StepNumbers = tuple[float, float, float, bool, float, float]
+StepNumbers = tuple[float, float, float, bool, float, float, float]
 
 GRAVITY = 9.8
 LEAST_MU = 0.03
@@ -63,6 +63,7 @@ class Model(NamedTuple):
     grade_error: float
     resistance_error: float
     building_up: float
+    filling: float
 
 
 class Step(NamedTuple):
@@ -73,6 +74,7 @@ class Step(NamedTuple):
     share: float
     rising: bool
     told: float
+    filling: float
     declared_m: float
 
 
@@ -157,9 +159,9 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
             added[MU] = (model.kinds[k, 1] * max(x[MU], LEAST_MU)) ** 2 * dt
         lasting[ROUGH] = math.exp(-way_m * model.fading[k, 0] - dt * model.fading[k, 1])
         lasting[GRADE], lasting[OFFSET] = math.exp(-way_m / model.grade_m), math.exp(-dt / n[4])
-        added[SPEED] = model.kinds[k, 3] ** 2 * dt
-        if step.rising:
-            added[SPEED] += (model.building_up * GRAVITY * u) ** 2 * dt
+        rising = model.building_up * GRAVITY * u if step.rising else 0.0
+        filling = model.filling * GRAVITY * x[BRAKE] * step.filling if by_brake > 0.0 else 0.0
+        added[SPEED] = (model.kinds[k, 3] ** 2 + rising**2 + filling**2) * dt
         added[ROUGH] = model.kinds[k, 2] ** 2 * (1.0 - lasting[ROUGH] ** 2)
         left = model.grade_error**2 + (model.resistance_error * basic) ** 2
         added[GRADE] = left * (1.0 - lasting[GRADE] ** 2)
