@@ -85,14 +85,13 @@ def advance(config: Config, state: State, sample: Sample) -> tuple[State, tuple[
         return state.told(Event(Outcome.INVALID, repr(sample))), ()
     if isinstance(sample, PositionSample):
         return _read(config, state, state.clock.read(sample))
+    state = state._replace(clock=state.clock.beside(sample))
     return _passed(config, state, gate.push(state.gate, state.inbox, sample))
 
 
 def settle(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:
     """Silence: what waits for others of its time waits no longer."""
-    state, estimates = _read(config, state._replace(events=()), state.clock.settled())
-    state, others = _passed(config, state, gate.settle(state.gate, state.inbox))
-    return state, estimates + others
+    return _passed(config, state._replace(events=()), gate.settle(state.gate, state.inbox))
 
 
 def finish(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:

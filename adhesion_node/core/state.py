@@ -121,6 +121,6 @@ class State(NamedTuple):
         return self._replace(counts=counted(self.counts, *events), events=self.events + events)
 
     def forgotten(self) -> State:
-        """All but the counts, what still waits, and the number of windows, which keeps the random streams apart."""
+        """All but counts, clock, what still waits, and the number of windows, which keeps the random streams apart."""
         knowledge = Knowledge(windows=self.knowledge.windows)
-        return State(*self[:6], knowledge=knowledge)
+        return State(*self[:7], knowledge=knowledge)

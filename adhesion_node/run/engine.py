@@ -12,7 +12,7 @@ import hashlib
 from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Callable, Mapping
-from typing import Any, Generic, NamedTuple, Protocol, Self, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 from ..core import Event, Outcome, Sample
 from ..core.intake.outcome import DROPS
@@ -88,7 +88,7 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
         self.state = self._verbs.init()
         return outputs
 
-    def adopt(self, other: Self) -> None:
+    def adopt(self, other: "EstimatorPipeline[S, E, Output]") -> None:
         """Go on with what another one is configured with; what is known stays."""
         self._verbs, self.config = other._verbs, other.config
 

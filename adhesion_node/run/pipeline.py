@@ -64,6 +64,11 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         """Whether what the newest estimate says of the train's direction was measured, not only foreseen."""
         self._ran_m = (math.inf, -math.inf)
 
+    def adopt(self, other: EstimatorPipeline[State, Estimate, Prediction]) -> None:
+        """Go on with what another one is configured with; a latency may be another, and stamps step as is meant."""
+        super().adopt(other)
+        self.state = self.state._replace(clock=self.state.clock.unsure())
+
     def _output(self, estimate: Estimate) -> Prediction:
         self.windows += estimate.window > 0
         self._note_way(estimate)

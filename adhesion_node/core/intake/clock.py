@@ -6,19 +6,22 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The clock of a receiver: where its stamps step against the motion of the train they are put back.
+"""The clock of a receiver: where its stamps step away from those of the other sensors they are put back.
 
 There are receivers whose stamps are off by a second for minutes. A train then seems to jump, and under the brake its
 speed is told of another moment. That it is the clock which has stepped shows: the stamps leave their rhythm, but the
 train has run no farther than in one period. Such samples are set aside until three agree: a driver that stalls, and
-then sends all that has come together, has no rhythm. The positions alone decide, in the order of their coming.
+then sends all that has come together, has no rhythm. Which time is right the stamps of the other sensors tell: nothing
+is put back but towards them, and no longer than it serves that. Samples decide in the order of their coming.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
-from statistics import median
-from typing import NamedTuple
+from statistics import median, median_low
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from .outcome import Event, Outcome
 from .samples import PositionSample
@@ -29,7 +32,10 @@ LEAST_NS, MOST_NS = 3 * S // 10, 3 * S
 """Stamps that step by less are jittered; beyond the other, once or in all, they are those of another time."""
 
 RHYTHM, AGREEING = 8, 3
-"""Samples that show period and speed, and such as must agree that the stamps have stepped."""
+"""Samples that show period and speed, or that stamps are right again; and such as must agree that they have stepped."""
+
+ALIVE = 30
+"""Another sensor tells the time until so many positions have come since it was heard."""
 
 UNEVEN = 0.5
 """Part of the period by which samples may come early or late."""
@@ -52,34 +58,62 @@ class Clock(NamedTuple):
     """How the stamps of the positions run. Immutable."""
 
     ahead_ns: int = 0
-    """By how much they are ahead of what they were in the beginning."""
+    """By how much they are ahead."""
     recent: tuple[PositionSample, ...] = ()
     """The last ones, with stamps put right, in the order of their coming."""
     doubted: tuple[PositionSample, ...] = ()
     """Those set aside behind them."""
+    others: Mapping[type[Any], tuple[int, int]] = MappingProxyType({})
+    """Stamp of the last sample of each other sensor, ns, and how many of these had come before it."""
+    come: int = 0
+    """How many of these have come."""
+    right: int = 0
+    """Samples in a row whose stamps were right, those put back not."""
+
+    def beside(self, sample: Any) -> Clock:
+        """Note a sample of another sensor."""
+        return self._replace(others=MappingProxyType({**self.others, type(sample): (sample.t_ns, self.come)}))
 
     def read(self, sample: PositionSample) -> Read:
         """Take the next one."""
-        clock = self._replace(doubted=(*self.doubted, sample))
-        step_ns = clock.step_ns()
-        if step_ns and len(clock.doubted) < AGREEING:
+        right = self.right + 1 if self.ahead_ns and self._agrees(sample.t_ns, 0, self.ahead_ns) else 0
+        clock = self._replace(doubted=(*self.doubted, sample), come=self.come + 1, right=right)
+        step_ns = -self.ahead_ns if right == RHYTHM else clock._step_ns()
+        if step_ns and right < RHYTHM and len(clock.doubted) < AGREEING:
             return Read(clock, ())
-        read = clock._replace(ahead_ns=self.ahead_ns + step_ns).settled()
-        if not step_ns:
-            return read
+        if not (step_ns and self._agrees(sample.t_ns, self.ahead_ns + step_ns, self.ahead_ns)):
+            return clock.settled()
+        read = clock._replace(ahead_ns=self.ahead_ns + step_ns, right=0).settled()
         said = f"stamp of the position went on by {step_ns / S:+.3g} s, now {read.clock.ahead_ns / S:+.3g} s"
         return read._replace(events=(Event(Outcome.SHIFTED, said),))
 
     def settled(self) -> Read:
         """Nothing is set aside any more."""
         samples = tuple(each._replace(t_ns=each.t_ns - self.ahead_ns) for each in self.doubted)
-        return Read(Clock(self.ahead_ns, (*self.recent, *samples)[-RHYTHM:]), samples)
+        return Read(self._replace(recent=(*self.recent, *samples)[-RHYTHM:], doubted=()), samples)
 
-    def step_ns(self) -> int:
+    def unsure(self) -> Clock:
+        """A step of what comes next is meant."""
+        return self._replace(recent=())
+
+    def _agrees(self, t_ns: int, ahead_ns: int, other_ns: int) -> bool:
+        """Whether a stamp agrees with the other sensors' plainly better if it is ahead by the one than by the other."""
+        period_ns = round(median(self._intervals() or (0,)))
+        ages = ((t_ns, self.come - before) for t_ns, before in self.others.values())
+        now_ns = [t_ns + age * period_ns for t_ns, age in ages if age <= ALIVE]
+        if not now_ns:
+            return False
+        right_ns = median_low(now_ns)
+        return abs(t_ns - ahead_ns - right_ns) + LEAST_NS // 2 < abs(t_ns - other_ns - right_ns)
+
+    def _intervals(self) -> list[int]:
+        return [later.t_ns - earlier.t_ns for earlier, later in pairwise(self.recent)]
+
+    def _step_ns(self) -> int:
         """By how much the stamps have stepped before those that are set aside; 0: not, or they do not agree."""
         if len(self.recent) < RHYTHM:
             return 0
-        intervals = [later.t_ns - earlier.t_ns for earlier, later in pairwise(self.recent)]
+        intervals = self._intervals()
         period_ns, first, before = round(median(intervals)), self.doubted[0], self.recent[-1]
         near_ns = UNEVEN * period_ns
         if not all(interval > 0 and abs(interval - period_ns) <= near_ns for interval in intervals):

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from oracles import ride
 
-from adhesion_node.core import Config, Outcome, PositionSample, PressureSample
+from adhesion_node.core import Config, Outcome, PositionSample, PressureSample, SpeedSample
 from adhesion_node.core.intake.clock import Clock
 from adhesion_node.core.prediction import Prediction
 from adhesion_node.run.pipeline import Pipeline
@@ -46,10 +46,14 @@ def stepped(samples: Iterable[PositionSample], by_s: float, first: int, last: in
     ]
 
 
-def read(samples: Iterable[PositionSample]) -> tuple[list[PositionSample], int]:
-    """What is let through, and how many steps were told."""
+def read(
+    samples: Sequence[PositionSample], now: Sequence[PositionSample] | None = None, every: int = 1, phase: int = 0
+) -> tuple[list[PositionSample], int]:
+    """What is let through, and how many steps were told; two other sensors are heard at every n-th time of `now`."""
     clock, through, told = Clock(), list[PositionSample](), 0
-    for sample in samples:
+    for index, (sample, true) in enumerate(zip(samples, now or samples, strict=True)):
+        if index % every == phase:
+            clock = clock.beside(PressureSample(true.t_ns - S // 50, 0.0)).beside(SpeedSample(true.t_ns, 1.0))
         clock, used, events = clock.read(sample)
         through += used
         told += len(events)
@@ -64,7 +68,7 @@ def largest_off_s(found: Sequence[PositionSample], true: Sequence[PositionSample
 @pytest.mark.parametrize(("rate_hz", "jitter", "noise_m"), [(10.0, 0.0, 0.5), (10.0, 0.2, 2.0), (4.0, 0.1, 1.0)])
 def test_stamps_that_step_and_return_are_put_back(by_s: float, rate_hz: float, jitter: float, noise_m: float) -> None:
     true = run(400, rate_hz, jitter=jitter, noise_m=noise_m)
-    found, told = read(stepped(true, by_s, 100, 260))
+    found, told = read(stepped(true, by_s, 100, 260), true)
     assert [each.position_m for each in found] == [each.position_m for each in true]
     assert largest_off_s(found, true) <= 2.0 * jitter / rate_hz
     assert told == 2
@@ -73,18 +77,18 @@ def test_stamps_that_step_and_return_are_put_back(by_s: float, rate_hz: float, j
 @pytest.mark.parametrize("by_s", [-1.0, 1.0])
 def test_one_hertz_is_enough(by_s: float) -> None:
     true = run(200, 1.0)
-    assert read(stepped(true, by_s, 60, 120)) == (true, 2)
+    assert read(stepped(true, by_s, 60, 120), true) == (true, 2)
 
 
 def test_a_step_from_one_error_to_the_other_is_one_of_two_seconds() -> None:
     true = run()
-    assert read(stepped(stepped(true, 1.0, 100, 200), -1.0, 200, 300)) == (true, 3)
+    assert read(stepped(stepped(true, 1.0, 100, 200), -1.0, 200, 300), true) == (true, 3)
 
 
 def test_stamps_that_return_while_the_train_stands_are_known_again() -> None:
     moving, standing = run(100), [PositionSample(S + round(k * 0.1 * S), 400.0, 0.25) for k in range(100, 200)]
     true = [*moving[:60], *(each._replace(position_m=40.0 * (each.t_ns / S - 1.0)) for each in moving[60:]), *standing]
-    assert read(stepped(true, 1.0, 40, 150)) == (true, 2)
+    assert read(stepped(true, 1.0, 40, 150), true) == (true, 2)
 
 
 def lost(samples: list[PositionSample]) -> list[PositionSample]:
@@ -131,8 +135,64 @@ def slow(samples: list[PositionSample]) -> list[PositionSample]:
     "odd", [list, lost, held_up, one_ahead, out_of_order, twice, standing_clock, other_time, a_balise, slow]
 )
 def test_what_is_no_step_of_the_clock_is_let_through_as_it_is(odd, rate_hz: float) -> None:  # type: ignore[no-untyped-def]
-    samples = odd(run(400, rate_hz))
-    assert read(samples) == (samples, 0)
+    true = run(400, rate_hz)
+    samples = odd(true)
+    assert read(samples, true if len(true) == len(samples) else samples) == (samples, 0)
+
+
+@pytest.mark.parametrize("by_s", [-1.0, 1.0])
+def test_a_clock_of_all_sensors_is_left_to_the_gate(by_s: float) -> None:
+    """Put back alone, positions would belong to another moment than all else, for good."""
+    samples = stepped(run(), by_s, 100, 300)
+    assert read(samples, samples) == (samples, 0)
+
+
+@pytest.mark.parametrize("by_s", [-1.0, 1.0])
+def test_positions_beside_which_nothing_is_heard_are_left_as_they_are(by_s: float) -> None:
+    clock, through = Clock(), list[PositionSample]()
+    samples = stepped(run(), by_s, 100, 300)
+    for sample in samples:
+        clock, used, _ = clock.read(sample)
+        through += used
+    assert through == samples
+
+
+@pytest.mark.parametrize("phase", range(10))
+@pytest.mark.parametrize("by_s", [-1.0, 1.0])
+def test_sensors_of_one_hertz_tell_which_time_is_right(by_s: float, phase: int) -> None:
+    true = run()
+    found, told = read(stepped(true, by_s, 100, 300), true, every=10, phase=phase)
+    assert largest_off_s(found[:300], true[:300]) == 0.0
+    assert largest_off_s(found[320:], true[320:]) == 0.0
+    assert told == 2
+
+
+@pytest.mark.parametrize("by_s", [-2.0, -1.0, 1.0, 2.0])
+def test_stamps_that_are_set_right_stay_as_they_are(by_s: float) -> None:
+    """Those in the beginning were wrong: what steps is no error."""
+    true = run()
+    samples = stepped(true, by_s, 0, 100)
+    assert read(samples, true) == (samples, 0)
+
+
+@pytest.mark.parametrize("by_s", [-1.0, 1.0])
+def test_where_the_step_was_missed_or_the_return_all_is_soon_right(by_s: float) -> None:
+    true = run()
+    samples = stepped(true, by_s, 100, 200)
+    for gap in (slice(100, 104), slice(200, 204)):
+        left, now = samples.copy(), true.copy()
+        del left[gap], now[gap]
+        found, _ = read(left, now)
+        assert largest_off_s(found[230:], now[230:]) == 0.0
+
+
+def test_a_step_that_is_meant_is_none() -> None:
+    samples, clock, told = stepped(run(), -1.0, 100, 400), Clock(), 0
+    for index, (sample, true) in enumerate(zip(samples, run(), strict=True)):
+        clock = clock.unsure() if index == 100 else clock
+        clock, _, events = clock.beside(PressureSample(true.t_ns, 0.0)).read(sample)
+        told += len(events)
+    assert told == 0
 
 
 def estimates(positions: Iterable[PositionSample], pressures: Sequence[PressureSample]) -> tuple[list[Prediction], int]:
