@@ -40,9 +40,9 @@ ALIVE = 30
 UNEVEN = 0.5
 """Part of the period by which samples may come early or late."""
 
-PLAIN_M, NEAR, NEAR_M = 10.0, 0.4, 2.0
-"""What the train runs in the time of the step, at least, unless the stamps return to what they were; by what part of
-that, or so little, its way may differ from that of one period."""
+NEAR, NEAR_M = 0.4, 2.0
+"""By what part of what the train runs in the time of the step, or by so little, its way may differ from that of one
+period."""
 
 
 class Read(NamedTuple):
@@ -124,8 +124,6 @@ class Clock(NamedTuple):
         period_m = (before.position_m - self.recent[0].position_m) / (RHYTHM - 1)
         way_m = abs(period_m * step_ns / period_ns)
         near_m = max(NEAR * way_m, NEAR_M)
-        if way_m < PLAIN_M and abs(self.ahead_ns + step_ns) > near_ns:
-            return 0
         runs = all(
             abs(each.t_ns - first.t_ns - k * period_ns) <= near_ns
             and abs(each.position_m - before.position_m - (k + 1) * period_m) <= near_m
