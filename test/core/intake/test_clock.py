@@ -10,7 +10,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -135,7 +135,9 @@ def a_balise(samples: list[PositionSample]) -> list[PositionSample]:
 @pytest.mark.parametrize(
     "odd", [list, lost, held_up, one_ahead, out_of_order, twice, standing_clock, other_time, a_balise]
 )
-def test_what_is_no_step_of_the_clock_is_let_through_as_it_is(odd, rate_hz: float) -> None:  # type: ignore[no-untyped-def]
+def test_what_is_no_step_of_the_clock_is_let_through_as_it_is(
+    odd: Callable[[list[PositionSample]], list[PositionSample]], rate_hz: float
+) -> None:
     true = run(400, rate_hz)
     samples = odd(true)
     assert read(samples, true if len(true) == len(samples) else samples) == (samples, 0)
