@@ -13,8 +13,8 @@ import math
 import numpy as np
 
 from .bank import following as bank
+from .bank.blind import misled
 from .bank.findings.verdict import SPEED_ERROR, Findings, found
-from .bank.judging import misled
 from .bank.memory import Memory
 from .bank.steps import Stepping
 from .belief.gaussian import Gaussian

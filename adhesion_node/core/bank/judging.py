@@ -17,16 +17,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..belief.rail import Rail
-from ..intake.samples import MAX_VARIANCE_M2
+from .blind import forwards, led_again, misled
 from .branching import branched, opened, pruned, unlikely_kept
 from .free import closed, mixed
 from .kernels import weighing
 from .labels.kinds import HELD, PASSING, SLIDES
-from .layout import MU, POSITION, ROUGH, SPEED, Bank
-from .memory import Memory, S, steps
+from .layout import ROUGH, SPEED, Bank
+from .memory import Memory, S
 from .motion import Braking, resistance, use
 from .seeing import wheels_seen
-from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -59,7 +58,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     bank, now_s = memory.bank, memory.t_ns / S
     pressed = memory.is_pressed(config)
     if memory.misled:
-        return memory if pressed else _led_again(memory)
+        return memory._replace(bank=forwards(bank)) if pressed else led_again(memory)
     braked, before = pressed and bank.mean_of(SPEED) >= config.slowest_mps, memory.braked
     if braked and not before:
         known = rail()
@@ -86,23 +85,6 @@ def _coasted(memory: Memory) -> Memory:
     if memory.since_s < BRANCH_S - 1e-6:
         return memory
     return memory._replace(bank=mixed(memory.bank, memory.since_s), since_s=0.0)
-
-
-def misled(config: Config, memory: Memory) -> Memory:
-    """The positions were those of a sliding wheel: go back to before, and on without them, whatever the brake does."""
-    t_ns, bank = memory.past[0] if memory.past else (memory.t_ns, memory.bank)
-    half = 0.5 * config.train.specific_brake(memory.brake.demanded_pa)
-    before = memory._replace(bank=closed(bank).with_fresh(MU, half, half), t_ns=t_ns, seen=0, past=())
-    ahead = before
-    for until_ns in steps(t_ns, memory.t_ns):
-        ahead = ahead._replace(bank=ahead.bank_at(config, until_ns), t_ns=until_ns)
-    return ahead._replace(misled=True, since_s=0.0)
-
-
-def _led_again(memory: Memory) -> Memory:
-    """The brake is released, no wheel slides any more: positions count again, wherever they say that the train is."""
-    bank = memory.bank.with_fresh(POSITION, memory.bank.mean[:, POSITION], math.sqrt(MAX_VARIANCE_M2))
-    return memory._replace(bank=bank, misled=False, course=Course())
 
 
 def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:

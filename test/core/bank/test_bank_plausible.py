@@ -152,3 +152,13 @@ def test_errors_by_chance_are_believed(tails: float) -> None:
         errors = rng.standard_normal(places.size) if math.isinf(tails) else rng.standard_t(tails, places.size)
         state, _ = followed(places + 0.5 * errors, 0.5)
         assert state.counts[Outcome.SLIDING] == 0, seed
+
+
+@pytest.mark.parametrize(("stds", "impossible"), [(4.5, False), (5.5, True)])
+def test_what_comes_by_chance_within_hours_is_no_sliding_wheel(stds: float, impossible: bool) -> None:
+    """Positions of 3 s that seem to gain speed by so many standard deviations: four come once in 100 long brakings."""
+    times, bank = np.arange(-30, 1) * H, bank_of([1])
+    gained = plausible.GAIN_MPS2 + stds * plausible._error(*plausible._errors(bank, 2.0), 3.0, times.size)
+    recent = [(round((60.0 + t) * S), 40.0 * t + 0.5 * gained * t * t) for t in times.tolist()]
+    course = plausible.Course(tuple(recent), braked_ns=round(50.0 * S))
+    assert course.is_impossible(CONFIG, bank, 2.0) == impossible

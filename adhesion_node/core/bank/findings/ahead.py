@@ -18,6 +18,7 @@ import numpy as np
 from ...belief.rail import Rail
 from ...physics.train import Array
 from ...setting import once
+from ..blind import STANDS_MPS
 from ..kernels import mixture, weighing
 from ..labels import kinds
 from ..layout import BRAKE, SPEED, Bank
@@ -58,7 +59,7 @@ UNTOLD = 4.0
 """Times its odds sliding since the brake was applied counts for the way ahead while neither wheels nor slide protection
 tell of it: as if it had been as likely as rolling, so that nothing but what is measured since speaks for the brake."""
 
-LOST, LOST_MPS, STANDS_MPS = 1.5, 5.0, 0.1
+LOST, LOST_MPS = 1.5, 5.0
 """A speed is lost where the train may be so many times as fast as told, and by so much; told is the third at least."""
 
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2

@@ -26,7 +26,6 @@ from .ahead import (
     PARTIAL,
     Ahead,
     borne_out,
-    constant,
     counted_on,
     for_the_fastest,
     is_partial,
@@ -68,7 +67,8 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     """Judge the bank; `before` is the rail as it was known, aged to now, `nothing` what is known of any rail."""
     bank = memory.bank
     if memory.misled:
-        return Findings(Regime.COASTING, nothing, constant(nothing.lower), nothing)
+        lower = min(nothing.lower, surely(config, bank))
+        return Findings(Regime.COASTING, nothing, for_the_fastest(config, bank, lower)[0], nothing)
     if not memory.braked and memory.brake.known:
         return Findings(Regime.COASTING, before, unfelt(config, bank, before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
