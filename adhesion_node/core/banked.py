@@ -9,6 +9,7 @@
 """What one measurement does where the bank identifies the adhesion: it joins the belief; estimates come by time."""
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from .bank import following as bank
 from .bank.blind import misled
 from .bank.findings.verdict import SPEED_ERROR, Findings, found
 from .bank.memory import Memory
+from .bank.motion import Foreseen
 from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail
@@ -28,7 +30,8 @@ from .methods.protocol import Fit, Verdict
 from .state import State
 
 LOST_S = 5.0
-"""A wheel that slides loses no more than the way of so many seconds before it is told; further off is another place."""
+"""A wheel that slides loses no more than the way of so many seconds before it is told, and no receiver steps by more;
+further off is another place."""
 
 
 def follow_banked(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
@@ -57,29 +60,45 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
 
     off = bank.off(config, memory, measurement)
     stepping = state.stepping.after(config, memory, measurement, off)
-    size_m = stepping.size_m(off.std_m)
-    if size_m:
+    size_m = stepping.size_m(config, off.std_m)
+    elsewhere = size_m != 0.0 and stepping.is_far(config) and abs(size_m) > LOST_S * state.followed_mps
+    if size_m and not elsewhere:
         memory, stepping = stepping.taken(config, size_m, rail)
         return _accepted(config, state, measurement, memory, stepping)
-    if off.nearest > config.gate_sigma:
+    if elsewhere or off.nearest > config.gate_sigma:
         state = state._replace(stepping=stepping)
-        detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
-        behind = memory.braked and -LOST_S * state.followed_mps < off.metres < 0.0
-        blind = measurement._replace(variance_m2=math.inf)
-        if state.outliers + 1 >= config.max_outliers and behind:
-            # under the brake positions fall behind for good where their wheel slides
-            memory = bank.followed(config, misled(config, memory), blind, rail)
-            return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
-        if state.outliers + 1 >= config.max_outliers:
-            anew = _anew(state, Event(Outcome.RESET, detail))
-            return _accepted(config, anew, measurement, bank.met(config, measurement))
-        state = state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail))
-        return _accepted(config, state, blind, bank.followed(config, memory, blind, rail))
+        elsewhere = elsewhere or (state.outliers + 1 >= config.max_outliers and not stepping.waits(config))
+        return _unbelieved(config, state, memory, measurement, off, elsewhere, rail)
     followed = bank.followed(config, memory, measurement, rail, off)
     if measurement.imu or state.proving.since:
         followed, proving = state.proving.after(config, memory, followed, measurement, rail)
         state = state._replace(proving=proving)
     return _accepted(config, state, measurement, followed, stepping)
+
+
+def _unbelieved(
+    config: Config,
+    state: State,
+    memory: Memory,
+    measurement: Measurement,
+    off: Foreseen,
+    elsewhere: bool,
+    rail: Callable[[], Rail],
+) -> tuple[State, Estimate | None]:
+    """A position far from what was foreseen: one by chance, or the train is elsewhere, or its wheel slides.
+
+    Under the brake positions fall behind for good where their wheel does.
+    """
+    detail = f"position x = {measurement.position_m:.12g}, innovation {off.nearest:.3g} standard deviations"
+    blind = measurement._replace(variance_m2=math.inf)
+    if not elsewhere:
+        state = state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail))
+        return _accepted(config, state, blind, bank.followed(config, memory, blind, rail))
+    if memory.braked and -LOST_S * state.followed_mps < off.metres < 0.0:
+        memory = bank.followed(config, misled(config, memory), blind, rail)
+        return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
+    anew = _anew(state, Event(Outcome.RESET, detail))
+    return _accepted(config, anew, measurement, bank.met(config, measurement))
 
 
 def _anew(state: State, event: Event) -> State:

@@ -86,6 +86,47 @@ def test_a_step_of_the_positions_moves_neither_mu_nor_speed(size_m: float, at_s:
         assert abs(e.position_m - size_m - without.position_m) < 1.0
 
 
+@pytest.mark.parametrize("period_s", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize("size_m", [-150.0, -60.0, 40.0, 200.0])
+def test_a_receiver_that_is_elsewhere_for_good_moves_neither_mu_nor_speed(size_m: float, period_s: float) -> None:
+    """At 14 s, 6 s behind the brake: known after 2 s. A position taken in later would be off by as much."""
+    phases: list[tuple[float, float | None]] = [(8.0, 0.0), (40.0, 410e3)]
+    measurements = ride(phases, seed=3, period_s=period_s)
+    every = {e.t_ns: e for e in drive(replace(BANK, estimate_s=0.0), measurements)[1]}
+    state, estimates = drive(BANK, stepped(measurements, 14.0, size_m))
+    assert state.counts[Outcome.OUTLIER] <= 2.0 / period_s
+    assert state.counts[Outcome.RESET] == state.counts[Outcome.SLIDING] == 0
+    for e in (each for each in estimates if each.t_ns >= 14 * S):
+        without = every[e.t_ns]
+        assert abs(e.mu - without.mu) < 3.0 * max(without.mu_std, e.mu_std)
+        assert abs(e.speed_mps - without.speed_mps) < 3.0 * math.hypot(without.speed_std_mps, e.speed_std_mps)
+        assert e.t_ns < 16.2 * S or abs(e.position_m - size_m - without.position_m) < 3.0
+
+
+@pytest.mark.parametrize("paused_s", [2.0, 4.5])
+@pytest.mark.parametrize("seed", range(3))
+def test_behind_a_clock_that_stood_the_train_is_slower(seed: int, paused_s: float) -> None:
+    """At 14 s under the full brake: the positions seem to have stepped, and the speed with them."""
+    phases: list[tuple[float, float | None]] = [(8.0, 0.0), (50.0, 410e3)]
+    measurements, first, paused_ns = ride(phases, 0.2, seed=seed), 140, round(paused_s * S)
+    every = {e.t_ns: e for e in drive(replace(BANK, estimate_s=0.0), measurements)[1]}
+    behind = [m._replace(t_ns=m.t_ns - paused_ns) for m in measurements[first + round(10.0 * paused_s) :]]
+    state, estimates = drive(BANK, measurements[:first] + behind)
+    assert state.counts[Outcome.RESET] == state.counts[Outcome.SLIDING] == 0
+    for e in (each for each in estimates if 16.2 * S < each.t_ns < 50 * S):
+        without = every[e.t_ns + paused_ns]
+        assert abs(e.speed_mps - without.speed_mps) < 3.0 * math.hypot(without.speed_std_mps, e.speed_std_mps)
+
+
+def test_positions_farther_off_than_any_receiver_steps_are_another_place() -> None:
+    """Once a second, 5 s of way and more behind: met anew after 2 s."""
+    measurements = ride([(8.0, 0.0), (20.0, 410e3)], seed=3, period_s=1.0)
+    state, estimates = drive(BANK, stepped(measurements, 14.0, -600.0))
+    assert state.counts[Outcome.RESET] == 1
+    assert all(e.mu_lower <= 0.0726 for e in estimates)
+    assert min(e.mu_std for e in estimates if 16 * S < e.t_ns <= 17 * S) > 0.02
+
+
 def test_positions_that_are_not_believed_silence_nothing() -> None:
     """2 s of stamps that are a second late, too short to be believed: followed without them, less sure."""
     measurements = ride([(40.0, 0.0)], seed=1)

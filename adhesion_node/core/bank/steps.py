@@ -17,13 +17,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..belief.rail import Rail
 from ..intake.samples import Measurement
 from .following import followed
-from .layout import POSITION
+from .layout import POSITION, SPEED
 from .memory import Memory
 from .motion import Foreseen
 from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
+
+S = 1_000_000_000
 
 AGREEING = 3
 """Positions in a row that must lie off alike."""
@@ -37,8 +39,9 @@ ABRUPT = 0.6
 BACK = 0.3
 """A step takes the one before back if it is as large to within this share: what reflects a signal passes by."""
 
-LARGEST = 4.0
-"""Size of a step over `position_step_std_m` at most."""
+NEAR, FAR_NS = 4.0, 2 * S
+"""Size of a step over `position_step_std_m` up to which so many positions are enough. Beyond, all of so long must lie
+off alike, to within that size: bursts of outliers are shorter."""
 
 
 class Stepping(NamedTuple):
@@ -60,8 +63,9 @@ class Stepping(NamedTuple):
         if not measurement.has_position:
             return self._replace(since=(*self.since, measurement)) if self.before is not None else self
         alike_m = ALIKE_SIGMA * math.sqrt(measurement.variance_m2)
-        first_m = self.off_m[0] if len(self.off_m) < AGREEING and self.off_m else 0.0
-        if abs(off.metres - first_m) < min(alike_m, abs(first_m)):  # never by a first one of 0: there is none
+        first_m = self.off_m[0] if self.waits(config) else 0.0
+        within_m = NEAR * config.position_step_std_m if self.is_far(config) else min(alike_m, abs(first_m))
+        if abs(off.metres - first_m) < within_m:  # never by a first one of 0: there is none
             return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
         calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m, by_m=self.by_m)
         if not abs(off.metres) > FIRST_SIGMA * off.std_m:
@@ -69,24 +73,42 @@ class Stepping(NamedTuple):
         spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
         back = abs(off.metres + self.by_m) < max(alike_m, BACK * abs(self.by_m))
         abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
-        near = abs(off.metres) <= LARGEST * config.position_step_std_m
-        if (spaced or back) and abrupt and near:
+        if (spaced or back) and abrupt:
             return calm._replace(before=memory, since=(measurement,), off_m=(off.metres,))
         return calm
 
-    def size_m(self, std_m: float) -> float:
+    def is_far(self, config: Config) -> bool:
+        """Whether it is more than a balise corrects."""
+        return bool(self.off_m) and abs(self.off_m[0]) > NEAR * config.position_step_std_m
+
+    def waits(self, config: Config) -> bool:
+        """Whether more positions have to say that they have stepped."""
+        if len(self.off_m) < AGREEING:
+            return bool(self.off_m)
+        return self.is_far(config) and self._lasts_ns < FAR_NS
+
+    @property
+    def _lasts_ns(self) -> int:
+        return max(each.t_ns for each in self.since if each.has_position) - self.since[0].t_ns
+
+    def size_m(self, config: Config, std_m: float) -> float:
         """Size of the step; 0 unless it is plain."""
-        if len(self.off_m) != AGREEING:
+        if not self.off_m or self.waits(config):
             return 0.0
-        mean = sum(self.off_m) / AGREEING
+        mean = sum(self.off_m) / len(self.off_m)
         return mean if abs(mean) > MEAN_SIGMA * std_m else 0.0
 
     def taken(self, config: Config, size_m: float, rail: Callable[[], Rail]) -> tuple[Memory, Stepping]:
-        """The train followed anew from before the step on, which moves its position and nothing else."""
+        """The train followed anew from before the step on, which moves its position and nothing else.
+
+        What a far one grows by is motion: the clock may have stood, and the train be slower by now.
+        """
         assert self.before is not None  # there is no size without it
         bank = self.before.bank
         covariance = bank.covariance.copy()
         covariance[:, POSITION, POSITION] += size_m**2
+        if self.is_far(config):
+            covariance[:, SPEED, SPEED] += ((self.off_m[-1] - self.off_m[0]) * S / self._lasts_ns) ** 2
         memory = self.before._replace(bank=bank._replace(covariance=covariance), course=Course())
         for measurement in self.since:
             memory = followed(config, memory, measurement, rail)

@@ -61,25 +61,44 @@ def seen(off_m: list[float | None], start: Stepping | None = None) -> Stepping:
 def test_a_step_is_abrupt_likely_of_its_size_and_borne_out_by_three(
     off_m: list[float | None], size_m: float, sign: float
 ) -> None:
-    found = seen([None if off is None else sign * off for off in off_m]).size_m(1.0)
+    found = seen([None if off is None else sign * off for off in off_m]).size_m(CALM, 1.0)
     assert found == pytest.approx(sign * size_m)
 
 
 @pytest.mark.parametrize(("last_m", "size_m"), [(750.0, 0.0), (1250.0, 0.0), (650.0, 5.0), (1350.0, 5.0)])
 def test_steps_lie_a_spacing_apart(last_m: float, size_m: float) -> None:
-    assert seen([0.1, 5.0, 5.0, 5.0], Stepping(stepped_m=last_m)).size_m(1.0) == size_m
+    assert seen([0.1, 5.0, 5.0, 5.0], Stepping(stepped_m=last_m)).size_m(CALM, 1.0) == size_m
 
 
 @pytest.mark.parametrize(("off_m", "size_m"), [(-5.0, -5.0), (-3.6, -3.6), (-3.2, 0.0), (-6.8, 0.0), (5.0, 0.0)])
 def test_a_step_may_be_taken_back_at_any_time(off_m: float, size_m: float) -> None:
     """What reflects a satellite's signal goes by."""
-    assert seen([0.1, off_m, off_m, off_m], Stepping(stepped_m=990.0, by_m=5.0)).size_m(1.0) == pytest.approx(size_m)
+    assert seen([0.1, off_m, off_m, off_m], Stepping(stepped_m=990.0, by_m=5.0)).size_m(CALM, 1.0) == pytest.approx(
+        size_m
+    )
 
 
 def test_a_step_behind_a_chance_error_is_one() -> None:
-    assert seen([0.1, 2.6, 2.4, 2.5, 2.4]).size_m(1.0) == 0.0  # it was decided by the third
-    assert seen([0.1, 2.6, 2.0, 0.1, 7.0, 7.0, 7.0]).size_m(1.0) == pytest.approx(7.0)
-    assert seen([0.1, -2.6, 7.0, 7.1, 6.9]).size_m(1.0) == pytest.approx(7.0)
+    assert seen([0.1, 2.6, 2.4, 2.5, 2.4]).size_m(CALM, 1.0) == 0.0  # it was decided by the third
+    assert seen([0.1, 2.6, 2.0, 0.1, 7.0, 7.0, 7.0]).size_m(CALM, 1.0) == pytest.approx(7.0)
+    assert seen([0.1, -2.6, 7.0, 7.1, 6.9]).size_m(CALM, 1.0) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize(
+    ("off_m", "size_m"),
+    [
+        ([0.1, *[50.0] * 21], 50.0),
+        ([0.1, *[-50.0] * 21], -50.0),
+        ([0.1, *[50.0] * 20], 0.0),  # shorter than 2 s
+        ([0.1, *[each for _ in range(11) for each in (50.0, None)]], 50.0),  # ticks are no positions
+        ([0.1, *[each for _ in range(10) for each in (50.0, None)]], 0.0),
+        ([0.1, *(50.0 + 0.3 * k for k in range(21))], 53.0),
+        ([0.1, *(50.0 + 0.5 * k for k in range(21))], 0.0),  # it grows: motion
+        ([40.0, *[50.0] * 21], 0.0),
+    ],
+)
+def test_a_far_step_lies_off_alike_for_two_seconds(off_m: list[float | None], size_m: float) -> None:
+    assert seen(off_m).size_m(CALM, 1.0) == pytest.approx(size_m)
 
 
 def test_a_step_moves_where_the_train_is_and_not_how_fast() -> None:
