@@ -52,6 +52,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     if measurement.has_position and memory.misled:
         detail = f"position x = {measurement.position_m:.12g}"
         state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
+    memory, measurement = bank.heard(memory, measurement)
     before = memory.bank
 
     def rail() -> Rail:
@@ -98,7 +99,7 @@ def _unbelieved(
         memory = bank.followed(config, misled(config, memory), blind, rail)
         return _accepted(config, state.told(Event(Outcome.SLIDING, detail)), blind, memory)
     anew = _anew(state, Event(Outcome.RESET, detail))
-    return _accepted(config, anew, measurement, bank.met(config, measurement))
+    return _accepted(config, anew, measurement, bank.met(config, measurement)._replace(places=memory.places))
 
 
 def _anew(state: State, event: Event) -> State:

@@ -32,7 +32,7 @@ from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
 from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
-from .sensors.scatter import BRAKED_FAR, SLOW_FAR
+from .sensors.scatter import BRAKED_FAR, PLACE_FAR, SLOW_FAR
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -136,6 +136,15 @@ def followed(
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
     return judged(config, with_wheels(config, memory, measurement), rail)
+
+
+def heard(memory: Memory, measurement: Measurement) -> tuple[Memory, Measurement]:
+    """Note how the positions scatter; where that is more than they declare, it is what they err by."""
+    if not measurement.has_position:
+        return memory, measurement
+    told = measurement.variance_m2
+    places = memory.places.after(measurement.t_ns, measurement.position_m, told, far=PLACE_FAR)
+    return memory._replace(places=places), measurement._replace(variance_m2=places.variance_of(told))
 
 
 def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:

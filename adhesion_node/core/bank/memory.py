@@ -28,7 +28,7 @@ from .motion import Braking, moved
 from .seeing import Observation, corrected
 from .sensors.plausible import Course
 from .sensors.pointing import Pointing
-from .sensors.scatter import LASTING, Coloured
+from .sensors.scatter import LASTING, Coloured, Scatter
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -78,6 +78,7 @@ class Memory(NamedTuple):
     """By how much the train was foreseen to slow under the brake, of all brakings."""
     repeating: Repeating = Repeating()
     pointing: Pointing = Pointing()
+    places: Scatter = Scatter()
     speeds: Coloured = Coloured(LASTING)
     shaking: Coloured = Coloured()
     left_out: tuple[Event, ...] = ()

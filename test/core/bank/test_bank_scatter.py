@@ -15,17 +15,17 @@ import pytest
 from banks import S, braked_run, measurements
 from test_bank_trust import Run, assert_known, followed
 
-from adhesion_node.core import ImuSample, SpeedSample
+from adhesion_node.core import ImuSample, Outcome, SpeedSample
 from adhesion_node.core.bank.findings.learnt import learnt
-from adhesion_node.core.bank.sensors.scatter import LASTING, Coloured, Scatter
+from adhesion_node.core.bank.sensors.scatter import FAR, LASTING, PLACE_FAR, Coloured, Scatter
 
 H = 0.1
 
 
-def scatter_of(values: np.ndarray, told: float, rate_hz: float = 10.0) -> Scatter:
+def scatter_of(values: np.ndarray, told: float, rate_hz: float = 10.0, far: float = FAR) -> Scatter:
     scatter = Scatter()
     for index, value in enumerate(values):
-        scatter = scatter.after(S + round(index / rate_hz * S), float(value), told)
+        scatter = scatter.after(S + round(index / rate_hz * S), float(value), told, far=far)
     return scatter
 
 
@@ -45,6 +45,16 @@ def test_what_scatters_more_than_is_told_counts(rate_hz: float, seed: int) -> No
 def test_a_train_that_brakes_harder_and_harder_does_not_scatter() -> None:
     times = np.arange(0.0, 30.0, H)
     assert scatter_of(60.0 - 0.1 * times**2, 0.03**2).variance_of(0.03**2) == 0.03**2
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_positions_scatter_by_their_noise_and_not_by_outliers(seed: int) -> None:
+    """At 40 m/s; one of twenty is off by 20 m, and stands beside two others."""
+    rng, times = np.random.default_rng(seed), np.arange(0.0, 60.0, H)
+    places = 40.0 * times + 0.5 * rng.standard_normal(times.size)
+    outliers = places + 20.0 * rng.standard_normal(times.size) * (rng.random(times.size) < 0.05)
+    assert scatter_of(outliers, 0.5**2, far=PLACE_FAR).variance_of(0.5**2) < 2.0**2 * 0.5**2
+    assert scatter_of(places, 0.1**2, far=PLACE_FAR).variance_of(0.1**2) == pytest.approx(0.5**2, rel=0.6)
 
 
 def test_samples_apart_or_back_in_time_tell_nothing() -> None:
@@ -105,6 +115,23 @@ def test_errors_that_do_not_last_weigh_what_they_are_told(rate_hz: float, seed: 
     notches = np.repeat(rng.choice([-0.1, 0.1], 24), round(5 * rate_hz))
     speeds = 40.0 + np.cumsum(notches) / rate_hz + 0.1 * rng.standard_normal(notches.size)
     assert coloured(speeds, 0.1**2, rate_hz).variance_of(0.1**2, 1.0 / rate_hz) == 0.1**2
+
+
+@pytest.mark.parametrize("mu", [0.3, 0.06, 0.03])
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("told_m", [0.2, 0.5])
+def test_positions_that_tell_less_than_their_noise_are_known_for_it(told_m: float, seed: int, mu: float) -> None:
+    """Of 2 m: they count as a receiver's, not as a sliding wheel's, once it is known how they scatter, after 2 s."""
+    times, truth, places = braked_run(mu, seed, 30.0)
+    shown = places + 2.0 * np.random.default_rng(seed + 100).standard_normal(times.size)
+    found = Run(times, truth[:, 1], *followed(measurements(times, shown, told_m)))
+    assert found.state.counts[Outcome.SLIDING] == 0
+    assert found.state.counts[Outcome.RESET] <= 1
+    assert found.state.memory is not None
+    assert learnt(found.state.memory)["position_scatter"] == pytest.approx(2.0, rel=0.3)
+    braked = [each for each in found.estimates if each.t_ns > 10 * S]
+    assert all(abs(each.speed_mps - found.speed_at(each)) < 4.0 * each.speed_std_mps for each in braked)
+    assert all(each.mu_lower < mu for each in braked)
 
 
 @pytest.mark.parametrize("mu", [0.3, 0.06, 0.03])

@@ -41,7 +41,8 @@ QUANTITIES = (
 )
 
 SCATTERS = (
-    ("speed_scatter", "m/s", "standard deviation by which measured speeds scatter"),
+    ("position_scatter", "m", "standard deviation by which measured positions scatter from one to the next"),
+    ("speed_scatter", "m/s", "the same of measured speeds"),
     ("acceleration_scatter", "m/s^2", "the same of the accelerometer, of its means over a step of time"),
 )
 """Name, unit and meaning; told once they are known. They count where a sensor tells much less."""
@@ -57,7 +58,8 @@ def learnt(memory: Memory) -> dict[str, float]:
     for name, component, _, _, factor in QUANTITIES:
         found[name] = factor * float(mean[component])
         found[f"{name}_std"] = factor * math.sqrt(max(float(covariance[component, component]), 0.0))
-    for (name, *_), scatter in zip(SCATTERS, (memory.speeds.quick, memory.shaking.quick), strict=True):
+    scatters = memory.places, memory.speeds.quick, memory.shaking.quick
+    for (name, *_), scatter in zip(SCATTERS, scatters, strict=True):
         if scatter.is_known:
             found[name] = math.sqrt(max(scatter.variance, 0.0))
     weight = memory.bank.weight

@@ -21,9 +21,9 @@ taken."""
 LEAST, SLOW_LEAST = 20, 5
 """Of how many values it is taken at least, and of how many means over a second."""
 
-FAR, SLOW_FAR, BRAKED_FAR = 4.0, 3.0, 1.5
+FAR, SLOW_FAR, BRAKED_FAR, PLACE_FAR = 4.0, 3.0, 1.5, 2.0
 """Standard deviations that one counts as at most; of means over a second less, as a driver's hand is seen there, too,
-and under the brake least, as the adhesion's fall is."""
+and under the brake least, as the adhesion's fall is; of positions less, as outliers are met among them."""
 
 UNDERTOLD, FEW = 2.25, 4.0
 """Times the variance that a message tells, from which the scatter counts instead; of n values by FEW / n more."""
