@@ -66,9 +66,10 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     if size_m and not elsewhere:
         memory, stepping = stepping.taken(config, size_m, rail)
         return _accepted(config, state, measurement, memory, stepping)
-    if elsewhere or off.nearest > config.gate_sigma:
+    doubted = stepping.doubts(config)
+    if elsewhere or (measurement.has_position and doubted) or off.nearest > config.gate_sigma:
         state = state._replace(stepping=stepping)
-        elsewhere = elsewhere or (state.outliers + 1 >= config.max_outliers and not stepping.waits(config))
+        elsewhere = elsewhere or (state.outliers + 1 >= config.max_outliers and not doubted)
         return _unbelieved(config, state, memory, measurement, off, elsewhere, rail)
     followed = bank.followed(config, memory, measurement, rail, off)
     if measurement.imu or state.proving.since:

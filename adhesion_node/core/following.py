@@ -9,6 +9,7 @@
 """What one measurement in its turn does: it is judged, and where it is good the train is followed with it."""
 
 import math
+from statistics import median
 
 from .banked import follow_banked, last_banked
 from .config import Config
@@ -20,6 +21,9 @@ from .intake.standing import moving
 from .state import State
 from .windowed import follow_windowed, last_window
 
+RUNNING_MPS = 5.0
+"""Wheels that are all faster than this do not merely spin."""
+
 SURE_SIGMA = 3.0
 """Standard deviations by which a speed in km/h is surely not the train's."""
 
@@ -30,7 +34,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     measurement, standing, silent = moving(measurement, state.standing, state.pace)
     state = state._replace(standing=standing).told(*silent)
     if placed:
-        repeated = state.repeated.after(measurement, state.sure)
+        repeated = state.repeated.after(measurement, state.sure, _running_mps(config, measurement))
         if repeated.is_stuck(measurement):
             state = _stuck(state, measurement)
             if not _is_moved(config, state, measurement):
@@ -67,6 +71,16 @@ def _surely(seen: Estimate | None) -> float:
     return math.nan if seen is None or wide else seen.speed_mps
 
 
+def _running_mps(config: Config, measurement: Measurement) -> float:
+    """How fast the train runs by its own speed, or by the wheels in the middle; 0 where these may merely spin."""
+    turning = [abs(each) for each in measurement.wheels[-1].speeds_radps] if measurement.wheels else []
+    found = [each * config.train.wheel_radius_m for each in turning if not math.isnan(each)]
+    told = measurement.speeds[-1].speed_mps if measurement.speeds else measurement.speed_mps
+    if told is not None and config.speed_source != "axle":
+        found = [abs(told)]
+    return speed if found and (speed := median(found)) > RUNNING_MPS else 0.0
+
+
 def _stuck(state: State, measurement: Measurement) -> State:
     """The position is stuck: it has said nothing since it was the same for the first time."""
     event = Event(Outcome.STUCK, f"position x = {measurement.position_m:.12g}")
@@ -76,7 +90,8 @@ def _stuck(state: State, measurement: Measurement) -> State:
 def _is_moved(config: Config, state: State, measurement: Measurement) -> bool:
     """Whether another sensor tells how the train moves, also under the brake."""
     speeds = bool(measurement.speeds) or measurement.speed_mps is not None
-    return state.memory is not None and (bool(measurement.imu) or (speeds and config.speed_source != "axle"))
+    told = speeds and config.speed_source != "axle"
+    return state.memory is not None and (told or bool(measurement.imu) or bool(measurement.wheels))
 
 
 def _unseen(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:

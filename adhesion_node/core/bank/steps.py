@@ -63,7 +63,7 @@ class Stepping(NamedTuple):
         if not measurement.has_position:
             return self._replace(since=(*self.since, measurement)) if self.before is not None else self
         alike_m = ALIKE_SIGMA * math.sqrt(measurement.variance_m2)
-        first_m = self.off_m[0] if self.waits(config) else 0.0
+        first_m = self.off_m[0] if self._waits(config) else 0.0
         within_m = NEAR * config.position_step_std_m if self.is_far(config) else min(alike_m, abs(first_m))
         if abs(off.metres - first_m) < within_m:  # never by a first one of 0: there is none
             return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
@@ -73,7 +73,9 @@ class Stepping(NamedTuple):
         spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
         back = abs(off.metres + self.by_m) < max(alike_m, BACK * abs(self.by_m))
         abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
-        if (spaced or back) and abrupt:
+        near_m = NEAR * config.position_step_std_m
+        plain = abs(off.metres) <= near_m or (off.std_m < near_m and off.nearest > FIRST_SIGMA)
+        if (spaced or back) and abrupt and plain:  # else they tell where the train is
             return calm._replace(before=memory, since=(measurement,), off_m=(off.metres,))
         return calm
 
@@ -81,7 +83,11 @@ class Stepping(NamedTuple):
         """Whether it is more than a balise corrects."""
         return bool(self.off_m) and abs(self.off_m[0]) > NEAR * config.position_step_std_m
 
-    def waits(self, config: Config) -> bool:
+    def doubts(self, config: Config) -> bool:
+        """Whether the positions may have stepped far: until that is known they tell nothing."""
+        return self.is_far(config) and self._waits(config)
+
+    def _waits(self, config: Config) -> bool:
         """Whether more positions have to say that they have stepped."""
         if len(self.off_m) < AGREEING:
             return bool(self.off_m)
@@ -93,7 +99,7 @@ class Stepping(NamedTuple):
 
     def size_m(self, config: Config, std_m: float) -> float:
         """Size of the step; 0 unless it is plain."""
-        if not self.off_m or self.waits(config):
+        if not self.off_m or self._waits(config):
             return 0.0
         mean = sum(self.off_m) / len(self.off_m)
         return mean if abs(mean) > MEAN_SIGMA * std_m else 0.0

@@ -68,11 +68,16 @@ class Repeated(NamedTuple, Generic[Of]):
     position_m: float
     since_ns: int
     before: Of | None
+    newest_ns: int = 0
+    gone_m: float = 0.0
+    """Way that the train has gone since by another sensor."""
 
-    def after(self, measurement: Measurement, known: Of | None) -> Repeated[Of]:
-        """Note the next position; `known` is what is known now."""
-        same = measurement.position_m == self.position_m and measurement.t_ns >= self.since_ns
-        return self if same else Repeated(measurement.position_m, measurement.t_ns, known)
+    def after(self, measurement: Measurement, known: Of | None, running_mps: float = 0.0) -> Repeated[Of]:
+        """Note the next position; `known` is what is known now, and another sensor says that it runs so fast."""
+        if measurement.position_m != self.position_m or measurement.t_ns < self.since_ns:
+            return Repeated(measurement.position_m, measurement.t_ns, known, measurement.t_ns)
+        gone_m = self.gone_m + running_mps * max(measurement.t_ns - self.newest_ns, 0) * 1e-9
+        return self._replace(newest_ns=measurement.t_ns, gone_m=gone_m)
 
     def is_held(self, measurement: Measurement) -> bool:
         """Whether the position is the one before, said again."""
@@ -81,7 +86,11 @@ class Repeated(NamedTuple, Generic[Of]):
     def is_stuck(self, measurement: Measurement) -> bool:
         """Whether the train must have moved on from a position that is still the same."""
         same_s = (measurement.t_ns - self.since_ns) * 1e-9
-        if self.before is None or same_s < STUCK_S:  # most positions are new
+        if same_s < STUCK_S:  # most positions are new
+            return False
+        if self.gone_m >= stuck_way(measurement.variance_m2):
+            return True
+        if self.before is None:
             return False
         before = self.before.estimate
         known_s = abs(self.since_ns - before.t_ns) * 1e-9

@@ -34,7 +34,7 @@ def seen(off_m: list[float | None], start: Stepping | None = None) -> Stepping:
     for k, off in enumerate(off_m):
         variance = math.inf if off is None else 0.25
         measured = Measurement(S + k * S // 10, 1000.0 + 4.0 * k, variance, 0.0)
-        stepping = stepping.after(CALM, memory, measured, Foreseen() if off is None else Foreseen(off, 1.0))
+        stepping = stepping.after(CALM, memory, measured, Foreseen() if off is None else Foreseen(off, 1.0, abs(off)))
     return stepping
 
 

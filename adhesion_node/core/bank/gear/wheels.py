@@ -39,7 +39,7 @@ UNLEARNT = 0.03
 """Error of all radii together of which nothing was learnt: wear."""
 
 LEARNING_MPS = 5.0
-"""Radii are learnt from this speed on."""
+"""Radii are learnt from this speed of the rims on, and creep is seen from this speed of the train on."""
 
 BRAKE_BELOW = 0.05
 """Share of sliding axles below which the brake limits."""
@@ -104,10 +104,10 @@ class WheelsSeen(NamedTuple):
         count, nothing = len(sample.speeds_radps), (None,) * len(sample.speeds_radps)
         wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, slid_ns=nothing, rolled_ns=nothing)
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
-        if speed_mps < LEARNING_MPS:
-            return wheels
         if not braked:
             return wheels._learning(rims)
+        if speed_mps < LEARNING_MPS:
+            return wheels
         rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
         fastest = max((rim for rim in rims if not math.isnan(rim)), default=0.0)
         unsure = 3.0 * std_mps / speed_mps
@@ -122,9 +122,10 @@ class WheelsSeen(NamedTuple):
 
     def _learning(self, rims: list[float]) -> WheelsSeen:
         turning = [rim for rim in rims if rim > 0.0]  # never true of NaN
-        if not turning:
+        middle = median(turning) if turning else 0.0
+        if middle < LEARNING_MPS:
             return self
-        part, middle = max(LEARNT, 1.0 / (self.learnt + 1)), median(turning)
+        part = max(LEARNT, 1.0 / (self.learnt + 1))
         radius = tuple(
             before + part * (middle / rim - before) if rim > 0.0 else before
             for before, rim in zip(self.radius, rims, strict=True)
