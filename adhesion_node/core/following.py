@@ -30,7 +30,7 @@ SURE_SIGMA = 3.0
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
-    seen, placed = state.seen, measurement.has_position
+    seen, placed, shown = state.seen, measurement.has_position, _shown(config, measurement)
     measurement, standing, silent = moving(measurement, state.standing, state.pace)
     state = state._replace(standing=standing).told(*silent)
     if placed:
@@ -45,16 +45,17 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
             measurement = measurement._replace(variance_m2=math.inf)
     else:
         repeated = state.repeated
-    pace = state.pace.after(measurement)
+    pace = state.pace.after(measurement, shown)
     refused: tuple[Event, ...] = ()
     if measurement.speeds or measurement.speed_mps is not None:
         measurement, refused = in_mps(measurement, (pace.speed_mps, _surely(seen)))
-    state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace)
-    if refused:
-        state = state.told(*refused)
-        if is_kmh(state.followed_mps, pace.speed_mps):
-            detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
-            state = state.forgotten()._replace(pace=pace, standing=standing).told(Event(Outcome.RESET, detail))
+    belied = pace.belies and not state.pace.belies
+    if belied:
+        measurement = measurement._replace(speed_mps=None, speeds=())
+    state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace).told(*refused)
+    if belied or (refused and is_kmh(state.followed_mps, pace.speed_mps)):
+        detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
+        state = state.forgotten()._replace(pace=pace, standing=standing).told(Event(Outcome.RESET, detail))
     if state.method is None:
         return follow_banked(config, state, measurement)
     return follow_windowed(config, state, measurement)
@@ -71,13 +72,19 @@ def _surely(seen: Estimate | None) -> float:
     return math.nan if seen is None or wide else seen.speed_mps
 
 
+def _shown(config: Config, measurement: Measurement) -> tuple[float, ...]:
+    """The speeds that no sliding axle shows."""
+    if config.speed_source == "axle":
+        return ()
+    alone = measurement.speed_mps
+    return tuple(each.speed_mps for each in measurement.speeds) or (() if alone is None else (alone,))
+
+
 def _running_mps(config: Config, measurement: Measurement) -> float:
     """How fast the train runs by its own speed, or by the wheels in the middle; 0 where these may merely spin."""
     turning = [abs(each) for each in measurement.wheels[-1].speeds_radps] if measurement.wheels else []
     found = [each * config.train.wheel_radius_m for each in turning if not math.isnan(each)]
-    told = measurement.speeds[-1].speed_mps if measurement.speeds else measurement.speed_mps
-    if told is not None and config.speed_source != "axle":
-        found = [abs(told)]
+    found = [abs(each) for each in _shown(config, measurement)] or found
     return speed if found and (speed := median(found)) > RUNNING_MPS else 0.0
 
 

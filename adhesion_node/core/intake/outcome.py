@@ -43,8 +43,8 @@ class Outcome(Enum):
     TOO_OFTEN = "publish at most 200 messages a second: no more are used"
     INVALID = "not finite, no positive variance or physically impossible: dropped"
     STUCK = (
-        "the same to the bit although the train must have moved on, or a standstill that no brake brings about: "
-        "check the sensor"
+        "the same to the bit although the train must have moved on, a standstill that no brake brings about, or a "
+        "speed far below that of the positions: check the sensor"
     )
     HELD = "the same to the bit as before: taken for a value that is held until the next one; publish each only once"
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"

@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from .outcome import Event, Outcome
@@ -37,6 +37,11 @@ PACE_NS = 2_000_000_000
 RUNS_MPS, RUNS_SPANS = 12.0, 3
 """A train whose positions were so fast over so many spans, one after the other, did not stop within the last two; one
 position that is far off makes two of them fast."""
+
+SLOWER, AGREES = (0.8, 3.0), (0.9, 1.0)
+"""A speed that is less than this share of how fast positions run, less this, m/s, over as many spans is not the
+train's: a wheel that slides is behind, and no receiver's error runs ahead so fast for so long. It is again from the
+second on."""
 
 
 class Motion(Protocol):
@@ -124,25 +129,38 @@ class Pace(NamedTuple):
     position_m: float = 0.0
     speed_mps: float = math.nan
     fast: int = 0
-    """Spans, one after the other, over which they were those of a train that runs."""
+    """Spans, one after the other, over which they were those of a train that runs, ..."""
+    slower: int = 0
+    """... and over which the measured speed was far less."""
+    shown: tuple[float, int] = (0.0, 0)
+    """Sum and number of the speeds of this span."""
 
     @property
     def runs(self) -> bool:
         """Whether the train surely runs."""
         return self.fast >= RUNS_SPANS
 
-    def after(self, measurement: Measurement) -> Pace:
-        """Note the next position, if there is one."""
+    @property
+    def belies(self) -> bool:
+        """Whether the measured speed is surely not the train's."""
+        return self.slower >= RUNS_SPANS
+
+    def after(self, measurement: Measurement, speeds_mps: Sequence[float] = ()) -> Pace:
+        """Note the next position, if there is one, and the speeds that were measured with it."""
+        shown = self.shown[0] + sum(map(abs, speeds_mps)), self.shown[1] + len(speeds_mps)
         if not measurement.has_position:
-            return self
+            return self._replace(shown=shown) if speeds_mps else self
         t_ns, position_m, _ = measurement[:3]
         if self.since_ns is None or t_ns < self.since_ns:
             return Pace(t_ns, position_m)
         elapsed_ns = t_ns - self.since_ns
         if elapsed_ns < PACE_NS:
-            return self
+            return self._replace(shown=shown) if speeds_mps else self
         speed_mps = abs(position_m - self.position_m) / (elapsed_ns * 1e-9)
-        return Pace(t_ns, position_m, speed_mps, self.fast + 1 if speed_mps > RUNS_MPS else 0)
+        slower, (share, less_mps) = self.slower, AGREES if self.belies else SLOWER
+        if shown[1]:
+            slower = slower + 1 if shown[0] / shown[1] < share * speed_mps - less_mps else 0
+        return Pace(t_ns, position_m, speed_mps, self.fast + 1 if speed_mps > RUNS_MPS else 0, slower)
 
 
 def in_mps(measurement: Measurement, known_mps: Iterable[float]) -> tuple[Measurement, tuple[Event, ...]]:

@@ -131,6 +131,20 @@ def test_a_receiver_that_tells_a_standstill_of_a_train_that_runs_is_left_out(
     assert_known(found, mu, 11.0, 25.0)
 
 
+@pytest.mark.parametrize("from_s", [0.0, 3.0, 11.0])
+@pytest.mark.parametrize("mu", [DRY, WET, 0.03])
+def test_a_speed_of_half_the_positions_is_left_out(mu: float, from_s: float) -> None:
+    times, truth, places = braked_run(mu, 1, 30.0)
+    shown = np.where(times < from_s, 1.0, 0.5) * truth[:, 1]
+    measured = [
+        each._replace(speeds=(SpeedSample(each.t_ns, float(v), 0.05**2),))
+        for each, v in zip(measurements(times, places, 0.3), shown, strict=True)
+    ]
+    found = Run(times, truth[:, 1], *followed(measured))
+    assert found.state.counts[Outcome.STUCK] > 50
+    assert_known(found, mu, from_s + 11.0, 29.0)
+
+
 def test_a_train_that_stops_stands() -> None:
     """A receiver tells that it does from 1 m/s on."""
     found = run(DRY, 1, seconds=22.6, speed=(0.08, 21.6, 99.0), held_mps=0.0, speed_mps=17.0)

@@ -77,6 +77,33 @@ def test_positions_that_run_belie_a_standstill() -> None:
     assert told
 
 
+def shown_beside(share: float, seconds: float = 12.0, back_s: float = 99.0) -> Pace:
+    """At 30 m/s, ten speeds a second, so much of it until they are right again."""
+    pace = Pace()
+    for tick in range(round(10 * seconds)):
+        speed_mps = 30.0 * (share if tick < 10 * back_s else 1.0)
+        pace = pace.after(Measurement(tick * S // 10, 3.0 * tick, 4.0), (speed_mps,))
+    return pace
+
+
+def test_positions_that_run_belie_a_speed_that_is_far_less() -> None:
+    assert shown_beside(0.5).belies
+    assert not shown_beside(0.5, seconds=5.0).belies  # three spans of 2 s
+    assert not shown_beside(0.75).belies  # within a fifth and 3 m/s
+    assert not shown_beside(1.5).belies  # of what a sliding wheel shows the speed is more
+    assert not shown_beside(0.5, back_s=8.0).belies
+    nearly = shown_beside(0.5)
+    for tick in range(120, 200):  # what would be within a fifth and 3 m/s does not clear it
+        nearly = nearly.after(Measurement(tick * S // 10, 3.0 * tick, 4.0), (23.0,))
+    assert nearly.belies
+    measurement = measured(9.0, 15.0, 15.1)
+    left, _, told = moving(measurement, Standing(), shown_beside(0.5))
+    assert left.speeds == ()
+    assert left.speed_mps is None
+    assert [event.outcome for event in told] == [Outcome.STUCK]
+    assert moving(measurement, Standing(), shown_beside(0.75))[0] == measurement
+
+
 def test_one_position_far_off_does_not() -> None:
     places = np.zeros(41)
     for index in range(5, 36):
