@@ -96,9 +96,8 @@ def _stuck(state: State, measurement: Measurement) -> State:
 
 def _is_moved(config: Config, state: State, measurement: Measurement) -> bool:
     """Whether another sensor tells how the train moves, also under the brake."""
-    speeds = bool(measurement.speeds) or measurement.speed_mps is not None
-    told = speeds and config.speed_source != "axle"
-    return state.memory is not None and (told or bool(measurement.imu) or bool(measurement.wheels))
+    others = _shown(config, measurement) or measurement.imu or measurement.wheels
+    return state.memory is not None and bool(others)
 
 
 def _unseen(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
