@@ -17,7 +17,7 @@ from .estimate import Estimate, blind_estimate
 from .intake.outcome import Event, Outcome
 from .intake.plausibility import KMH_PER_MPS, in_mps, is_kmh
 from .intake.samples import Measurement
-from .intake.standing import moving
+from .intake.standing import HELD_MPS, moving
 from .state import State
 from .windowed import follow_windowed, last_window
 
@@ -45,7 +45,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
             measurement = measurement._replace(variance_m2=math.inf)
     else:
         repeated = state.repeated
-    pace = state.pace.after(measurement, shown)
+    pace = state.pace.after(measurement, [each for each in shown if abs(each) >= HELD_MPS])
     refused: tuple[Event, ...] = ()
     if measurement.speeds or measurement.speed_mps is not None:
         measurement, refused = in_mps(measurement, (pace.speed_mps, _surely(seen)))

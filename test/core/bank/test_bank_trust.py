@@ -128,6 +128,7 @@ def test_a_receiver_that_tells_a_standstill_of_a_train_that_runs_is_left_out(
     """As one does that has lost its satellites."""
     found = run(mu, 1, speed=(0.08, from_s, until_s), held_mps=0.0)
     assert found.state.counts[Outcome.STUCK] >= 19
+    assert from_s == 0.0 or found.state.counts[Outcome.RESET] == 0  # from the start on nothing belies it
     assert_known(found, mu, 11.0, 25.0)
 
 
