@@ -47,13 +47,15 @@ def over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
 
 
 def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
-    """The times of a zone as UTC; where an hour is there twice and the rows do not tell which, it is summer time."""
+    """The times of a zone as UTC; of an hour that is there twice, where the rows do not tell, that which joins them."""
     if form.time_format is None or form.time_zone == "UTC" or is_clock(form.time_format):
         return rows, []
     local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
     try:
         utc = local.tz_localize(zone, ambiguous="infer", nonexistent="shift_forward")
     except ValueError:
-        utc = local.tz_localize(zone, ambiguous=np.ones(len(local), dtype=bool), nonexistent="shift_forward")
+        either = (np.full(len(local), summer) for summer in (True, False))
+        both = [local.tz_localize(zone, ambiguous=summer, nonexistent="shift_forward") for summer in either]
+        utc = min(both, key=lambda each: np.max(np.abs(np.diff(each.asi8)), initial=0))
     rows["t_ns"] = utc.as_unit("ns").asi8
     return rows, [f"time: local of {zone}"]

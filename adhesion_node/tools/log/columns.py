@@ -92,7 +92,9 @@ def _the_one(name: str, ours: str, header: Sequence[str], source: str) -> str:
     how = option(ours) if ours != "wheel_speed" else "--wheel-speeds"
     found = meant(name, ours, header)
     if not found:
-        raise ValueError(f"{source}: column {name!r} is missing: it has {_listed(header)}; name one with {how} COL")
+        split = next((mark for mark in (";", "\t", "|", " ") if len(header) == 1 and mark in header[0].strip()), None)
+        cure = f"name one with {how} COL" if split is None else f"is the --delimiter {split!r}?"
+        raise ValueError(f"{source}: column {name!r} is missing: it has {_listed(header)}; {cure}")
     if len(set(found)) > 1:
         raise ValueError(f"{source}: column {name!r} may be {_listed(found)}: name one with {how} COL")
     return found[0]

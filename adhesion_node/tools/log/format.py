@@ -8,10 +8,10 @@
 
 """How a log is written: its text, the units of its columns, and what they may hold."""
 
-import codecs
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import Any
 from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
 
@@ -26,7 +26,8 @@ from ...core.physics.train import CRH3, KMH
 from ...wire.line import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA, Line
 from ...wire.messages.refused import MAX_WHEEL_RADPS
 
-TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "excel": 86_400 * 10**9}
+TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "min": 60 * 10**9, "h": 3600 * 10**9}
+TIME_UNITS |= {"excel": 86_400 * 10**9}
 """In ns; besides there is `iso`, a date. `excel`: days, those of 1970 from 25569 on."""
 
 EXCEL_1970 = 25_569
@@ -34,8 +35,8 @@ EXCEL_1970 = 25_569
 
 POSITION_UNITS = {"m": 1.0, "km": 1e3, "ft": 0.3048}
 PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757}
-SPEED_UNITS = {"mps": 1.0, "kmh": KMH, "mph": 0.44704}
-ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665}
+SPEED_UNITS = {"mps": 1.0, "kmh": KMH, "mph": 0.44704, "kn": 1852.0 / 3600.0}
+ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665, "mg": 9.80665e-3}
 WHEEL_UNITS = ("radps", "rpm", "mps", "kmh")
 """The last two of the rim."""
 
@@ -144,7 +145,9 @@ class Format:
         if self.skip_rows is not None and self.skip_rows < 0:
             raise ValueError(f"skip-rows = {self.skip_rows}: give the number of lines above the header")
         if self.encoding is not None:
-            _require(codecs.lookup, LookupError, "encoding", self.encoding, "such as utf-8, cp1252 or utf-16")
+            _require(_decodes, _NO_TEXT, "encoding", self.encoding, "such as utf-8, cp1252 or utf-16")
+        if self.time_format is not None:
+            _require_format(self.time_format)
         _require(ZoneInfo, _NO_ZONE, "time-zone", self.time_zone, "such as UTC or Europe/Berlin")
         std = self.position_std_m
         least, most = MIN_VARIANCE_M2**0.5, MAX_VARIANCE_M2**0.5
@@ -182,6 +185,21 @@ def wheel_units(radius_m: float) -> Mapping[str, float]:
     """What one of each of `WHEEL_UNITS` is in rad/s."""
     return dict(zip(WHEEL_UNITS, (1.0, math.pi / 30.0, 1.0 / radius_m, KMH / radius_m), strict=True))
 
+
+def _decodes(encoding: str) -> None:
+    b"a".decode(encoding, "replace")
+
+
+def _require_format(time_format: str) -> None:
+    try:
+        datetime.strptime("", time_format)
+    except ValueError as error:
+        if "does not match" not in str(error):
+            raise ValueError(f"time-format = {time_format!r}: {error}; give one such as %d.%m.%Y %H:%M:%S.%f") from None
+
+
+_NO_TEXT = (LookupError, UnicodeError)
+"""What is raised for an encoding that is none, or none of text."""
 
 _NO_ZONE = (ZoneInfoNotFoundError, ValueError, OSError)
 """What `ZoneInfo` raises for a name that is none, or a folder."""

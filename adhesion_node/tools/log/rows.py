@@ -23,8 +23,8 @@ from .format import LIMITS, PRESSURES, Format
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
 from .units import known
 
-ZONED = re.compile(r"(Z|[+-]\d\d:?\d\d)$")
-"""How a date ends that names its zone."""
+ZONED = re.compile(r"(Z|[T ]\d\d.*[+-]\d\d(:?\d\d)?)$")
+"""How a date ends that names its zone, behind the time of the day."""
 
 EMPTY = "every row needs a time and something measured"
 
@@ -171,7 +171,9 @@ def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
     """The format with that of the times."""
     if pd.api.types.is_timedelta64_dtype(cells):
         return replace(form, time_format=None, time_unit="ns")
-    if form.time_format is not None or form.time_unit in ("s", "ms", "us", "ns"):
+    if form.time_format is not None:
+        return replace(form, time_zone="UTC") if "%z" in form.time_format else form
+    if form.time_unit is not None and form.time_unit != "iso":
         return form
     sample = [str(cell) for cell in cells.head(SAMPLE)]
     written = "ISO8601" if form.time_unit == "iso" else next(iter(time_formats(sample)), None)

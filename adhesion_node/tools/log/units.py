@@ -19,12 +19,15 @@ _SPELT = {
     "ms": ("msec", "millisecond", "milliseconds"),
     "us": ("μs", "microseconds"),
     "ns": ("nanoseconds",),
+    "min": ("minute", "minutes", "minuten"),
+    "h": ("hour", "hours", "std"),
     "m": ("metre", "metres", "meter", "meters"),
     "km": ("kilometre", "kilometres", "kilometer", "kilometers"),
     "ft": ("feet", "foot"),
     "mps": ("m/s", "ms", "ms-1", "m/sec"),
     "kmh": ("km/h", "kph", "kmph", "km/hr", "kmh-1"),
     "mph": ("mi/h", "miles/h"),
+    "kn": ("kt", "kts", "knot", "knots", "knoten"),
     "pa": ("pascal",),
     "bar": ("barg", "bar(g"),
     "mbar": ("hpa",),
@@ -42,7 +45,7 @@ _BRACKETS = re.compile(r"(.*?)[\s_]*[\[(<{]\s*(.*?)\s*[\])>}]+")
 def known(text: str, column: str) -> str | None:
     """Return the unit of a column that a text means, as its option calls it; None for what is none.
 
-    >>> known("km/h", "speed"), known("m s⁻²", "acceleration"), known("MPa", "brake_pipe"), known("kn", "speed")
+    >>> known("km/h", "speed"), known("m s⁻²", "acceleration"), known("MPa", "brake_pipe"), known("rods", "speed")
     ('kmh', 'mps2', 'mpa', None)
     >>> known("ms", "time"), known("ms", "speed"), known("(1/min)", "wheel_speed")
     ('ms', 'mps', 'rpm')

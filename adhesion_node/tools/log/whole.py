@@ -29,6 +29,9 @@ from .text import Refusal
 FULL_DROP_PA = 1.5e5
 """The pipe's pressure falls by so much for a full brake (UIC 540)."""
 
+RELEASED_PA = 2e5, 1.2e6
+"""What a pipe may have while the brake is released; mostly it is 5 bar."""
+
 SET_BACK = "the clock was set back; --time-zone where summer time ended, else cut the log there; or unsorted? --sort"
 
 
@@ -133,6 +136,10 @@ def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, s
     pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.unit("brake_pipe")
     scale = PRESSURE_UNITS[unit]
     released = pipe.quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
+    if form.pipe_released is not None and not RELEASED_PA[0] <= released <= RELEASED_PA[1]:
+        least, most = (pa / scale for pa in RELEASED_PA)
+        range_ = f"give what the pipe has while the brake is released, {least:g} to {most:g} {unit}"
+        raise ValueError(f"pipe-released = {form.pipe_released:g} {unit}: {range_}; mostly it is {5e5 / scale:g}")
     share = ((released - pipe) / FULL_DROP_PA).clip(0.0, 1.0)
     rows = rows.drop(columns="brake_pipe").assign(brake_demand=form.ambient_pressure_pa + share * form.full_pressure_pa)
     note = (

@@ -11,6 +11,7 @@
 Means over a second are judged, so that neither noise nor the rate of the rows matters.
 """
 
+import math
 from collections.abc import Iterator
 from itertools import chain
 
@@ -18,9 +19,10 @@ import numpy as np
 
 from ....core.physics.train import KMH, Array
 from ....run.results.seen import FASTEST_MPS
+from ....wire.line import ATMOSPHERE_PA
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from ..whole import Log, moment
-from .motion import BRAKES_MPS2, LEAST_S, RUNS_MPS2, Motion, motion_of
+from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
 from .ways import resets, slow_or_falling, speed_against_positions
@@ -28,7 +30,7 @@ from .ways import resets, slow_or_falling, speed_against_positions
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
 
-SLOWEST_ROWS_S, FASTEST_ROWS_S = 10.0, 5e-4
+SLOWEST_ROWS_S, FASTEST_ROWS_S, USUAL_ROWS_S = 10.0, 5e-4, 0.3
 """Between two rows of a recorder."""
 
 SILENT, WEAKEST_PA, FULL_PA = 0.1, 15e3, (5e4, 1.5e6)
@@ -49,10 +51,11 @@ def odd(log: Log) -> list[str]:
     stand_ins = [*sentinels(log)]
     of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *_pressures(log)]
     if of_time or stand_ins or t_s[-1] < LEAST_S:
-        return [*log.columns.doubts, *of_time, *texts]
+        return [*log.columns.doubts, *(of_time or _too_far(log, t_s)), *texts]
     motion = motion_of(log, t_s)
     of_way = [*resets(log, t_s)]
-    of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else slow_or_falling(motion))]
+    alone = () if motion.by_fixes else slow_or_falling(motion)
+    of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else alone)]
     of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion)]
     return [
         *log.columns.doubts,
@@ -68,8 +71,18 @@ def odd(log: Log) -> list[str]:
 def _rows_too_far(t_s: Array, form: Format) -> Iterator[str]:
     step_s = float(np.median(np.diff(t_s))) if len(t_s) > 2 else 1.0
     if form.time_unit in TIME_UNITS and not FASTEST_ROWS_S < step_s < SLOWEST_ROWS_S:
-        other, cure = ("ms", "ms") if step_s > 1.0 else ("s", "s") if form.time_unit != "s" else ("days", "excel")
+        of_unit = {unit: step_s * ns / TIME_UNITS[form.time_unit] for unit, ns in TIME_UNITS.items()}
+        cure = min(of_unit, key=lambda unit: abs(math.log(max(of_unit[unit], 1e-30) / USUAL_ROWS_S)))
+        other = {"excel": "days"}.get(cure, cure)
         yield f"a row every {step_s:.3g} s: are the times in {other}? --time-unit {cure}"
+
+
+def _too_far(log: Log, t_s: Array) -> Iterator[str]:
+    """Of a short log: the whole way is too long for the whole time."""
+    place = log.rows["position"].dropna() if "position" in log.rows else log.rows["t_ns"][:0]
+    way_m = abs(float(place.iloc[-1] - place.iloc[0])) if len(place) > 2 else 0.0
+    if way_m > LEAST_M and way_m > FASTEST_MPS * t_s[-1]:
+        yield f"{way_m:.4g} m in {t_s[-1]:.3g} s: another --time-unit, or --position-unit?"
 
 
 def _pressures(log: Log) -> Iterator[str]:
@@ -79,12 +92,21 @@ def _pressures(log: Log) -> Iterator[str]:
         gauge = log.rows[name] - log.form.ambient_pressure_pa
         least, most = gauge.min(), gauge.max()
         yield from _other_unit(name, most, log.form)
+        if name == "brake_demand" and _is_share(log, most):
+            yield "brake_demand goes up to 1: a share of a full brake is not read: give its pressure in the cylinders"
         if 80e3 < least < 108e3:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
 
     if "brake_pipe" in log.columns.names and log.form.pipe_released is not None:
         released_pa = log.form.pipe_released * PRESSURE_UNITS[log.form.unit("brake_pipe")]
         yield from _other_unit("brake_pipe", released_pa, log.form)
+
+
+def _is_share(log: Log, most_pa: float) -> bool:
+    """Whether a demand up to 1 in its unit, which no header names, is far below what the cylinders get."""
+    most = most_pa / PRESSURE_UNITS[log.form.unit("brake_demand")]
+    told = "brake_demand" in log.form.told or "brake_pressure" not in log.rows
+    return not told and abs(most - 1.0) < 1e-6 and log.rows["brake_pressure"].max() - ATMOSPHERE_PA > 2.0 * most_pa
 
 
 def _other_unit(name: str, most_pa: float, form: Format) -> Iterator[str]:
@@ -94,8 +116,9 @@ def _other_unit(name: str, most_pa: float, form: Format) -> Iterator[str]:
         most = most_pa / PRESSURE_UNITS[read_in]
         would_be = {unit: most * pa for unit, pa in PRESSURE_UNITS.items() if FULL_PA[0] < most * pa <= FULL_PA[1]}
         cures = "; ".join(f"--pressure-unit {unit}: {pa / 1e5:.2g} bar" for unit, pa in would_be.items())
-        is_share = PERCENT[0] < most < PERCENT[1]
-        cure = "; per cent of a full brake are not read: give its pressure" if is_share else ""
+        share = "per cent of a full brake are" if PERCENT[0] < most < PERCENT[1] else "a share of a full brake is"
+        is_share = PERCENT[0] < most < PERCENT[1] or most <= 1.0
+        cure = f"; {share} not read: give its pressure" if is_share else ""
         units = " or ".join(would_be) or "another unit"
         yield f"{name} is {most:.6g} {read_in} at most: is it in {units}? {cures}{cure}"
 

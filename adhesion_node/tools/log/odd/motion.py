@@ -27,6 +27,9 @@ BRAKES_MPS2, RUNS_MPS2 = -0.3, -0.1
 OVER_S = 5
 """Seconds over which it is seen whether a train brakes, however noisy its positions."""
 
+EARTH_M = 6.371e6
+"""Radius of a sphere like it."""
+
 SAME = math.log(1.25)
 """By so much positions and speed may differ, as where a wheel slides."""
 
@@ -42,6 +45,8 @@ class Motion(NamedTuple):
     """Of the accelerometer."""
     rolls_radps: Array
     """Of the middle axle, without sign."""
+    by_fixes: bool = False
+    """Whether the places are the way along the fixes, which rises whatever the train does."""
 
     @property
     def course_mps(self) -> Array:
@@ -88,5 +93,15 @@ def motion_of(log: Log, t_s: Array) -> Motion:
 
     axles = [name for name in log.columns.axles if name in means]
     rolls = means[axles].abs().median(axis=1).to_numpy(dtype=np.float64) if axles else column("")
-    pressure = column("brake_pressure", log.form.ambient_pressure_pa)
-    return Motion(column("position"), column("speed"), pressure, column("acceleration"), rolls)
+    pressure, others = column("brake_pressure", log.form.ambient_pressure_pa), (column("acceleration"), rolls)
+    if {"lat", "lon", "speed"} <= set(means) and "position" not in means:
+        return Motion(_way_along(column("lat"), column("lon")), column("speed"), pressure, *others, by_fixes=True)
+    return Motion(column("position"), column("speed"), pressure, *others)
+
+
+def _way_along(lat: Array, lon: Array) -> Array:
+    """Way along places, m, good to a part in 200; what is not known is NaN, and the way goes on behind it."""
+    north = np.radians(np.diff(lat, prepend=math.nan)) * EARTH_M
+    east = np.radians(np.diff(lon, prepend=math.nan)) * EARTH_M * np.cos(np.radians(lat))
+    steps = np.hypot(north, east)
+    return np.where(np.isfinite(steps), np.nancumsum(steps), math.nan)

@@ -16,6 +16,9 @@ import numpy as np
 from ..format import ACCELERATION_UNITS, Format, wheel_units
 from .motion import BRAKES_MPS2, LEAST_S, OVER_S, RUNS_MPS2, SAME, Motion
 
+SIMILAR = 3.0
+"""An accelerometer feels so many times what the speed changes by at most, and a part as small: grades are not felt."""
+
 RUNS_MPS = 5.0
 """Slower wheels tell nothing of their radius."""
 
@@ -40,8 +43,10 @@ def felt(motion: Motion, form: Format) -> Iterator[str]:
         if unit != form.unit("acceleration") and abs(math.log(max(abs(ratio), 1e-9) / other)) < 2.0 * SAME:
             yield f"{told}: another unit? --acceleration-unit {unit}"
             return
-    if ratio < -0.5:
+    if -SIMILAR < ratio < -1.0 / SIMILAR:
         yield f"{told}: change its sign, it counts forward along the run"
+    elif not 1.0 / SIMILAR < ratio < SIMILAR:
+        yield f"{told}: in another unit, or along another axis than the track?"
 
 
 def rolling(motion: Motion, form: Format) -> Iterator[str]:

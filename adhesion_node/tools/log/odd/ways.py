@@ -44,8 +44,9 @@ def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
     """Positions and speeds tell the same way; if not, what the one is of the other tells why."""
     course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
     ratio = float((np.abs(course) * speed).sum() / (speed * speed).sum())
-    yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
-    if course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
+    if not motion.by_fixes:
+        yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
+    if not motion.by_fixes and course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
         yield "the speed is below 0 while the positions rise: change its sign, it counts forward along the run"
     told = f"the positions move at {ratio:.3g} times the speed"
     if abs(math.log(max(ratio, 1e-30))) < SAME:
@@ -57,13 +58,14 @@ def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
         other = pace_mps / SPEED_UNITS[form.unit("speed")] / (place_m / POSITION_UNITS[form.unit("position")])
         return abs(math.log(max(ratio, 1e-30) / other))
 
-    nearest = place, pace = min(product(POSITION_UNITS, SPEED_UNITS), key=off)
+    places = [form.unit("position")] if motion.by_fixes else POSITION_UNITS
+    nearest = place, pace = min(product(places, SPEED_UNITS), key=off)
     if off(nearest) < SAME:
         cures = [f"--position-unit {place}"] * (place != form.unit("position"))
         cures += [f"--speed-unit {pace}"] * (pace != form.unit("speed"))
         yield f"{told}: another unit? {' '.join(cures)}"
         return
-    if ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
+    if not motion.by_fixes and ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
         yield f"{told}: are they degrees? --lat COL --lon COL"
     else:
         yield f"{told}: are both units right, is the speed that of a wheel which slid?"
