@@ -8,13 +8,16 @@
 
 """Replays many recordings on all cores; writes a table of all their brakings, and a map of the rail by place and date.
 
-A recording that cannot be used is said and left out. What is finished is kept, so that a killed call goes on.
+A recording that cannot be used is said and left out. A braking counts once, however often it is given or copied. What
+is finished is kept, so that a killed call goes on.
 """
 
 import argparse
+import os
 import sys
 from array import array
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -117,16 +120,14 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _work(options: argparse.Namespace) -> int:
-    for path in filter(None, (options.output, options.map)):
-        if Path(path).suffix not in ENDINGS:
-            raise ValueError(f"output = {path}: give a file that ends in {' or '.join(ENDINGS)}")
+    _check_files(options)
     if not 1.0 <= options.cell <= 1e5:
         raise ValueError(f"cell = {options.cell}: give a length of 1 to 100000 m")
     values = offline.parameters_of(options)
     setup = setup_of(values)
     if values.get(TRAIN_FILE.name):  # by its contents, which may change under its name
         values = {**read_train(values.pop(TRAIN_FILE.name)).values, **values}
-    tasks = [_recording(text, values, options) for text in options.bags]
+    tasks = _once([_recording(text, values, options) for text in options.bags])
     failed, rows, cells = dict[str, str](), [], []
     for task, found in zip(tasks, run_all(tasks, running(options)), strict=True):
         if str(found["failed"]):
@@ -137,22 +138,65 @@ def _work(options: argparse.Namespace) -> int:
         cells.append(pd.DataFrame(found["cells"]))
     result: dict[str, Any] = {"train": setup.train, "recordings": len(rows), "failed": failed, "brakings": 0}
     if rows:
-        table = table_of(rows)
+        table = table_of(_without_copies(pd.concat(rows)))
         _write(table, options.output)
         result |= {"brakings": len(table), "output": options.output, **_summary(table)}
     if rows and options.map:
-        rail = map_of(pd.concat(cells), options.cell)
+        _say_undated(table)
+        rail = map_of(pd.concat(cells).drop_duplicates(), options.cell)
         _write(rail, options.map)
         result |= {"map": options.map, "pieces": int(rail["place_m"].nunique())}
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return FAILED if failed or not rows else DONE
 
 
-def table_of(rows: Sequence[pd.DataFrame]) -> pd.DataFrame:
+def table_of(rows: pd.DataFrame) -> pd.DataFrame:
     """One row per braking, in the order of time."""
-    table = pd.concat(rows).sort_values("t_ns", ignore_index=True)
+    table = rows.sort_values("t_ns", ignore_index=True)
     table.insert(0, "time", pd.to_datetime(table["t_ns"], utc=True))
     return table[["train", "recording", *table.columns.drop(["train", "recording"])]]
+
+
+def _check_files(options: argparse.Namespace) -> None:
+    """Raise ValueError for a file that cannot be written as it is named, or that would take another's place."""
+    for name, path in (("output", options.output), ("map", options.map)):
+        if path and Path(path).suffix not in ENDINGS:
+            raise ValueError(f"{name} = {path}: give a file that ends in {' or '.join(ENDINGS)}")
+    named = [(name, path) for name in ("output", "map", "json") if (path := getattr(options, name))]
+    for (one, path), (other, again) in combinations(named, 2):
+        if os.path.realpath(path) == os.path.realpath(again):
+            raise ValueError(f"--{one} {path} and --{other} {again}: both are one file: give each its own")
+
+
+def _once(tasks: Sequence[Recording]) -> list[Recording]:
+    """Say which recordings are given more than once, as by overlapping patterns, and take the first of each."""
+    by_place = dict[str, list[Recording]]()
+    for task in tasks:
+        by_place.setdefault(os.path.realpath(task.path), []).append(task)
+    for first, *more in by_place.values():
+        if more:
+            counted = f"is given {1 + len(more)} times, and counts once, as of train {first.train}"
+            print(f"brakings: {first.path}: {counted}: give it once", file=sys.stderr)
+    return [first for first, *_ in by_place.values()]
+
+
+def _without_copies(rows: pd.DataFrame) -> pd.DataFrame:
+    """Say which brakings are copies, and take the first of each: no two agree in their stamps and in every number."""
+    numbers = list(BRAKING.names or ())
+    copied = rows.duplicated(numbers)
+    first = rows.groupby(numbers, dropna=False)["recording"].transform("first")
+    for (path, of), count in rows.assign(of=first)[copied].groupby(["recording", "of"]).size().items():
+        shared = f"{count} of its brakings are those of {of}, and count once"
+        print(f"brakings: {path}: {shared}: give one of both", file=sys.stderr)
+    return rows[~copied]
+
+
+def _say_undated(table: pd.DataFrame) -> None:
+    """A date of 1970 is that of a clock which began at 0."""
+    undated = table["recording"][table["time"].dt.year == 1970].unique()
+    if undated.size:
+        what = "stamps of 1970, as of a clock that began at 0, tell no date, and the map no age"
+        print(f"brakings: {', '.join(undated)}: {what}: stamp them in UTC, or import logs with dates", file=sys.stderr)
 
 
 def _recording(text: str, values: dict[str, Any], options: argparse.Namespace) -> Recording:

@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 from pathlib import Path
 
 import pandas as pd
 import pytest
+import test_offline
 from test_offline import NO_TRUTH, samples, write_run
 
 from adhesion_node.run.results.rail_map import map_of
@@ -68,6 +70,63 @@ def test_what_is_finished_is_kept(bags: Path, tmp_path: Path) -> None:
     assert ((tmp_path / "brakings.csv").read_bytes(), kept.stat().st_mtime_ns) == (first, written)
 
 
+@pytest.mark.parametrize("copied", [False, True])
+def test_a_braking_counts_once_however_often_it_is_given(
+    copied: bool, bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monday, tuesday, again = bags / "monday", bags / "tuesday", tmp_path / "again"
+    if copied:
+        shutil.copytree(monday, again)
+    else:
+        again.symlink_to(monday, target_is_directory=True)
+    table, rail = tmp_path / "brakings.csv", tmp_path / "rail.csv"
+    options = ["--output", str(table), "--map", str(rail), "--cache", str(tmp_path / "cache")]
+    assert brakings.main([str(monday), str(tuesday), *options]) == 0
+    once = table.read_bytes(), rail.read_bytes()
+    assert capfd.readouterr().err == ""
+    assert brakings.main([str(monday), str(again), str(tuesday), *options]) == 0
+    assert (table.read_bytes(), rail.read_bytes()) == once
+    said = {
+        True: f"brakings: {again}: 1 of its brakings are those of {monday}, and count once: give one of both",
+        False: f"brakings: {monday}: is given 2 times, and counts once, as of train monday: give it once",
+    }
+    assert capfd.readouterr().err.splitlines() == [said[copied]]
+
+
+def test_stamps_without_a_date_are_said_of_a_map(
+    bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(test_offline, "START_NS", 0)
+    write_run(tmp_path / "undated", samples(15.0, 30.0), names=NO_TRUTH)
+    table, rail = str(tmp_path / "brakings.csv"), str(tmp_path / "rail.csv")
+    options = ["--output", table, "--cache", str(tmp_path / "cache")]
+    assert brakings.main([str(tmp_path / "undated"), str(bags / "monday"), *options, "--map", rail]) == 0
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith(f"brakings: {tmp_path / 'undated'}: stamps of 1970")
+    assert line.endswith(": stamp them in UTC, or import logs with dates")
+    assert brakings.main([str(tmp_path / "undated"), *options]) == 0
+    assert capfd.readouterr().err == "", "a table tells no age"
+
+
+@pytest.mark.parametrize("other", ["--map", "--json"])
+@pytest.mark.parametrize("path", ["table.csv", "./table.csv", "link.csv"])
+def test_no_file_takes_the_place_of_the_table(
+    other: str,
+    path: str,
+    bags: Path,
+    tmp_path: Path,
+    capfd: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("link.csv").symlink_to("table.csv")
+    assert brakings.main([str(bags / "monday"), "--output", "table.csv", other, path, "--cache", "cache"]) == 2
+    said = f"brakings: --output table.csv and {other} {path}: both are one file: give each its own"
+    assert capfd.readouterr().err.splitlines() == [said]
+    assert not Path("table.csv").exists()
+    assert not Path("cache").exists(), "nothing is replayed"
+
+
 def test_a_name_of_bytes_that_are_no_text_is_escaped(bags: Path, tmp_path: Path) -> None:
     named, table = tmp_path / os.fsdecode(b"t\xff"), tmp_path / "brakings.csv"
     named.symlink_to(bags / "monday", target_is_directory=True)
@@ -104,6 +163,7 @@ def test_the_map_says_how_often_where_and_when() -> None:
     ("options", "said"),
     [
         (["--output", "brakings.xlsx"], "output = brakings.xlsx: give a file that ends in .csv or .parquet"),
+        (["--output", "b.csv", "--map", "m.txt"], "map = m.txt: give a file that ends in .csv or .parquet"),
         (["--output", "b.csv", "--cell", "0"], "cell = 0.0: give a length of 1 to 100000 m"),
         (["--output", "b.csv", "--workers", "0"], "workers = 0: give at least 1"),
         (["--output", "b.csv", "--set", "start_mu=2"], "start_mu = 2.0: give a value from 0 to 1"),

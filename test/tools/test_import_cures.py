@@ -94,7 +94,8 @@ def test_a_date_that_names_its_zone_is_in_no_other(importing: Import, written: s
 
 
 def test_a_date_without_a_zone_is_in_the_one_that_is_told(importing: Import) -> None:
-    assert importing("time,position\n2024-11-21 00:00:00,1\n2024-11-21 00:00:01,2\n", "--time-zone", "Europe/Berlin") == 0
+    log = "time,position\n2024-11-21 00:00:00,1\n2024-11-21 00:00:01,2\n"
+    assert importing(log, "--time-zone", "Europe/Berlin") == 0
     assert pd.Timestamp(importing.positions()[0].t_ns) == pd.Timestamp("2024-11-20 23:00:00")
 
 

@@ -19,6 +19,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag2 import Reader
+from test_bag_damaged import index_of
 from test_recording_survives import file_size_limit
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
@@ -26,7 +27,7 @@ from adhesion_node.bag.qos import LATCHED
 from adhesion_node.bag.types import Definition
 from adhesion_node.bag.write.writer import file_name
 from adhesion_node.tools import recover
-from adhesion_node.wire.topics import BRAKING_CURVE, POSITION
+from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, POSITION
 
 S = 10**9
 
@@ -64,6 +65,51 @@ def test_an_interrupted_recording_becomes_complete(tmp_path: Path, capsys: pytes
         assert after.complete
         assert after.infos["/curve"].offered == (LATCHED,)
         assert it.message_count == len(read) == sum(summary["messages"].values()) > 100
+
+
+def damaged_first_chunk(path: Path) -> Path:
+    """Damage the chunk that names the type of /early and /late; that of /pressure is named in a later one."""
+    with BagWriter(path) as writer:
+        for number, (name, topic) in enumerate(
+            {"/early": POSITION, "/late": POSITION, "/pressure": BRAKE_PRESSURE}.items()
+        ):
+            for step in range(10):
+                t_ns = number * S + step * S // 100
+                cdr = cdrs.position(t_ns, 0.0, 0.25) if topic is POSITION else cdrs.brake_pressure(t_ns, 1e5)
+                writer.write(name, topic.type, cdr, t_ns)
+            writer.flush()
+    file = path / file_name(0)
+    data = bytearray(file.read_bytes())
+    data[index_of(file).chunk_indexes[0].chunk_start_offset + 100] ^= 0xFF
+    file.write_bytes(data)
+    (path / "metadata.yaml").unlink()
+    return file
+
+
+def test_a_type_that_a_damaged_chunk_named_is_that_of_the_end(tmp_path: Path) -> None:
+    file = damaged_first_chunk(tmp_path / "bag")
+    summary = recover.recover(file, tmp_path / "whole")
+    assert summary["messages"] == {"/late": 10, "/pressure": 10}
+    (damage,) = summary["damage"]
+    assert "is damaged at byte" in damage
+    with BagReader(tmp_path / "whole") as reader:
+        assert reader.topics == {"/late": POSITION.type, "/pressure": BRAKE_PRESSURE.type}
+        assert all(record.is_whole for record in reader.messages())
+
+
+def test_a_topic_whose_type_is_lost_is_said_and_all_others_are_rescued(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = damaged_first_chunk(tmp_path / "bag")
+    last = index_of(file).chunk_indexes[-1]
+    with file.open("r+b") as stream:
+        stream.truncate(last.chunk_start_offset + last.chunk_length)
+    assert recover.main([str(file), "--output", str(tmp_path / "whole")]) == 0
+    out, err = capsys.readouterr()
+    assert f"{file}: 10 messages of /late are left out, their type is lost" in err.splitlines()
+    assert "10 /pressure" in out.splitlines()
+    with BagReader(tmp_path / "whole") as reader:
+        assert reader.counts == {"/pressure": 10}
 
 
 def test_recovering_twice_changes_nothing(tmp_path: Path) -> None:

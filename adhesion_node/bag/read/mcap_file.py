@@ -9,7 +9,8 @@
 """Reads one MCAP file whether or not its recording was finished.
 
 The index at the end of a file is missing when the recorder died, so it is not used at all: one pass over the file
-finds the blocks (chunks, or single messages outside of chunks), the topics and the first place that is damaged.
+finds the blocks (chunks, or single messages outside of chunks), the topics and the places that are damaged. What the
+end repeats of topics and types is taken where the chunk that said it first is lost.
 Messages are then read block by block, one block at a time in memory.
 """
 
@@ -68,7 +69,8 @@ class McapFile:
         self.counts: Counter[int] = Counter()
         self.blocks: list[Block] = []
         self.damage: list[str] = []
-        self._schemas: dict[int, Schema] = {}
+        self._types: dict[int, tuple[str, Definition]] = {}
+        self._channels: dict[int, Channel] = {}
         with path.open("rb") as stream:
             self._scan(stream)
 
@@ -94,7 +96,8 @@ class McapFile:
                 counted = _messages(stream.read(length))
             if opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
                 self._take_block(opcode, offset, stream.read(length))
-        if nameless := sum(count for channel, count in self.counts.items() if channel not in self.topics):
+        self._name_topics()
+        if nameless := sum(count for channel, count in self.counts.items() if channel not in self._channels):
             self.damage.append(f"{self.path}: {nameless} messages are left out, the names of their topics are lost")
         missing = counted - sum(self.counts.values())
         if missing > 0 and not self.damage:  # a chunk whose kind one wrong bit has changed looks like nothing at all
@@ -126,13 +129,19 @@ class McapFile:
         """
         for record in records:
             if isinstance(record, Schema):
-                self._schemas.setdefault(record.id, record)
+                self._types.setdefault(record.id, (record.name, Definition(record.encoding, record.data.decode())))
             else:
-                schema = self._schemas.get(record.schema_id) or Schema(id=0, data=b"", encoding="", name="")
-                known_as = Definition(schema.encoding, schema.data.decode())
-                offered = parse(record.metadata.get("offered_qos_profiles", ""))
-                info = TopicInfo(record.topic, schema.name, record.message_encoding, known_as, offered)
-                self.topics.setdefault(record.id, info)
+                self._channels.setdefault(record.id, record)
+
+    def _name_topics(self) -> None:
+        """Give the channels their types, which a damaged chunk took along where the end does not repeat them."""
+        for number, channel in self._channels.items():
+            kind, known_as = self._types.get(channel.schema_id, ("", Definition("", "")))
+            if kind:
+                offered = parse(channel.metadata.get("offered_qos_profiles", ""))
+                self.topics[number] = TopicInfo(channel.topic, kind, channel.message_encoding, known_as, offered)
+            elif count := self.counts[number]:
+                self.damage.append(f"{self.path}: {count} messages of {channel.topic} are left out, their type is lost")
 
 
 def _records(stream: BinaryIO) -> Iterator[tuple[int, int, int]]:
