@@ -14,10 +14,12 @@ is not installed says how to get it: the nodes of a train run with rclpy, numpy,
 
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 
-from .command.signals import stop_on_signals
+from .command.signals import interrupted, stop_on_signals
+from .command.streams import open_closed_streams
 
 Program = Callable[[], int]
 
@@ -41,26 +43,30 @@ def _node(module: str) -> Program:
 
 
 def _replay() -> int:
-    """It is also a tool: it takes the signals over itself where it is a node."""
+    """With --offline it is a tool; else a node, which takes the signals over itself."""
+    module = "adhesion_node.nodes.replay"
+    if "--offline" in sys.argv[1:]:
+        return _tool(module)()
     with stop_on_signals() as stop:
-        program = _main_of("adhesion_node.nodes.replay")
+        program = _main_of(module)
     return 0 if stop.requested else program()
 
 
 def _tool(module: str) -> Program:
     def main() -> int:
-        with stop_on_signals() as stop:
-            program = _main_of(module)
-        if not stop.requested:
-            return program()
-        print(f"{module.removesuffix('.__main__').rpartition('.')[2]}: interrupted", file=sys.stderr)
-        return 1
+        with suppress(KeyboardInterrupt):  # it may come before the program minds it, or after
+            with stop_on_signals() as stop:
+                program = _main_of(module)
+            if not stop.requested:
+                return program()
+        return interrupted(module.removesuffix(".__main__").rpartition(".")[2])
 
     return _saying_what_is_missing(main)
 
 
 def _saying_what_is_missing(program: Program) -> Program:
     def main() -> int:
+        open_closed_streams()
         try:
             return program()
         except ModuleNotFoundError as error:

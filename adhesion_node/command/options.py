@@ -21,6 +21,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
+from .signals import interrupted
+from .streams import open_closed_streams
+
 Item = TypeVar("Item")
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
@@ -120,18 +123,19 @@ def run_tool(
     """Parse the command line, do the work and return the exit code.
 
     A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback, and
-    none at all where nobody reads on, as behind `| head`. Bad usage ends the program with 2 (SystemExit). Asked by a
-    shell, it says how the command line may go on and ends.
+    none at all where nobody reads on, as behind `| head`, or a stream is closed. Bad usage ends the program with 2
+    (SystemExit). Asked by a shell, it says how the command line may go on and ends.
     """
+    open_closed_streams()
     try:
         try:
             return _worked(parser, work, args)
         finally:
             sys.stdout.flush()
-    except BrokenPipeError:
+    except OSError as error:
         with suppress(io.UnsupportedOperation):  # what waits to be written would complain at the program's end
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return FAILED
+        return FAILED if isinstance(error, BrokenPipeError) else _failed(parser, error)
 
 
 def _worked(
@@ -151,12 +155,11 @@ def _worked(
     except BrokenPipeError:
         raise
     except OSError as error:
-        remedy = REMEDIES.get(type(error), "")
-        return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}", FAILED)
+        return _failed(parser, error)
     except (KeyboardInterrupt, SystemError) as error:
         if not _is_interrupt(error):
             raise
-        return _complain(parser, "interrupted", FAILED)
+        return interrupted(parser.prog)
 
 
 def printable(path: str) -> str:
@@ -204,6 +207,11 @@ def progress(items: Iterable[Item], noun: str, total: int | None = None) -> Iter
             due = now + PROGRESS_S
             print(f"{count}{of_all} {noun}", file=sys.stderr)
         yield item
+
+
+def _failed(parser: argparse.ArgumentParser, error: OSError) -> int:
+    remedy = REMEDIES.get(type(error), "")
+    return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}", FAILED)
 
 
 def _complain(parser: argparse.ArgumentParser, message: str, code: int) -> int:

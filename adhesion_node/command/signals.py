@@ -9,6 +9,7 @@
 """SIGINT and SIGTERM as a request to stop. Standard library alone, so that it is there before anything heavy is."""
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -23,6 +24,12 @@ class StopRequest:
 
     def __init__(self) -> None:
         self.requested = False
+
+
+def interrupted(program: str) -> int:
+    """Say that a tool was; return its exit code, which is that of a failure."""
+    print(f"{program}: interrupted", file=sys.stderr)
+    return 1
 
 
 _watching: list[StopRequest] = []

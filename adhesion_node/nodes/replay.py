@@ -25,6 +25,7 @@ from ..command.options import (
     run_tool,
     setting_options,
 )
+from ..command.signals import stop_on_signals
 from ..wire.topics import POSITIONS, TRACTION_FORCE
 
 EXAMPLES = (
@@ -44,9 +45,10 @@ def main(args: Sequence[str] | None = None) -> int:
     arguments = list(sys.argv[1:] if args is None else args)
     if "--offline" in arguments:
         return run_tool(_parser(), _offline, arguments)
-    # Only here: ROS is neither needed nor loaded for --offline.
-    from .ros import runtime
-
+    with stop_on_signals() as stop:
+        from .ros import runtime  # only here: ROS is neither needed nor loaded for --offline
+    if stop.requested:
+        return DONE
     own, ros = runtime.split_ros_arguments(arguments)
     return run_tool(_parser(), partial(_live, ros=ros), own)
 
@@ -68,7 +70,7 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
             return nodes[0]
 
         code = runtime.run(make_node, ros)
-        if code != DONE:
+        if code != DONE or not nodes:  # a signal may come before there is one
             return code
         (node,) = nodes
         complete = node.finished and node.failure is None

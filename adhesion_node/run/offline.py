@@ -84,9 +84,11 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
 def _remarks(pipeline: Pipeline, why: str | None, brake: str | None) -> Iterator[str]:
     """What a person must hear: nothing is identified, much was dropped, its brake, that it runs back, or elsewhere."""
     for reason, count in pipeline.dropped.items():
-        if count > MANY * pipeline.measurements:
+        is_line = reason == Reason.NO_TRACK_LINE.name  # that is no fault now and then: it is all fixes
+        if is_line or count > MANY * pipeline.measurements:
             known = [kind[reason].value for kind in (Outcome, Reason) if reason in kind.__members__]
-            yield f"{count} messages were dropped: {reason}" + "".join(f": {text}" for text in known)
+            what = "fixes" if is_line else "messages"
+            yield f"{count} {what} were dropped: {reason}" + "".join(f": {text}" for text in known)
     if why is not None:
         yield f"nothing is identified: {why}"
     elif pipeline.back_m > BACK_M:
@@ -138,6 +140,8 @@ def feed(
     """Push the messages of `inputs`; yield each sample, what it completed and how long that took, s."""
     reader = Reader(inputs, line)
     topics = {topic.name: topic for topic in reader.inputs}
+    if line.position_source == "auto" and FIX in inputs:
+        topics[FIX.name] = FIX  # without a track line it is none of the reader's: refused, it is counted, and told
     for name, message, _ in recorded:
         if isinstance(message, Rejected):
             pipeline.refuse(name, message.reason)

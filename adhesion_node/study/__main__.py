@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
+from ..command.signals import interrupted, stop_on_signals
 
 PURPOSE = "Reproduces the figures of the papers, and shows what follows from them."
 
@@ -77,9 +78,16 @@ class _Study(argparse.ArgumentParser):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run one study."""
+    with stop_on_signals() as stop:  # a study's module brings numpy and numba, whose import no Ctrl-C may cut off
+        parser = _parser(sys.argv[1:] if args is None else args)
+    return interrupted(parser.prog) if stop.requested else run_tool(parser, _run, args)
+
+
+def _parser(args: Sequence[str]) -> argparse.ArgumentParser:
+    """Return the parser of all studies; those that `args` name, or a shell asks for, have their options."""
     parser = argparse.ArgumentParser("study", **help_texts(PURPOSE, *(f"study {name}" for name in STUDIES)))
     studies: Any = parser.add_subparsers(metavar="NAME", required=True, parser_class=_Study)
-    asked = {*(sys.argv[1:] if args is None else args), *os.environ.get("COMP_LINE", "").split()}
+    asked = {*args, *os.environ.get("COMP_LINE", "").split()}
     for name, (module, summary, options) in STUDIES.items():
         study = import_module(f".{module}", __package__) if name in asked else None
         texts = help_texts((study and study.__doc__) or summary, f"study {name}", f"study {name} {options}")
@@ -87,7 +95,7 @@ def main(args: Sequence[str] | None = None) -> int:
         if study:
             study.add_options(own)
             own.set_defaults(run=study.run)
-    return run_tool(parser, _run, args)
+    return parser
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -13,6 +13,7 @@ import io
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -47,6 +48,20 @@ def test_nothing_is_said_where_nobody_reads_on(lines: int) -> None:
         command = [sys.executable, "-c", program]
         ended = subprocess.run(command, check=False, stdout=unread, stderr=subprocess.PIPE, text=True)
     assert (ended.returncode, ended.stderr) == (FAILED, "")
+
+
+@pytest.mark.parametrize("lines", [0, 1, 100_000])
+def test_a_full_disk_is_one_line(lines: int) -> None:
+    """Whenever it shows: at the end, while the work prints, or, with 0 lines, at --version."""
+    program = (
+        "import argparse, sys; from adhesion_node.command.options import run_tool\n"
+        f"sys.exit(run_tool(argparse.ArgumentParser('tool'), lambda _: print('line\\n' * {lines}) or 0))"
+    )
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    command = [sys.executable, "-c", program, *([] if lines else ["--version"])]
+    with Path("/dev/full").open("w") as full:
+        ended = subprocess.run(command, check=False, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
+    assert (ended.returncode, ended.stderr) == (FAILED, "tool: input/output: No space left on device\n")
 
 
 def broken(_: argparse.Namespace) -> int:

@@ -33,9 +33,10 @@ from recorded import write_steps
 from rosbags.rosbag2 import StoragePlugin, Writer
 
 from adhesion_node.bag import BagReader, BagWriter, Record, select, serialize, typestore
+from adhesion_node.command.options import DONE
 from adhesion_node.nodes import player, replay
 from adhesion_node.nodes.player import Replay
-from adhesion_node.nodes.ros import discovery
+from adhesion_node.nodes.ros import discovery, runtime
 from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, subscribe
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU
@@ -302,6 +303,12 @@ def test_an_unreadable_bag_is_one_line_and_code_2(tmp_path: Path, capsys: pytest
     assert replay.main([str(tmp_path / "x.mcap")]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "x.mcap: is not an MCAP file: name another recording" in line
+
+
+def test_a_signal_before_the_node_is_there_is_a_clean_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_steps(tmp_path / "bag", 2)
+    monkeypatch.setattr(runtime, "run", lambda *_: DONE)
+    assert replay.main([str(tmp_path / "bag")]) == DONE
 
 
 def test_offline_needs_no_ros() -> None:

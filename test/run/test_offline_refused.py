@@ -28,10 +28,10 @@ from test_offline import (
     write_run,
 )
 
-from adhesion_node.bag import deserialize, serialize
+from adhesion_node.bag import BagWriter, deserialize, encode, serialize
 from adhesion_node.nodes import replay
 from adhesion_node.wire.topic import Topic
-from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
+from adhesion_node.wire.topics import BRAKE_PRESSURE, FIX, POSITION, SPEED
 
 __all__ = ["bag", "offline"]
 
@@ -144,6 +144,39 @@ def test_a_bag_without_any_estimate_has_failed(tmp_path: Path, offline: Offline)
     assert set(result) == KEYS | {"why"}
     assert (result["measurements"], result["accepted"], result["dropped"]) == (20, 0, {"BAD_VARIANCE": 20})
     assert [result[key] for key in ("mu_final", "mu_lower_final", "regime_final", "windows")] == [None, None, None, 0]
+
+
+def write_fixes(path: Path, count: int, beside: Topic) -> None:
+    """Record a speed or a position, and as many fixes."""
+    with BagWriter(path) as writer:
+        for index in range(100):
+            t_ns = START_NS + index * 10**8
+            writer.write(f"/{BRAKE_PRESSURE.name}", BRAKE_PRESSURE.type, cdrs.brake_pressure(t_ns, 101_325.0), t_ns)
+            value = 40.0 if beside is SPEED else 4.0 * index
+            writer.write(f"/{beside.name}", beside.type, encode(beside, t_ns, (value,), 0.25), t_ns)
+            if index < count:
+                writer.write(f"/{FIX.name}", FIX.type, encode(FIX, t_ns, (47.0 + 4e-5 * index, 8.0, 500.0), 1.0), t_ns)
+
+
+@pytest.mark.parametrize(("count", "beside"), [(100, SPEED), (100, POSITION), (3, POSITION)])
+def test_fixes_without_a_track_line_are_told(count: int, beside: Topic, tmp_path: Path, offline: Offline) -> None:
+    write_fixes(tmp_path / "fixes", count, beside)
+    write_fixes(tmp_path / "none", 0, beside)
+    told, without = offline(tmp_path / "fixes"), offline(tmp_path / "none")
+    remedy = "NO_TRACK_LINE: set track_line to a GeoJSON or CSV file with the centre line of the track"
+    assert f"replay: {count} fixes were dropped: {remedy}" in told.err
+    assert told.result["dropped"] == {**without.result["dropped"], "NO_TRACK_LINE": count}
+    assert told.result["measurements"] == without.result["measurements"] + count
+    assert told.result["digest"] == without.result["digest"]
+    assert not any("fixes" in line for line in without.err)
+
+
+def test_fixes_that_are_not_wanted_are_not_missed(tmp_path: Path, offline: Offline) -> None:
+    write_fixes(tmp_path / "fixes", 100, POSITION)
+    named = offline(tmp_path / "fixes", "--set", "position_source=position")
+    assert (named.result["measurements"], named.result["dropped"]) == (100, {})
+    off = offline(tmp_path / "fixes", "--set", "use_fix=false")
+    assert off.result["dropped"] == {"SWITCHED_OFF": 100}
 
 
 def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offline) -> None:

@@ -106,8 +106,8 @@ def test_of_several_sources_the_best_that_is_heard_counts(way: list[tuple[float,
     alone = run(messages(way, POSITION))
     both = run(messages(way, POSITION, ODOMETRY, FIX))
     assert both.digest == alone.digest, "without a track line a fix is no source"
-    assert both.dropped == {"OTHER_SOURCE": 180}
-    assert both.measurements == 360
+    assert both.dropped == {"NO_TRACK_LINE": 180, "OTHER_SOURCE": 180}
+    assert both.measurements == 540
     fixed = run(messages(way, FIX, POSITION, ODOMETRY), track_line=track_line)
     assert fixed.digest == run(messages(way, FIX), track_line=track_line).digest
     named = run(messages(way, FIX, POSITION, ODOMETRY), track_line=track_line, position_source="odometry")

@@ -1,0 +1,69 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""A Ctrl-C before the tool itself minds it: one line and code 1, and nothing is said of a node that has not begun."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+INTERRUPTED = """
+import signal, sys
+from adhesion_node import main
+
+module = sys.argv[1]
+
+class CtrlC:
+    def find_spec(self, name, *_):
+        if name == module:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, CtrlC())
+program = getattr(main, sys.argv[2])
+del sys.argv[:2]
+sys.exit(program())
+"""
+"""A program that gets a Ctrl-C as the import of a module begins."""
+
+
+@pytest.mark.parametrize(
+    ("command", "module", "code"),
+    [
+        (["study", "distances"], "adhesion_node.study.__main__", 1),
+        (["study", "distances"], "adhesion_node.study.xie.distances", 1),
+        (["replay", "a_bag", "--offline"], "adhesion_node.nodes.replay", 1),
+        (["replay", "a_bag"], "adhesion_node.nodes.replay", 0),
+        (["replay", "a_bag"], "adhesion_node.nodes.ros.runtime", 0),
+    ],
+)
+def test_a_ctrl_c_while_a_module_is_imported(command: list[str], module: str, code: int) -> None:
+    call = [sys.executable, "-c", INTERRUPTED, module, *command]
+    ended = subprocess.run(call, capture_output=True, text=True, timeout=60.0, cwd=ROOT, check=False)
+    said = f"{command[0]}: interrupted\n" if code else ""
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", said)
+
+
+EARLY = """
+import signal, sys
+from types import SimpleNamespace
+from adhesion_node import main
+
+main.import_module = lambda _: SimpleNamespace(main=lambda: signal.raise_signal(signal.SIGINT))
+sys.exit(main.train())
+"""
+"""A tool that gets a Ctrl-C as its own main begins."""
+
+
+def test_a_ctrl_c_between_the_import_and_the_work() -> None:
+    call = [sys.executable, "-c", EARLY]
+    ended = subprocess.run(call, capture_output=True, text=True, timeout=60.0, cwd=ROOT, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (1, "", "train: interrupted\n")
