@@ -62,18 +62,17 @@ class Stepping(NamedTuple):
         """Take in a measurement; its position, if it has one, lies so far off what `memory` had foreseen."""
         if not measurement.has_position:
             return self._replace(since=(*self.since, measurement)) if self.before is not None else self
-        alike_m = ALIKE_SIGMA * math.sqrt(measurement.variance_m2)
-        first_m = self.off_m[0] if self._waits(config) else 0.0
-        within_m = NEAR * config.position_step_std_m if self.is_far(config) else min(alike_m, abs(first_m))
-        if abs(off.metres - first_m) < within_m:  # never by a first one of 0: there is none
-            return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
+        alike_m, near_m = ALIKE_SIGMA * math.sqrt(measurement.variance_m2), NEAR * config.position_step_std_m
+        if self._waits(config):
+            within_m = near_m if self.is_far(config) else min(alike_m, abs(self.off_m[0]))
+            if abs(off.metres - self.off_m[0]) < within_m:
+                return self._replace(since=(*self.since, measurement), off_m=(*self.off_m, off.metres))
         calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m, by_m=self.by_m)
         if not abs(off.metres) > FIRST_SIGMA * off.std_m:
             return calm
         spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
         back = abs(off.metres + self.by_m) < max(alike_m, BACK * abs(self.by_m))
         abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
-        near_m = NEAR * config.position_step_std_m
         plain = abs(off.metres) <= near_m or (off.std_m < near_m and off.nearest > FIRST_SIGMA)
         if (spaced or back) and abrupt and plain:  # else they tell where the train is
             return calm._replace(before=memory, since=(measurement,), off_m=(off.metres,))

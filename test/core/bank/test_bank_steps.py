@@ -101,6 +101,11 @@ def test_a_far_step_lies_off_alike_for_two_seconds(off_m: list[float | None], si
     assert seen(off_m).size_m(CALM, 1.0) == pytest.approx(size_m)
 
 
+@pytest.mark.parametrize("off_m", [[0.1, 2.4, 2.4, 2.4, 0.3], [0.1, *[50.0] * 21, 3.0]])
+def test_what_was_decided_is_over(off_m: list[float | None]) -> None:
+    assert not seen(off_m).off_m
+
+
 def test_a_step_moves_where_the_train_is_and_not_how_fast() -> None:
     memory = met(CALM, Measurement(S, 1000.0, 0.25, 0.0, 40.0))
     for k in range(1, 30):
