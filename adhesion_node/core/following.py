@@ -15,9 +15,9 @@ from .banked import follow_banked, last_banked
 from .config import Config
 from .estimate import Estimate, blind_estimate
 from .intake.outcome import Event, Outcome
-from .intake.plausibility import KMH_PER_MPS, in_mps, is_kmh
+from .intake.plausibility import KMH_PER_MPS, believed, in_mps, is_kmh
 from .intake.samples import Measurement
-from .intake.standing import HELD_MPS, moving
+from .intake.standing import moving
 from .state import State
 from .windowed import follow_windowed, last_window
 
@@ -30,7 +30,7 @@ SURE_SIGMA = 3.0
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
-    seen, placed, shown = state.seen, measurement.has_position, _shown(config, measurement)
+    seen, placed = state.seen, measurement.has_position
     measurement, standing, silent = moving(measurement, state.standing, state.pace)
     state = state._replace(standing=standing).told(*silent)
     if placed:
@@ -45,15 +45,14 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
             measurement = measurement._replace(variance_m2=math.inf)
     else:
         repeated = state.repeated
-    pace = state.pace.after(measurement, [each for each in shown if abs(each) >= HELD_MPS])
+    pace = state.pace.after(measurement, _shown(config, measurement))
+    measurement, belied = believed(measurement, pace)
     refused: tuple[Event, ...] = ()
     if measurement.speeds or measurement.speed_mps is not None:
         measurement, refused = in_mps(measurement, (pace.speed_mps, _surely(seen)))
-    belied = pace.belies and not state.pace.belies
-    if belied:
-        measurement = measurement._replace(speed_mps=None, speeds=())
-    state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace).told(*refused)
-    if belied or (refused and is_kmh(state.followed_mps, pace.speed_mps)):
+    is_other = (pace.belies and not state.pace.belies) or (refused and is_kmh(state.followed_mps, pace.speed_mps))
+    state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace).told(*belied, *refused)
+    if is_other:
         detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
         state = state.forgotten()._replace(pace=pace, standing=standing).told(Event(Outcome.RESET, detail))
     if state.method is None:

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Logs as recorders write them: each is read as it is meant, or said to be odd with the option that cures it."""
+"""How logs are written, and the options that say so: each is read as it is meant, or the option is said."""
 
 from __future__ import annotations
 
@@ -96,61 +96,6 @@ def test_the_header_is_found_below_a_preamble_of_empty_cells_whatever_its_names(
     assert "it has ['Laufzeit', 'Weg', 'speed', 'brake_pressure']" in importing.errors[0]
 
 
-@pytest.mark.parametrize(
-    ("written", "options", "first_ns"),
-    [
-        ("%H:%M:%S,%f", [], 29_703 * S),
-        ("%d.%m.%Y %H:%M:%S", [], 1_732_176_903 * S),
-        ("%d.%m.%Y %H:%M:%S,%f", ["--time-zone", "Europe/Berlin"], (1_732_176_903 - 3600) * S),
-        ("%d.%m.%y %H:%M:%S.%f", [], 1_732_176_903 * S),
-        ("%m/%d/%Y %H:%M:%S", [], 1_732_176_903 * S),
-        ("%Y-%m-%dT%H:%M:%S.%fZ", ["--time-zone", "Europe/Berlin"], 1_732_176_903 * S),
-        ("%Y-%m-%d %H:%M:%S", [], 1_732_176_903 * S),
-        ("%m/%d/%Y %I:%M:%S %p", [], 1_732_176_903 * S),
-        ("%m/%d/%Y %I:%M:%S.%f %p", [], 1_732_176_903 * S),
-        ("%Hh%Mm%S %d-%b-%Y", ["--time-format", "%Hh%Mm%S %d-%b-%Y"], 1_732_176_903 * S),
-    ],
-)
-def test_times_as_recorders_write_them(importing: Import, written: str, options: list[str], first_ns: int) -> None:
-    moments = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(range(30), unit="s")
-    rows = ride()[: 10 * len(moments) : 10].assign(time=moments.strftime(written))
-    assert importing(text(rows, ";"), *options) == 0, importing.errors
-    assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S for i in range(30)]
-
-
-@pytest.mark.parametrize(("unit", "per_s"), [("s", 1), ("ms", 10**3), ("us", 10**6), ("ns", 10**9)])
-def test_times_since_1970_tell_their_unit(importing: Import, unit: str, per_s: int) -> None:
-    begin = 1_732_176_903
-    assert importing(f"time,speed\n{begin * per_s},1\n{(begin + 1) * per_s},1\n") == 0
-    assert [SPEED.read(message).t_ns for message in importing.messages("speed")] == [begin * S, (begin + 1) * S]
-
-
-def test_a_time_that_is_written_in_no_known_way_is_told_with_the_option(importing: Import) -> None:
-    log = "time,speed\n8:15:03 o'clock,1\n8:15:04 o'clock,1\n"
-    assert importing(log) == 2
-    assert "say how with --time-format" in importing.errors[0]
-    assert importing(log, "--time-format", "%H:%M:%S o'clock") == 0
-
-
-def test_the_days_of_a_spreadsheet(importing: Import) -> None:
-    rows = ride()
-    log = text(rows.assign(time=45617.34378472 + rows.time / 86400.0))
-    assert importing(log) == 1
-    assert "are the times in days? --time-unit excel" in importing.errors[0]
-    importing.output = importing.output.with_name("cured")
-    assert importing(log, "--time-unit", "excel") == 0
-    first, *_, last = (sample.t_ns for sample in importing.positions())
-    assert first == pytest.approx(1_732_176_903 * S, abs=S / 100)
-    assert last - first == pytest.approx(59.9 * S, abs=S / 100)
-
-
-def test_a_clock_of_whole_seconds_is_told(importing: Import) -> None:
-    rows = ride()
-    assert importing(text(rows.assign(time=rows.time.astype(int)))) == 1
-    assert importing.errors[0].endswith("rows share a time: log it with the fraction of the second")
-    assert importing.summary["written"] == 60
-
-
 def test_a_decimal_comma_that_is_the_delimiter_too_is_told(importing: Import) -> None:
     assert importing("time,speed\n1,5,20,5\n") == 2
     assert "or is it the decimal sign, too? Then export with ';'" in importing.errors[0]
@@ -175,117 +120,6 @@ def test_what_stands_for_no_value_is_none(importing: Import, missing: str) -> No
     assert importing(text(ride().astype({"position": object}).assign(position=[1000.0, *[missing] * 9] * 60))) == 1
     assert (importing.summary["written"], importing.summary["empty"]) == (600, {"position": 540})
     assert len(importing.messages("brake_pressure")) == 600
-
-
-@pytest.mark.parametrize(
-    ("factor", "told"),
-    [
-        (1e-5, "is 3 pa at most: is it in bar? --pressure-unit bar: 3 bar"),
-        (1e-6, "is it in mpa? --pressure-unit mpa: 3 bar"),
-        (1e-2, "is it in mbar? --pressure-unit mbar: 3 bar"),
-        (
-            1.0 / 6894.757,
-            "is it in psi? --pressure-unit psi: 3 bar; per cent of a full brake are not read: give its pressure",
-        ),
-        (
-            100.3 / 3e5,
-            "is it in kpa or psi? --pressure-unit kpa: 1 bar; --pressure-unit psi: 6.9 bar; per cent of a full",
-        ),
-    ],
-)
-def test_pressures_in_another_unit_are_told(importing: Import, factor: float, told: str) -> None:
-    rows = ride()
-    assert importing(text(rows.assign(brake_pressure=(factor * rows.brake_pressure).round(6)))) == 1
-    assert [said for said in importing.summary["odd"] if told in said]
-
-
-def test_a_pressure_in_another_unit_than_the_option_says_is_told(importing: Import) -> None:
-    rows = ride()
-    assert importing(text(rows.assign(brake_pressure=rows.brake_pressure / 1e5)), "--pressure-unit", "kpa") == 1
-    assert "brake_pressure is 3 kpa at most: is it in bar? --pressure-unit bar: 3 bar" in importing.summary["odd"]
-
-
-@pytest.mark.parametrize("factor", [1.0, 1.0 / 9.80665, -1.0])
-def test_an_accelerometer_that_tells_of_another_motion_is_told(importing: Import, factor: float) -> None:
-    """0.8 m/s^2 under the brake, with a bias of 0.05 m/s^2."""
-    rows = ride().assign(acceleration=lambda rows: factor * (-0.8 * (rows.time >= 20.0) - 0.05))
-    importing(text(rows))
-    told = [said for said in importing.summary["odd"] if said.startswith("the acceleration is")]
-    cure = {1.0: None, -1.0: "change its sign"}.get(factor, "another unit? --acceleration-unit g")
-    assert len(told) == (cure is not None)
-    assert cure is None or cure in told[0]
-
-
-@pytest.mark.parametrize(
-    ("per_mps", "read_as", "unit"),
-    [
-        (1 / 0.46, "radps", None),
-        (1 / 0.35, "radps", None),
-        (1.0, "radps", "mps"),
-        (8.0, "radps", ""),
-        (0.2, "radps", ""),
-        (1 / 0.46, "rpm", "radps"),
-    ],
-)
-def test_wheels_that_turn_otherwise_than_the_train_runs_are_told(
-    importing: Import, per_mps: float, read_as: str, unit: str | None
-) -> None:
-    """Of a wheel of 0.46 m, and of a smaller one; the last are of no unit. What slides tells nothing."""
-    rows = ride().assign(wheel_speed_1=lambda rows: per_mps * rows.speed * np.where(rows.time > 30.0, 0.5, 1.0))
-    importing(text(rows), "--wheel-radius", "0.46", "--wheel-unit", read_as)
-    told = [said for said in importing.summary["odd"] if said.startswith("the wheels turn")]
-    assert len(told) == (unit is not None)
-    assert not unit or told[0].endswith(f"another unit? --wheel-unit {unit}")
-
-
-def test_all_that_is_odd_is_told_at_once(importing: Import) -> None:
-    rows = ride()
-    wrong = rows.assign(brake_pressure=rows.brake_pressure / 1e5, position=(120_000.0 - rows.position) / 1e3)
-    assert importing(text(wrong.assign(speed=3.6 * rows.speed))) == 1
-    told = " ".join(importing.summary["odd"])
-    assert all(cure in told for cure in ("--pressure-unit bar", "--direction down", "--position-unit km"))
-    assert "--speed-unit kmh" in told
-
-
-def test_the_clock_goes_on_after_midnight(importing: Import) -> None:
-    assert importing("time,speed\n23:59:59.9,1\n00:00:00.0,1\n00:00:00.1,1\n") == 0
-    times = [SPEED.read(message).t_ns for message in importing.messages("speed")]
-    assert np.diff(times).tolist() == [S // 10, S // 10]
-
-
-def test_the_end_of_summer_time_is_no_step_of_the_clock(importing: Import) -> None:
-    """At 3 o'clock it is 2 o'clock again."""
-    log = "time,speed\n27.10.2024 02:59:58,1\n27.10.2024 02:59:59,1\n27.10.2024 02:00:00,1\n27.10.2024 02:00:01,1\n"
-    assert importing(log, "--time-zone", "Europe/Berlin") == 0
-    assert np.diff([SPEED.read(message).t_ns for message in importing.messages("speed")]).tolist() == [S] * 3
-
-
-@pytest.mark.parametrize("written", ["%H%M%S.%f", "%H%M%S"])
-@pytest.mark.parametrize("begin", ["08:15:33", "12:59:30", "23:59:30"])
-def test_digits_of_a_clock_are_no_seconds(importing: Import, begin: str, written: str) -> None:
-    """As of NMEA: 081559 is followed by 081600."""
-    moments = pd.Timestamp(f"2024-11-21 {begin}") + pd.to_timedelta(range(150), unit="s")
-    rows = pd.DataFrame({"time": moments.strftime(written), "position": 40.0 * np.arange(150) + 1000.0})
-    assert importing(text(rows)) == 0, importing.errors
-    of_day_s = (pd.Timestamp(f"1970-01-01 {begin}") - pd.Timestamp(0)).total_seconds()
-    assert [sample.t_ns / S for sample in importing.positions()] == [of_day_s + i for i in range(150)]
-    importing.output = importing.output.with_name("seconds")
-    importing(text(rows), "--time-unit", "s")
-    told = "--time-format %H%M%S where the times are hhmmss, %H%M%S.%f with a fraction" in str(importing.errors)
-    assert told == (begin == "12:59:30"), "a step of 40 s is none among rows of a second"
-    importing.output = importing.output.with_name("format")
-    assert importing(text(rows), "--time-format", written) == 0
-
-
-@pytest.mark.parametrize(
-    "times", [range(200), range(1000, 1060), [*range(1000, 1060), *range(1100, 1130)], range(81530, 81730)], ids=str
-)
-def test_seconds_are_no_digits_of_a_clock(importing: Import, times: list[int]) -> None:
-    importing("time,speed\n" + "".join(f"{time},20\n" for time in times))
-    expected = list(times)
-    if expected[-1] == 1129:  # 16:59 is followed by 11:00
-        expected = [*range(600, 690)]
-    assert [SPEED.read(message).t_ns // S for message in importing.messages("speed")] == expected
 
 
 def test_unsorted_rows_are_sorted_on_demand_and_the_option_is_named(importing: Import, tmp_path: Path) -> None:
@@ -326,6 +160,16 @@ def test_the_brake_pipe_becomes_the_demand(importing: Import, capsys: pytest.Cap
     assert demanded[-3] == pytest.approx(300e3 * 0.55 / 1.5)
 
 
+@pytest.mark.parametrize("released", ["500000", "0", "-5", "nan", "inf"])
+def test_a_pipe_is_released_at_a_pressure_that_pipes_have(importing: Import, released: str) -> None:
+    log = "time,position,pipe\n0,0,5.0\n1,30,5.0\n2,60,3.5\n"
+    options = "--pipe", "pipe", "--pressure-unit", "bar"
+    assert importing(log, *options, "--pipe-released", released) == 2
+    assert f"pipe-released = {released} bar: give what the pipe has" in importing.errors[0]
+    assert "2 to 12 bar" in importing.errors[0]
+    assert importing(log, *options, "--pipe-released", "5.0") == 0
+
+
 def test_a_dry_run_shows_rows_and_writes_nothing(importing: Import, capsys: pytest.CaptureFixture[str]) -> None:
     importing(text(ride(), ";", ","))
     options = ["--dry-run", "--output", str(importing.output.with_name("never"))]
@@ -358,6 +202,10 @@ def test_guesses_give_way_to_options(importing: Import) -> None:
         (["--time-zone", "Berlin/Europe"], "time-zone = 'Berlin/Europe': there is none of this name"),
         (["--skip-rows", "-1"], "skip-rows = -1: give the number of lines above the header"),
         (["--full-pressure", "4.1"], "full-pressure = 4.1: give 100000 to 1000000 Pa, gauge"),
+        (["--encoding", "base64"], "encoding = 'base64': there is none of this name"),
+        (["--encoding", "idna"], "encoding = 'idna': there is none of this name"),
+        (["--time-format", "%"], "time-format = '%': "),
+        (["--time-format", "%Q"], "time-format = '%Q': "),
     ],
 )
 def test_options_that_cannot_be_are_refused(importing: Import, options: list[str], message: str) -> None:
@@ -373,3 +221,12 @@ def test_a_guess_from_the_beginning_does_not_spoil_the_rest(importing: Import) -
     assert "--decimal" in importing.errors[0]
     importing.output = importing.output.with_name("cured")
     assert importing(log, "--decimal", ",") == 0
+
+
+@pytest.mark.parametrize("mark", [" ", "|"])
+def test_a_delimiter_that_nothing_guesses_is_named(importing: Import, mark: str) -> None:
+    log = "time,position,speed\n0,0,30\n1,30,30\n".replace(",", mark)
+    code = importing(log)
+    assert code == 0 or f"is the --delimiter {mark!r}?" in importing.errors[0]
+    importing.output = importing.output.with_name("told")
+    assert importing(log, "--delimiter", mark) == 0

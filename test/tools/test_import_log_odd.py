@@ -100,6 +100,26 @@ ODD: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], str, list[str]]] = 
         "5.0 bar while the train runs",
         ["--pipe", "brake_pressure"],
     ),
+    ("kn", lambda r: r.assign(speed=r.speed / 0.514444), "--speed-unit kn", ["--speed-unit", "kn"]),
+    ("mph", lambda r: r.assign(speed=r.speed / 0.44704), "--speed-unit mph", ["--speed-unit", "mph"]),
+    ("us", lambda r: r.assign(time=1e6 * r.time), "--time-unit us", ["--time-unit", "us"]),
+    ("hours", lambda r: r.assign(time=r.time / 3600.0), "--time-unit h", ["--time-unit", "h"]),
+    ("days", lambda r: r.assign(time=25569.0 + r.time / 86400.0), "--time-unit excel", ["--time-unit", "excel"]),
+    ("minutes", lambda r: r.assign(time=r.time / 60.0), "another --time-unit", ["--time-unit", "min"]),
+    (
+        "mg",
+        lambda r: r.assign(acceleration=1e3 / 9.80665 * np.gradient(r.speed, r.time)),
+        "--acceleration-unit mg",
+        ["--acceleration-unit", "mg"],
+    ),
+    (
+        "kn beside places",
+        lambda r: r.assign(lat=47.0 + r.position / 111_194.9, lon=8.0, speed=r.speed / 0.514444).drop(
+            columns="position"
+        ),
+        "--speed-unit kn",
+        ["--speed-unit", "kn"],
+    ),
 ]
 
 

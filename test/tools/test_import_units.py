@@ -123,3 +123,10 @@ def test_parquet_names_units_as_well(importing: Import) -> None:
     pd.DataFrame({"time [s]": [1.0, 2.0], "speed [km/h]": [36.0, 36.0]}).to_parquet(log)
     assert import_csv.main([str(log), "--output", str(importing.output)]) == 0
     assert SPEED.read(importing.messages("speed")[0]).speed_mps == 10.0
+
+
+@pytest.mark.parametrize("header", ["speed [kn]", "speed (kts)", "speed_kn"])
+def test_knots_are_read(importing: Import, header: str) -> None:
+    rows = ride()
+    assert importing(text(rows.assign(speed=rows.speed * 3600.0 / 1852.0).rename(columns={"speed": header}))) == 0
+    assert importing.messages("speed")[0].twist.twist.linear.x == pytest.approx(rows.speed.iloc[0])

@@ -163,6 +163,15 @@ class Pace(NamedTuple):
         return Pace(t_ns, position_m, speed_mps, self.fast + 1 if speed_mps > RUNS_MPS else 0, slower)
 
 
+def believed(measurement: Measurement, pace: Pace) -> tuple[Measurement, tuple[Event, ...]]:
+    """Without speeds that the positions belie, and what is to be told."""
+    newest_mps = measurement.speeds[-1].speed_mps if measurement.speeds else measurement.speed_mps
+    if newest_mps is None or not pace.belies:
+        return measurement, ()
+    event = Event(Outcome.STUCK, f"speed x = {newest_mps:.6g} at {pace.speed_mps:.3g} m/s")
+    return measurement._replace(speed_mps=None, speeds=()), (event,)
+
+
 def in_mps(measurement: Measurement, known_mps: Iterable[float]) -> tuple[Measurement, tuple[Event, ...]]:
     """Without the speeds that are km/h of one of the train's known speeds (NaN: is not), and what is to be told."""
     known = [speed for speed in known_mps if speed >= KMH_FROM_MPS]

@@ -39,20 +39,16 @@ class Standing(NamedTuple):
 
 
 def moving(measurement: Measurement, standing: Standing, pace: Pace) -> tuple[Measurement, Standing, tuple[Event, ...]]:
-    """Without speeds that are far less than positions run, and of a standstill that no brake brings about.
-
-    And what is to be told.
-    """
+    """Without speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
     newest_mps, kept, left_out = measurement.speed_mps, list[SpeedSample](), list[float]()
     alone = () if newest_mps is None else (SpeedSample(measurement.t_ns, newest_mps),)
     for sample in measurement.speeds or alone:
         slowest_mps = STRONGEST_MPS2 * abs(sample.t_ns - standing.t_ns) / S + HELD_MPS
         standing = standing.after(*sample[:2], slowest_mps, pace.runs)
-        kept += [] if standing.silent or pace.belies else [sample]
-        left_out += [sample.speed_mps] if standing.silent or pace.belies else []
+        kept += [] if standing.silent else [sample]
+        left_out += [sample.speed_mps] if standing.silent else []
     if not left_out:
         return measurement, standing, ()
     speeds = tuple(kept) if measurement.speeds else ()
-    silent = standing.silent or pace.belies
-    measurement = measurement._replace(speed_mps=None if silent else newest_mps, speeds=speeds)
+    measurement = measurement._replace(speed_mps=None if standing.silent else newest_mps, speeds=speeds)
     return measurement, standing, (Event(Outcome.STUCK, f"speed x = {left_out[-1]:.6g}"),)

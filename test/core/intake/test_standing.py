@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 
 from adhesion_node.core import Measurement, Outcome, SpeedSample
-from adhesion_node.core.intake.plausibility import Pace
+from adhesion_node.core.intake.plausibility import Pace, believed
 from adhesion_node.core.intake.standing import Standing, moving
 
 S = 1_000_000_000
@@ -32,19 +32,17 @@ def measured(t_s: float, *speeds_mps: float) -> Measurement:
 
 
 @pytest.mark.parametrize("shown_mps", [0.0, 0.2, -0.1])
-@pytest.mark.parametrize(("was_mps", "gap_s", "believed"), [(40.0, 0.1, False), (40.0, 14.0, True), (2.5, 0.1, True)])
-def test_a_train_stops_no_faster_than_brakes_allow(
-    was_mps: float, gap_s: float, believed: bool, shown_mps: float
-) -> None:
+@pytest.mark.parametrize(("was_mps", "gap_s", "right"), [(40.0, 0.1, False), (40.0, 14.0, True), (2.5, 0.1, True)])
+def test_a_train_stops_no_faster_than_brakes_allow(was_mps: float, gap_s: float, right: bool, shown_mps: float) -> None:
     _, standing, _ = moving(measured(1.0, was_mps), Standing(), Pace())
     left, standing, told = moving(measured(1.0 + gap_s, shown_mps), standing, Pace())
-    assert (left.speed_mps is not None) == bool(left.speeds) == (told == ()) == believed
-    assert standing.silent != believed
+    assert (left.speed_mps is not None) == bool(left.speeds) == (told == ()) == right
+    assert standing.silent != right
     again, standing, _ = moving(measured(1.2 + gap_s, shown_mps), standing, Pace())
-    assert (again.speed_mps is not None) == believed
+    assert (again.speed_mps is not None) == right
 
 
-def test_it_is_believed_again_once_it_shows_a_speed() -> None:
+def test_it_right_again_once_it_shows_a_speed() -> None:
     _, standing, _ = moving(measured(1.0, 40.0), Standing(), Pace())
     left, standing, told = moving(measured(1.1, 40.0, 0.0, 39.9), standing, Pace())
     assert [sample.speed_mps for sample in left.speeds] == [40.0, 39.9]
@@ -55,10 +53,10 @@ def test_it_is_believed_again_once_it_shows_a_speed() -> None:
 
 def test_a_speed_without_its_samples_is_judged_too() -> None:
     standing = Standing()
-    for speed_mps, believed in ((40.0, 40.0), (0.0, None), (0.0, None), (38.0, 38.0)):
+    for speed_mps, kept_mps in ((40.0, 40.0), (0.0, None), (0.0, None), (38.0, 38.0)):
         one = Measurement(standing.t_ns + S // 10, 0.0, math.inf, speed_mps=speed_mps)
         left, standing, _ = moving(one, standing, Pace())
-        assert left.speed_mps == believed
+        assert left.speed_mps == kept_mps
 
 
 def paced(places_m: list[float]) -> Pace:
@@ -97,11 +95,11 @@ def test_positions_that_run_belie_a_speed_that_is_far_less() -> None:
         nearly = nearly.after(Measurement(tick * S // 10, 3.0 * tick, 4.0), (23.0,))
     assert nearly.belies
     measurement = measured(9.0, 15.0, 15.1)
-    left, _, told = moving(measurement, Standing(), shown_beside(0.5))
+    left, told = believed(measurement, shown_beside(0.5))
     assert left.speeds == ()
     assert left.speed_mps is None
     assert [event.outcome for event in told] == [Outcome.STUCK]
-    assert moving(measurement, Standing(), shown_beside(0.75))[0] == measurement
+    assert believed(measurement, shown_beside(0.75)) == (measurement, ())
 
 
 def test_one_position_far_off_does_not() -> None:

@@ -46,8 +46,8 @@ def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
     ratio = float((np.abs(course) * speed).sum() / (speed * speed).sum())
     if not motion.by_fixes:
         yield from _against_chainage(motion, course[speed > MOVES_MPS], 0.0)
-    if not motion.by_fixes and course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
-        yield "the speed is below 0 while the positions rise: change its sign, it counts forward along the run"
+        if course.sum() > 0.0 > motion.speed_mps[motion.both].sum():
+            yield "the speed is below 0 while the positions rise: change its sign, it counts forward along the run"
     told = f"the positions move at {ratio:.3g} times the speed"
     if abs(math.log(max(ratio, 1e-30))) < SAME:
         return
@@ -65,7 +65,7 @@ def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
         cures += [f"--speed-unit {pace}"] * (pace != form.unit("speed"))
         yield f"{told}: another unit? {' '.join(cures)}"
         return
-    if not motion.by_fixes and ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
+    if ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
         yield f"{told}: are they degrees? --lat COL --lon COL"
     else:
         yield f"{told}: are both units right, is the speed that of a wheel which slid?"

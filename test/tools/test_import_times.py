@@ -1,0 +1,152 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Times of logs as recorders write them: numbers, dates, clocks, zones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from test_import_csv import Import, importing
+from test_import_log import ride, text
+
+from adhesion_node.wire.topics import SPEED
+
+__all__ = ["importing"]
+
+S = 10**9
+
+
+@pytest.mark.parametrize(
+    ("written", "options", "first_ns"),
+    [
+        ("%H:%M:%S,%f", [], 29_703 * S),
+        ("%d.%m.%Y %H:%M:%S", [], 1_732_176_903 * S),
+        ("%d.%m.%Y %H:%M:%S,%f", ["--time-zone", "Europe/Berlin"], (1_732_176_903 - 3600) * S),
+        ("%d.%m.%y %H:%M:%S.%f", [], 1_732_176_903 * S),
+        ("%m/%d/%Y %H:%M:%S", [], 1_732_176_903 * S),
+        ("%Y-%m-%dT%H:%M:%S.%fZ", ["--time-zone", "Europe/Berlin"], 1_732_176_903 * S),
+        ("%Y-%m-%d %H:%M:%S", [], 1_732_176_903 * S),
+        ("%m/%d/%Y %I:%M:%S %p", [], 1_732_176_903 * S),
+        ("%m/%d/%Y %I:%M:%S.%f %p", [], 1_732_176_903 * S),
+        ("%Hh%Mm%S %d-%b-%Y", ["--time-format", "%Hh%Mm%S %d-%b-%Y"], 1_732_176_903 * S),
+    ],
+)
+def test_times_as_recorders_write_them(importing: Import, written: str, options: list[str], first_ns: int) -> None:
+    moments = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(range(30), unit="s")
+    rows = ride()[: 10 * len(moments) : 10].assign(time=moments.strftime(written))
+    assert importing(text(rows, ";"), *options) == 0, importing.errors
+    assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S for i in range(30)]
+
+
+@pytest.mark.parametrize(("unit", "per_s"), [("s", 1), ("ms", 10**3), ("us", 10**6), ("ns", 10**9)])
+def test_times_since_1970_tell_their_unit(importing: Import, unit: str, per_s: int) -> None:
+    begin = 1_732_176_903
+    assert importing(f"time,speed\n{begin * per_s},1\n{(begin + 1) * per_s},1\n") == 0
+    assert [SPEED.read(message).t_ns for message in importing.messages("speed")] == [begin * S, (begin + 1) * S]
+
+
+def test_a_time_that_is_written_in_no_known_way_is_told_with_the_option(importing: Import) -> None:
+    log = "time,speed\n8:15:03 o'clock,1\n8:15:04 o'clock,1\n"
+    assert importing(log) == 2
+    assert "say how with --time-format" in importing.errors[0]
+    assert importing(log, "--time-format", "%H:%M:%S o'clock") == 0
+
+
+def test_the_days_of_a_spreadsheet(importing: Import) -> None:
+    rows = ride()
+    log = text(rows.assign(time=45617.34378472 + rows.time / 86400.0))
+    assert importing(log) == 1
+    assert "are the times in days? --time-unit excel" in importing.errors[0]
+    importing.output = importing.output.with_name("cured")
+    assert importing(log, "--time-unit", "excel") == 0
+    first, *_, last = (sample.t_ns for sample in importing.positions())
+    assert first == pytest.approx(1_732_176_903 * S, abs=S / 100)
+    assert last - first == pytest.approx(59.9 * S, abs=S / 100)
+
+
+def test_a_clock_of_whole_seconds_is_told(importing: Import) -> None:
+    rows = ride()
+    assert importing(text(rows.assign(time=rows.time.astype(int)))) == 1
+    assert importing.errors[0].endswith("rows share a time: log it with the fraction of the second")
+    assert importing.summary["written"] == 60
+
+
+def test_the_clock_goes_on_after_midnight(importing: Import) -> None:
+    assert importing("time,speed\n23:59:59.9,1\n00:00:00.0,1\n00:00:00.1,1\n") == 0
+    times = [SPEED.read(message).t_ns for message in importing.messages("speed")]
+    assert np.diff(times).tolist() == [S // 10, S // 10]
+
+
+def test_the_end_of_summer_time_is_no_step_of_the_clock(importing: Import) -> None:
+    """At 3 o'clock it is 2 o'clock again."""
+    log = "time,speed\n27.10.2024 02:59:58,1\n27.10.2024 02:59:59,1\n27.10.2024 02:00:00,1\n27.10.2024 02:00:01,1\n"
+    assert importing(log, "--time-zone", "Europe/Berlin") == 0
+    assert np.diff([SPEED.read(message).t_ns for message in importing.messages("speed")]).tolist() == [S] * 3
+
+
+@pytest.mark.parametrize("written", ["%H%M%S.%f", "%H%M%S"])
+@pytest.mark.parametrize("begin", ["08:15:33", "12:59:30", "23:59:30"])
+def test_digits_of_a_clock_are_no_seconds(importing: Import, begin: str, written: str) -> None:
+    """As of NMEA: 081559 is followed by 081600."""
+    moments = pd.Timestamp(f"2024-11-21 {begin}") + pd.to_timedelta(range(150), unit="s")
+    rows = pd.DataFrame({"time": moments.strftime(written), "position": 40.0 * np.arange(150) + 1000.0})
+    assert importing(text(rows)) == 0, importing.errors
+    of_day_s = (pd.Timestamp(f"1970-01-01 {begin}") - pd.Timestamp(0)).total_seconds()
+    assert [sample.t_ns / S for sample in importing.positions()] == [of_day_s + i for i in range(150)]
+    importing.output = importing.output.with_name("seconds")
+    importing(text(rows), "--time-unit", "s")
+    told = "--time-format %H%M%S where the times are hhmmss, %H%M%S.%f with a fraction" in str(importing.errors)
+    assert told == (begin == "12:59:30"), "a step of 40 s is none among rows of a second"
+    importing.output = importing.output.with_name("format")
+    assert importing(text(rows), "--time-format", written) == 0
+
+
+@pytest.mark.parametrize(
+    "times", [range(200), range(1000, 1060), [*range(1000, 1060), *range(1100, 1130)], range(81530, 81730)], ids=str
+)
+def test_seconds_are_no_digits_of_a_clock(importing: Import, times: list[int]) -> None:
+    importing("time,speed\n" + "".join(f"{time},20\n" for time in times))
+    expected = list(times)
+    if expected[-1] == 1129:  # 16:59 is followed by 11:00
+        expected = [*range(600, 690)]
+    assert [SPEED.read(message).t_ns // S for message in importing.messages("speed")] == expected
+
+
+@pytest.mark.parametrize(
+    ("written", "options"),
+    [
+        ("2024-11-21 08:15:0{}+01", ()),
+        ("2024-11-21T08:15:0{}+0100", ()),
+        ("2024-11-21 08:15:0{}.5+01:00", ()),
+        ("21.11.2024 08:15:0{} +0100", ("--time-format", "%d.%m.%Y %H:%M:%S %z")),
+    ],
+)
+def test_a_date_that_names_its_zone_is_in_no_other(importing: Import, written: str, options: tuple[str, ...]) -> None:
+    rows = "".join(f"{written.format(second)},{second}\n" for second in range(3))
+    assert importing(f"time,position\n{rows}", "--time-zone", "America/New_York", *options) == 0
+    begins = pd.Timestamp(importing.positions()[0].t_ns).floor("s")
+    assert begins == pd.Timestamp("2024-11-21 07:15:00")
+
+
+def test_a_date_without_a_zone_is_in_the_one_that_is_told(importing: Import) -> None:
+    log = "time,position\n2024-11-21 00:00:00,1\n2024-11-21 00:00:01,2\n"
+    assert importing(log, "--time-zone", "Europe/Berlin") == 0
+    assert pd.Timestamp(importing.positions()[0].t_ns) == pd.Timestamp("2024-11-20 23:00:00")
+
+
+@pytest.mark.parametrize(("begins", "utc"), [("02:59:30", "01:59:30"), ("01:59:30", "23:59:30")])
+def test_the_hour_that_is_there_twice_joins_the_rows(importing: Import, begins: str, utc: str) -> None:
+    """In Berlin summer time ended at 3 on 27 October 2024."""
+    times = pd.to_datetime(f"2024-10-27 {begins}") + pd.to_timedelta(np.arange(60), unit="s")
+    rows = "".join(f"{time},{30.0 * index}\n" for index, time in enumerate(times.strftime("%Y-%m-%d %H:%M:%S")))
+    assert importing(f"time,position\n{rows}", "--time-zone", "Europe/Berlin") == 0
+    stamps = [each.t_ns for each in importing.positions()]
+    assert np.ptp(np.diff(stamps)) == 0
+    assert str(pd.Timestamp(stamps[0]).time()) == utc
