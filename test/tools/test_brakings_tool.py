@@ -83,7 +83,7 @@ def test_a_braking_counts_once_however_often_it_is_given(
     options = ["--output", str(table), "--map", str(rail), "--cache", str(tmp_path / "cache")]
     assert brakings.main([str(monday), str(tuesday), *options]) == 0
     once = table.read_bytes(), rail.read_bytes()
-    assert capfd.readouterr().err == ""
+    assert told(capfd) == []
     assert brakings.main([str(monday), str(again), str(tuesday), *options]) == 0
     assert (table.read_bytes(), rail.read_bytes()) == once
     said = {
