@@ -20,7 +20,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from .outcome import Event, Outcome
-from .pairing import Gate, Inbox, Matched, S, kept_ns
+from .pairing import Gate, Inbox, Matched, S, kept_ns, longest_wait_ns
 from .release import release
 from .samples import Measurement, Sample
 
@@ -42,10 +42,10 @@ def push(gate: Gate, inbox: Inbox, sample: Sample) -> Pushed:
     believed = now_ns is None or now_ns - gate.reset_ns <= t_ns <= now_ns + gate.far_ns
     if believed and not suspects:
         return _take(gate, inbox, sample)
+    if now_ns is None or believed:
+        return _believed(gate, inbox, sample)
     of_kind = tuple(each for each in suspects if type(each) is type(sample))
     of_others = tuple(each for each in suspects if type(each) is not type(sample))
-    if now_ns is None or believed:
-        return _with(_strays(now_ns, of_kind), _take(gate, inbox._replace(suspects=of_others), sample))
     if any(each.t_ns == t_ns for each in of_kind):
         return Pushed(inbox, events=(_doubled(sample),))
     near_ns = min(abs(t_ns - now_ns), gate.reset_ns)
@@ -71,6 +71,17 @@ def drain(gate: Gate, inbox: Inbox) -> Pushed:
 def settle(gate: Gate, inbox: Inbox) -> Pushed:
     """End of the waits in silence: all anchors that wait, with what is known so far."""
     return Pushed(*release(gate, inbox, len(inbox.anchors.samples)))
+
+
+def _believed(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
+    """Let a sample in, and behind it what was set aside only because it came first, as none came earlier."""
+    until_ns = sample.t_ns + longest_wait_ns(gate)
+    behind = [each for each in inbox.suspects if sample.t_ns <= each.t_ns < until_ns]
+    apart = [each for each in inbox.suspects if each not in behind]
+    of_kind = [each for each in apart if type(each) is type(sample)]
+    inbox = inbox._replace(suspects=tuple(each for each in apart if each not in of_kind))
+    strays = _strays(inbox.now_ns, of_kind)
+    return _with(strays, _take_all(gate, _take(gate, inbox, sample), sorted(behind, key=lambda each: each.t_ns)))
 
 
 def _take(gate: Gate, inbox: Inbox, sample: Any) -> Pushed:
@@ -142,8 +153,12 @@ def _returns(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
 def _jump(gate: Gate, inbox: Inbox, is_gap: bool, samples: Sequence[Any]) -> Pushed:
     """Stamps agree that time has jumped: a gap, or where it is long or back, another time."""
     first, *others = samples
-    pushed = _take(gate, inbox, first) if is_gap else _anew(gate, inbox, first)
-    for sample in others:
+    return _take_all(gate, _take(gate, inbox, first) if is_gap else _anew(gate, inbox, first), others)
+
+
+def _take_all(gate: Gate, pushed: Pushed, samples: Iterable[Any]) -> Pushed:
+    """Let further samples in, in the order of their stamps."""
+    for sample in samples:
         inbox, matched, events, ended = _take(gate, pushed.inbox, sample)
         pushed = Pushed(inbox, pushed.matched + matched, pushed.events + events, pushed.ended + ended)
     return pushed

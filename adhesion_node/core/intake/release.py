@@ -74,20 +74,18 @@ def _is_ready(gate: Gate, inbox: Inbox, anchor: Any, near_ns: int) -> bool:
         return False
     if isinstance(anchor, Measurement):  # complete as it is
         return True
-    at_turn = inbox._replace(begun_ns=anchor.t_ns) if _begins(gate, inbox, anchor.t_ns) else inbox
     # before it, a tick may still come to be
     before_ns, ticks = inbox.released_ns, 0
     if gate.tick_ns and before_ns is not None:
         ticks = (anchor.t_ns - near_ns - 1 - before_ns) // gate.tick_ns
     may_tick = ticks > 0 and before_ns is not None and _lacks(gate, inbox, before_ns + ticks * gate.tick_ns)
-    return not (may_tick or _lacks(gate, at_turn, anchor.t_ns))
+    return not (may_tick or _lacks(gate, _at_turn(gate, inbox, anchor.t_ns), anchor.t_ns))
 
 
 def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, ...]]:
     """The samples of the time of an anchor or tick, which waits no longer; those that come once are used up."""
     t_ns, others, is_complete = turn.t_ns, inbox.others, isinstance(turn, Measurement)
-    if _begins(gate, inbox, t_ns):
-        inbox = inbox._replace(begun_ns=t_ns)
+    inbox = _at_turn(gate, inbox, t_ns)
     values, waits = [] if is_complete else [*missing_of(gate)], waits_of(gate)
     for kind, stream in () if is_complete else inbox.others.items():
         for wait_ns, sources in waits.get(kind, {}).items():
@@ -105,8 +103,10 @@ def _given_out(gate: Gate, inbox: Inbox, turn: Any) -> tuple[Inbox, tuple[Any, .
     return inbox._replace(released_ns=t_ns, anchored_ns=t_ns, anchors=anchors, others=others), tuple(values)
 
 
-def _begins(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
-    return inbox.released_ns is None or t_ns > inbox.released_ns + gate.far_ns
+def _at_turn(gate: Gate, inbox: Inbox, t_ns: int) -> Inbox:
+    """The inbox as it is once a time is released, which may be the first, of all or after a gap."""
+    begins = inbox.released_ns is None or t_ns > inbox.released_ns + gate.far_ns
+    return inbox._replace(begun_ns=t_ns) if begins else inbox
 
 
 def _is_last(gate: Gate, inbox: Inbox, t_ns: int) -> bool:
@@ -163,7 +163,7 @@ def _earliest(gate: Gate, inbox: Inbox, sources: Iterable[Source], before_ns: in
 
 def _is_due(gate: Gate, inbox: Inbox, tick_ns: int, near_ns: int) -> bool:
     """Whether no anchor can be expected that would take a tick's place, nor a sample of its time."""
-    if _is_last(gate, inbox, tick_ns + near_ns) and not _lacks(gate, inbox, tick_ns):
+    if _is_last(gate, inbox, tick_ns + near_ns) and not _lacks(gate, _at_turn(gate, inbox, tick_ns), tick_ns):
         return True
     return _is_past(gate, inbox, tick_ns + near_ns)
 

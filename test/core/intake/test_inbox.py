@@ -193,6 +193,22 @@ def test_the_samples_of_a_long_gap_are_bounded() -> None:
     assert [one.speed_mps for one in values[3]] == [float(k) for k in range(1600, 2000)]
 
 
+def test_behind_a_gap_the_order_of_arrival_does_not_matter() -> None:
+    """A sample far behind all others may have overtaken one that is not so far."""
+    found = []
+    overtaking, behind = (ImuSample(round(t_s * S), -0.5) for t_s in (3.09, 3.11))
+    before = pressure(2.99, 5.0)
+    orders: tuple[tuple[Sample, Sample], ...] = ((before, overtaking), (overtaking, before))
+    for order in orders:
+        feeder = running()
+        feeder.push(*order, behind, position(3.3))
+        feeder.drain()
+        assert feeder.outcomes == []
+        found.append(feeder.matched)
+    assert found[0] == found[1]
+    assert found[0][-1].values[5] == (overtaking, behind)
+
+
 def test_late_and_double_anchors_are_told() -> None:
     feeder = running()
     feeder.push(position(0.95), position(1.0), position(1.1), position(1.1))

@@ -163,6 +163,14 @@ def test_the_first_positions_may_come_late_in_a_burst() -> None:
     assert (came.positions, came.ticks_s, came.outcomes) == (100, [], [])
 
 
+def test_the_first_tick_waits_for_a_sensor_that_begins_late() -> None:
+    """A speed begins, then an accelerometer, and a position when the first tick is over."""
+    others = [Sensor("speed", 50), Sensor("position", 1.6, silent=(0.0, 0.6))]
+    prompt, late = (run([*others, Sensor("imu", 50, late_s, silent=(0.0, 0.35))], 3.0) for late_s in (0.0, 0.15))
+    assert isinstance(prompt.matched[0].anchor, Tick)
+    assert late.matched == prompt.matched
+
+
 @pytest.mark.parametrize("name", ["pressure", "imu", "wheels", "demand"])
 def test_no_other_sensor_begins_by_itself(name: str) -> None:
     assert run([Sensor(name, 10)], 100.0).matched == []
