@@ -20,9 +20,7 @@ from mcap.records import Channel, Chunk, Schema
 from zstandard import ZstdDecompressor
 
 from ..metadata import LATEST_NS
-
-HEAD = Struct("<BQ")
-"""Opcode and length of a record."""
+from .records import HEAD
 
 MAX_CHUNK_BYTES = 32 * 2**20
 """Length of a chunk when decompressed. Writers end theirs at 64 kB to 4 MB, or with one longer message; a few bytes

@@ -9,8 +9,9 @@
 """Reads one MCAP file whether or not its recording was finished.
 
 The index at the end of a file is missing when the recorder died, so it is not used at all: one pass over the file
-finds the blocks (chunks, or single messages outside of chunks), the topics and the places that are damaged. What the
-end repeats of topics and types is taken where the chunk that said it first is lost.
+finds the blocks (chunks, or single messages outside of chunks), the topics and the places that are damaged. Behind a
+torn record it goes on with the next chunk. What the end repeats of topics and types is taken where the chunk that said
+it first is lost.
 Messages are then read block by block, one block at a time in memory.
 """
 
@@ -31,7 +32,8 @@ from zstandard import ZstdError
 
 from ..qos import parse
 from ..types import Definition
-from .chunk import HEAD, Message, unpack
+from .chunk import Message, unpack
+from .records import Record, next_chunk, record_at
 
 _UNREADABLE = (error, ValueError, OverflowError, MemoryError, EOFError, McapError, ZstdError, RuntimeError)
 """What the decoders raise on bytes that are not what they seem."""
@@ -87,8 +89,10 @@ class McapFile:
             raise ValueError(f"{self.path}: {'is empty' if empty else 'is not an MCAP file'}: name another recording")
         finished, counted = False, 0
         end = len(MCAP0_MAGIC)
-        for opcode, offset, length in _records(stream):
-            end = offset + length
+        for record in self._records(stream):
+            opcode, offset, length, _ = record
+            end = record.end
+            stream.seek(offset)
             if opcode == Opcode.FOOTER:
                 stream.seek(end)
                 finished = stream.read() == MCAP0_MAGIC
@@ -107,6 +111,24 @@ class McapFile:
             rest = f", the {extent} bytes there are left out" if (extent := _extent(stream)) else ""
             reason = "its recording was interrupted or the file was cut"
             self.damage.append(f"{self.path} breaks off at byte {end}: {reason}{rest}")
+
+    def _records(self, stream: BinaryIO) -> Iterator[Record]:
+        """Yield every record that lies in the stream as a whole; behind a torn one go on with the next chunk."""
+        position = searched_from = len(MCAP0_MAGIC)
+        size = stream.seek(0, 2)
+        while (record := record_at(stream, position, size)) is None or record.opcode != Opcode.FOOTER:
+            if record is None:
+                if (chunk := next_chunk(stream, searched_from, size)) is None:
+                    return
+                left_out = f"the {chunk - searched_from} bytes there are left out"
+                self.damage.append(f"{self.path} is damaged at byte {searched_from}: {left_out}")
+                position = chunk
+                continue
+            yield record
+            position = record.end if record.agrees else next_chunk(stream, record.offset, size) or record.end
+            if record.opcode in (Opcode.CHUNK, Opcode.MESSAGE):
+                searched_from = position
+        yield record
 
     def _take_block(self, opcode: int, offset: int, body: bytes) -> None:
         """Note a record of the data section; a damaged one is left out as a whole."""
@@ -142,22 +164,6 @@ class McapFile:
                 self.topics[number] = TopicInfo(channel.topic, kind, channel.message_encoding, known_as, offered)
             elif count := self.counts[number]:
                 self.damage.append(f"{self.path}: {count} messages of {channel.topic} are left out, their type is lost")
-
-
-def _records(stream: BinaryIO) -> Iterator[tuple[int, int, int]]:
-    """Yield opcode, offset and length of the body of every record that lies in the stream as a whole."""
-    offset = stream.tell()
-    size = stream.seek(0, 2)
-    while offset + HEAD.size <= size:
-        stream.seek(offset)
-        opcode, length = HEAD.unpack(stream.read(HEAD.size))
-        offset += HEAD.size
-        if opcode == 0 or offset + length > size:
-            return
-        yield opcode, offset, length
-        if opcode == Opcode.FOOTER:
-            return
-        offset += length
 
 
 def _messages(body: bytes) -> int:

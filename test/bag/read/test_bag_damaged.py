@@ -134,6 +134,32 @@ def test_a_chunk_that_no_longer_looks_like_one_is_missed(tmp_path: Path) -> None
         assert reader.damage == (f"{single}: {lost} messages are lost, its end counts {len(written)}",)
 
 
+@pytest.mark.parametrize("where", ["chunk", "index"])
+@pytest.mark.parametrize("length", [0, 5, 50_000, 2**40])
+@pytest.mark.parametrize("finished", [True, False])
+def test_behind_a_torn_record_reading_goes_on_with_the_next_chunk(
+    where: str, length: int, finished: bool, tmp_path: Path
+) -> None:
+    """A chunk that only claims to be longer than it is is there as a whole."""
+    written = write_steps(tmp_path / "bag", 1500)
+    file = tmp_path / "bag" / file_name(0)
+    before, chunk, after, *_ = index_of(file).chunk_indexes[1:]
+    data = bytearray(file.read_bytes())
+    at = chunk.chunk_start_offset if where == "chunk" else before.chunk_start_offset + before.chunk_length
+    data[at + 1 : at + 9] = length.to_bytes(8, "little")
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(data if finished else data[: index_of(file).chunk_indexes[-1].chunk_start_offset])
+    whole = where == "chunk" and length == 50_000
+    lost = (chunk.message_start_time, chunk.message_end_time) if where == "chunk" and not whole else (1, 0)
+    with BagReader(cut) as reader:
+        read = list(reader.messages())
+        assert whole or f"{cut} is damaged at byte " in "".join(reader.damage)
+    kept, left = ([each for each in all_ if not lost[0] <= each.log_ns <= lost[1]] for all_ in (read, written))
+    assert kept == (left if finished else left[: len(kept)])
+    assert after.message_end_time <= read[-1].log_ns
+    assert not [each for each in read if lost[0] < each.log_ns < lost[1]]
+
+
 @pytest.mark.parametrize("compression", [CompressionType.ZSTD, CompressionType.LZ4])
 @pytest.mark.parametrize("claimed", [None, 1000])
 def test_a_chunk_that_is_too_long_is_left_out_before_it_is_made(

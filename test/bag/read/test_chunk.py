@@ -19,7 +19,8 @@ import pytest
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, Writer
 
-from adhesion_node.bag.read.chunk import HEAD, unpack
+from adhesion_node.bag.read.chunk import unpack
+from adhesion_node.bag.read.records import HEAD
 
 
 def chunk_of(content: bytes, checksum: int | None = None) -> bytes:
