@@ -53,10 +53,14 @@ def _kinds() -> Iterator[Sequence[str]]:
 def _noises() -> Iterator[Sequence[str]]:
     for each in noises.NOISES:
         parts = ((each.white, each.least_white_m), (each.slow, each.least_slow_m))
-        stds = (
-            f"{of:g} × declared" + (f", at least {least:g} m" if least else "") if of else "–" for of, least in parts
-        )
-        yield *stds, f"{each.lasts_s:g}" if each.slow else "–", f"{each.prior:g}"
+        stds = (_std(*part) for part in parts)
+        yield *stds, f"{each.lasts_s:g}" if each.slow_m(1.0) else "–", f"{each.prior:g}"
+
+
+def _std(of_declared: float, least_m: float) -> str:
+    if not of_declared:
+        return f"{least_m:g} m" if least_m else "–"
+    return f"{of_declared:g} × declared" + (f", at least {least_m:g} m" if least_m else "")
 
 
 def _laws() -> Iterator[Sequence[str]]:

@@ -48,7 +48,7 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     pace = state.pace.after(measurement, _shown(config, measurement))
     measurement, belied = believed(measurement, pace)
     refused: tuple[Event, ...] = ()
-    if measurement.speeds or measurement.speed_mps is not None:
+    if measurement.all_speeds:
         measurement, refused = in_mps(measurement, (pace.speed_mps, _surely(seen)))
     is_other = (pace.belies and not state.pace.belies) or (refused and is_kmh(state.followed_mps, pace.speed_mps))
     state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace).told(*belied, *refused)
@@ -75,8 +75,7 @@ def _shown(config: Config, measurement: Measurement) -> tuple[float, ...]:
     """The speeds that no sliding axle shows."""
     if config.speed_source == "axle":
         return ()
-    alone = measurement.speed_mps
-    return tuple(each.speed_mps for each in measurement.speeds) or (() if alone is None else (alone,))
+    return tuple(each.speed_mps for each in measurement.all_speeds)
 
 
 def _running_mps(config: Config, measurement: Measurement) -> float:

@@ -6,4 +6,4 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The command line tools: import a log, recover a recording, the demo."""
+"""The command line tools: a log imported, a recording recovered, what brakings say, a train's file, the demo."""

@@ -13,33 +13,23 @@ from heapq import merge
 from operator import itemgetter
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
 
-from adhesion_node.core.physics.train import Array
 from adhesion_node.wire.messages.parts import NS
 
 from ..train.plant import ADHESION_LIMITED, BRAKE_LIMITED, COASTING, Truth
 from ..train.sensors import SensorMessage, Tick
 from .drive import START_S, Drive
 from .plant.journey import PERIOD_S, Journey
-
-SLID_WITHIN_S = 3.0
-"""Axles that slid within this time slide by turns, under the slide protection."""
-
-
-def slid(journey: Journey) -> Array:
-    """Largest share of the axle groups that slid at once within the last `SLID_WITHIN_S`; shape (T,)."""
-    width = round(SLID_WITHIN_S / PERIOD_S)
-    most: Array = maximum_filter1d(journey.sliding, width, mode="constant", origin=(width - 1) // 2)
-    return most
+from .plant.validation import slid
 
 
 def truths(journey: Journey) -> list[Truth]:
     """The truth every `PERIOD_S`: mu is the adhesion that the whole train *uses*, and so is what is applied.
 
-    Adhesion limits while at least half of the axle groups slide by turns.
+    Adhesion limits while at least half of the axle groups slide, or did so lately: slide protection lets them roll by
+    turns.
     """
-    regimes = np.where(slid(journey) >= 0.5, ADHESION_LIMITED, BRAKE_LIMITED)
+    regimes = np.where(slid(journey).mean(axis=1) >= 0.5, ADHESION_LIMITED, BRAKE_LIMITED)
     regimes = np.where((journey.demanded_pa > 0.0) & (journey.speed_mps > 0.0), regimes, COASTING)
     t_ns = np.round(journey.time_s * NS).astype(np.int64)
     used = journey.used.tolist()

@@ -162,9 +162,9 @@ _ALL = (
     _braking("weak_brake", 300, 100, (0.0, WET), train=replace(CRH3, pad_friction=0.6 * CRH3.pad_friction)),
     _braking("grade_unknown", 300, 100, (0.0, WET), track=Track((Grade(0.0, 20e3, -100.0),))),
     _braking("overweight", 300, 100, (0.0, WET), train=replace(CRH3, mass_kg=1.1 * CRH3.mass_kg)),
-    # A quarter of the wet adhesion: for more than three minutes nothing changes, and no change may be reported.
     # Runs on towards its target, through every level of the supervision, and brakes when nothing is left.
     Scenario("approach", 160 * KMH, Rail(((0.0, DRY),)), 150.0, Brake(_TOO_LATE_S), 50 * KMH),
+    # A quarter of the wet adhesion: for more than three minutes nothing changes, and no change may be reported.
     _braking("long_braking", 300, 100, (0.0, replace(WET, scale=0.25)), end_s=400.0),
 )
 

@@ -26,7 +26,7 @@ from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
 from .judging import judged
 from .kernels import weighing
 from .labels.kinds import FREE, FREE_STD
-from .labels.noises import NOISES
+from .labels.noises import NOISES, of_receiver
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCALE, SIZE, SPEED, Bank
 from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
@@ -67,13 +67,14 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
 
 def met(config: Config, measurement: Measurement) -> Memory:
     """A train just met: its position is known, if it was measured, of its speed only how large it may be."""
-    count = len(NOISES)
     declared = math.sqrt(measurement.variance_m2) if measurement.has_position else 1.0
+    noises = of_receiver(declared)
+    count = len(noises)
     mean = np.zeros((count, SIZE))
     mean[:, POSITION] = measurement.position_m if measurement.has_position else 0.0
     mean[:, SPEED], mean[:, BRAKE], mean[:, PITCH] = config.unknown_speed_mps, 1.0, PITCH_MEAN
-    priors = np.log([noise.prior for noise in NOISES])
-    labels = np.arange(count), np.zeros(count, np.intp), np.full(count, FREE), np.zeros(count), np.zeros(count)
+    priors = np.log([NOISES[noise].prior for noise in noises])
+    labels = np.array(noises), np.zeros(count, np.intp), np.full(count, FREE), np.zeros(count), np.zeros(count)
     bank = Bank(mean, np.zeros((count, SIZE, SIZE)), priors, *labels)
     variances: dict[int, float | Array] = {
         POSITION: MAX_VARIANCE_M2,
@@ -104,16 +105,17 @@ def followed(
 
     `rail` is asked for where a braking opens; `predicted` is what `off` has said of the measurement, if that is known.
     """
-    pressures, speeds, start = _pressures(measurement), _speeds(config, measurement), memory
+    pressures, speeds = _pressures(measurement), measurement.all_speeds
     demand_pa, imu = measurement.demand_pa, measurement.imu
     memory = memory._replace(untold=measurement.brake_pressure_pa is None and demand_pa is None)
     if memory.untold:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
     before_ns = memory.t_ns
     memory = memory._replace(left_out=()) if memory.left_out else memory
-    for until_ns in steps(before_ns, measurement.t_ns, speeds):
-        ahead = predicted.bank if predicted is not None and until_ns == measurement.t_ns else None
-        bank = memory.bank_at(config, until_ns) if ahead is None or memory is not start else ahead
+    ends = steps(before_ns, measurement.t_ns, speeds)
+    ahead = None if predicted is None or len(ends) > 1 or memory.untold else predicted.bank
+    for until_ns in ends:
+        bank = memory.bank_at(config, until_ns) if ahead is None else ahead
         since_ns, before_ns, before = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
         share = memory.wheels.share(until_ns)
@@ -198,12 +200,6 @@ def _pressures(measurement: Measurement) -> tuple[PressureSample, ...]:
     """Pressures since the measurement before; the demand, where none is measured."""
     newest = measurement.demand_pa if measurement.brake_pressure_pa is None else measurement.brake_pressure_pa
     return measurement.pressures or (() if newest is None else (PressureSample(measurement.t_ns, newest),))
-
-
-def _speeds(config: Config, measurement: Measurement) -> tuple[SpeedSample, ...]:
-    """Speeds since the measurement before."""
-    alone = measurement.speed_mps
-    return measurement.speeds or (() if alone is None else (SpeedSample(measurement.t_ns, alone),))
 
 
 def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> Braking:

@@ -66,7 +66,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         return memory._replace(bank=opened(config, bank, known), since_s=0.0, seen=1, told_s=told_s, known=known)
     if before and not braked:
         return memory._replace(bank=closed(bank), seen=0)
-    if not before:  # one hypothesis has nothing beside it that could be forgotten
+    if not before:
         return _coasted(memory)
     if memory.since_s >= BRANCH_S - 1e-6:
         if memory.course.is_impossible(config, bank, memory.declared_m):

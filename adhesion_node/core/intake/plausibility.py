@@ -165,10 +165,10 @@ class Pace(NamedTuple):
 
 def believed(measurement: Measurement, pace: Pace) -> tuple[Measurement, tuple[Event, ...]]:
     """Without speeds that the positions belie, and what is to be told."""
-    newest_mps = measurement.speeds[-1].speed_mps if measurement.speeds else measurement.speed_mps
-    if newest_mps is None or not pace.belies:
+    speeds = measurement.all_speeds
+    if not (speeds and pace.belies):
         return measurement, ()
-    event = Event(Outcome.STUCK, f"speed x = {newest_mps:.6g} at {pace.speed_mps:.3g} m/s")
+    event = Event(Outcome.STUCK, f"speed x = {speeds[-1].speed_mps:.6g} at {pace.speed_mps:.3g} m/s")
     return measurement._replace(speed_mps=None, speeds=()), (event,)
 
 

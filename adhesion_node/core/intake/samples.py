@@ -148,6 +148,12 @@ class Measurement(NamedTuple):
         """Whether a position was measured."""
         return self.variance_m2 != math.inf
 
+    @property
+    def all_speeds(self) -> tuple[SpeedSample, ...]:
+        """Speeds since the measurement before; where only the newest one is told, that."""
+        alone = self.speed_mps
+        return self.speeds or (() if alone is None else (SpeedSample(self.t_ns, alone),))
+
     def is_valid(self) -> bool:
         """Whether every number is finite and physically possible; a position need not be there."""
         scalars: tuple[tuple[Callable[[int, float], Sample], float | None], ...] = (

@@ -41,8 +41,7 @@ class Standing(NamedTuple):
 def moving(measurement: Measurement, standing: Standing, pace: Pace) -> tuple[Measurement, Standing, tuple[Event, ...]]:
     """Without speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
     newest_mps, kept, left_out = measurement.speed_mps, list[SpeedSample](), list[float]()
-    alone = () if newest_mps is None else (SpeedSample(measurement.t_ns, newest_mps),)
-    for sample in measurement.speeds or alone:
+    for sample in measurement.all_speeds:
         slowest_mps = STRONGEST_MPS2 * abs(sample.t_ns - standing.t_ns) / S + HELD_MPS
         standing = standing.after(*sample[:2], slowest_mps, pace.runs)
         kept += [] if standing.silent else [sample]

@@ -9,7 +9,7 @@
 """The train as a point mass: brake force and running resistance, Xie et al. 2019, (1)-(6).
 
 Everything is SI. The published running-resistance coefficients take km/h; the conversion stays inside
-`Train.basic_resistance`.
+`Train.resistance_si`.
 """
 
 import math

@@ -12,16 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_node.real.plant.creep import SLIDING
 from sim_node.real.plant.journey import PERIOD_S, Journey
+from sim_node.real.plant.validation import slid
 
 from ...core.physics.train import Array
 
 USED_S = 1.0
 """Time, centred, over which the used adhesion is averaged: slide protection swings it by its cycle."""
-
-SLID_S = 3.0
-"""An axle group that slid so lately still counts: slide protection lets it roll in between."""
 
 BORDER_RATIO = 0.75
 """A rail has a border where its adhesion falls below this share of what it was, or rises above its inverse, ..."""
@@ -49,7 +46,7 @@ class Truth(NamedTuple):
     """Adhesion that the train's force used, averaged over `USED_S`."""
     available: Array
     slid: Array
-    """Share of the axle groups that slid within the last `SLID_S`."""
+    """Share of the axle groups that slid lately: slide protection lets them roll in between."""
     remaining_m: Array
     """Way to the standstill; NaN before the full brake."""
 
@@ -57,7 +54,7 @@ class Truth(NamedTuple):
 def truth_at(journey: Journey, t_s: Array) -> Truth:
     """Look the truth up at N times, s."""
     remaining = np.where(journey.time_s >= journey.full_from_s, journey.position_m[-1] - journey.position_m, np.nan)
-    columns = (journey.speed_mps, averaged(journey.used), journey.available, slid(journey), remaining)
+    columns = (journey.speed_mps, averaged(journey.used), journey.available, slid(journey).mean(axis=1), remaining)
     return Truth(*(np.interp(t_s, journey.time_s, column) for column in columns))
 
 
@@ -68,19 +65,6 @@ def averaged(values: Array) -> Array:
     index = np.arange(values.size)
     first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, values.size)
     return np.asarray((total[last] - total[first]) / (last - first))
-
-
-def slid(journey: Journey) -> Array:
-    """Share of the axle groups that slid at any time within the last `SLID_S`, shape (T,).
-
-    A group slides from `SLIDING` of creep on: on a dry rail beyond the peak of its curve, on others about there.
-    """
-    rim = journey.wheel_radps * journey.radius_m
-    sliding = rim < (1.0 - SLIDING) * journey.speed_mps[:, np.newaxis]
-    count = np.cumsum(sliding, axis=0)
-    back = round(SLID_S / PERIOD_S)
-    before = np.concatenate((np.zeros((back, count.shape[1]), count.dtype), count))[: len(count)]
-    return np.asarray(np.mean(count > before, axis=1))
 
 
 def borders(journey: Journey) -> list[Border]:

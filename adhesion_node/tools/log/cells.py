@@ -86,7 +86,7 @@ def grouped(cells: "pd.Series[Any]", decimal: str) -> Flags:
 def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype[np.int64]]":
     """Return the times of cells in whole nanoseconds, shape (n,), exactly; `NO_TIME` for what is none.
 
-    A date without zone is taken as it stands: the zone is that of the log as a whole (time.py).
+    A date without zone is taken as it stands: the zone is that of the log as a whole (clock.py).
     """
     if pd.api.types.is_datetime64_any_dtype(cells):
         return _stamps(cells)

@@ -58,10 +58,13 @@ def creep(journey: Journey) -> Array:
     return np.asarray((speed - journey.wheel_radps * journey.radius_m) / np.maximum(speed, CREEPING_MPS))
 
 
-def remembered(flags: NDArray[np.bool_], seconds: float = REMEMBERED_S) -> NDArray[np.bool_]:
-    """Return where a flag was up at some time within the last seconds; along the first axis."""
-    count = np.cumsum(flags, axis=0)
-    periods = round(seconds / PERIOD_S)
+def slid(journey: Journey) -> NDArray[np.bool_]:
+    """Return which groups slid at some time within the last `REMEMBERED_S`, shape (T, A).
+
+    A group slides from `SLIDING` of creep on: on a dry rail beyond the peak of its curve, on others about there.
+    """
+    count = np.cumsum(creep(journey) > SLIDING, axis=0)
+    periods = round(REMEMBERED_S / PERIOD_S)
     before = np.concatenate([np.zeros_like(count[:periods]), count[:-periods]])
     return np.asarray(count > before[: len(count)])
 
@@ -72,23 +75,23 @@ def figures(journey: Journey, full_s: float) -> Figures:
     stop = float(journey.position_m[-1] - journey.position_m[begin])
     judged = (journey.time_s > journey.full_from_s + full_s) & (journey.speed_mps > SLOWEST_MPS)
     creeps = creep(journey)
-    slid = remembered(creeps > SLIDING)[judged]
+    slides = slid(journey)[judged]
     used, available, creeps = journey.used[judged], journey.available[judged], creeps[judged]
     pressure = journey.cylinder_pa[judged]
     dumps = np.diff(pressure, axis=0) < -DUMPED * pressure[:-1]
     starts = int((dumps[1:] & ~dumps[:-1]).sum())
     beyond = creeps[creeps > SLIDING]
-    mostly = slid.mean(axis=1) >= 0.5
+    mostly = slides.mean(axis=1) >= 0.5
     nothing = not beyond.size
     return Figures(
         stop,
         float(journey.speed_mps[begin] ** 2 / (2.0 * stop)),
         float(used.mean()),
         float(available.mean()),
-        float(slid.mean()),
+        float(slides.mean()),
         float(used[mostly].sum() / available[mostly].sum()) if mostly.any() else np.nan,
         np.nan if nothing else float(np.median(beyond)),
         np.nan if nothing else float(np.mean((beyond > BAND[0]) & (beyond < BAND[1]))),
         np.nan if nothing else float(np.quantile(beyond, 0.95)),
-        starts / (slid.sum() * PERIOD_S) if slid.any() else np.nan,
+        starts / (slides.sum() * PERIOD_S) if slides.any() else np.nan,
     )

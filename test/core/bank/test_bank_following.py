@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 from banks import CONFIG, FULL_PA, S
 
-from adhesion_node.core.bank.following import followed, met
+from adhesion_node.core.bank.following import followed, met, off
 from adhesion_node.core.bank.layout import BRAKE, MU, POSITION, SCALE, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail
@@ -82,6 +82,20 @@ def test_a_speed_between_two_positions_counts_at_its_own_time() -> None:
     in_turn = on(CONFIG, start, before, Measurement(until, 32.0, 0.01, 0.0))
     for one, other in zip(at_once.bank.moments(), in_turn.bank.moments(), strict=True):
         assert one == pytest.approx(other, rel=1e-6, abs=1e-9)
+
+
+def test_what_was_foreseen_of_a_position_need_not_be_foreseen_again() -> None:
+    """It is the very bank that the position is taken into, in a braking, too."""
+    fixes = [Measurement(S + k * S // 5, 8.0 * k, 0.01, 0.0 if k < 4 else FULL_PA) for k in range(8)]
+    *before, last = fixes
+    memory = on(CONFIG, met(CONFIG, before[0]), *before[1:])
+    foreseen = off(CONFIG, memory, last)
+    found = followed(CONFIG, memory, last, lambda: WET, foreseen)
+    for one, other in zip(found.bank, on(CONFIG, memory, last).bank, strict=True):
+        assert np.array_equal(one, other)
+    assert foreseen.bank is not None
+    moved = foreseen._replace(bank=foreseen.bank.with_fresh(BRAKE, 0.9, 0.01))
+    assert followed(CONFIG, memory, last, lambda: WET, moved).bank.mean_of(BRAKE) == pytest.approx(0.9, abs=0.02)
 
 
 def test_many_accelerations_say_what_their_mean_says_with_a_part_of_the_variance() -> None:

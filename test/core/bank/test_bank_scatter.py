@@ -17,6 +17,7 @@ from test_bank_trust import Run, assert_known, followed
 
 from adhesion_node.core import ImuSample, Outcome, SpeedSample
 from adhesion_node.core.bank.findings.learnt import learnt
+from adhesion_node.core.bank.labels.noises import NOISES, of_receiver
 from adhesion_node.core.bank.sensors.scatter import FAR, LASTING, PLACE_FAR, Coloured, Scatter
 
 H = 0.1
@@ -132,6 +133,36 @@ def test_positions_that_tell_less_than_their_noise_are_known_for_it(told_m: floa
     braked = [each for each in found.estimates if each.t_ns > 10 * S]
     assert all(abs(each.speed_mps - found.speed_at(each)) < 4.0 * each.speed_std_mps for each in braked)
     assert all(each.mu_lower < mu for each in braked)
+
+
+@pytest.mark.parametrize(("told_m", "wanders_m", "white_m"), [(0.2, 2.0, 0.1), (3.0, 1.0, 0.05), (3.0, 2.0, 0.1)])
+def test_a_receiver_may_wander_by_another_measure_than_it_declares(
+    told_m: float, wanders_m: float, white_m: float
+) -> None:
+    """Over 30 s; 3 m stand for what declares nothing. The train runs on for 30 s before it brakes."""
+    off, kept = list[float](), list[bool]()
+    for seed in range(12):
+        times, truth, _ = braked_run(0.03, seed, 40.0)
+        before = np.arange(-30.0, 0.0, H)
+        times = np.concatenate((before, times)) + 30.0
+        places = np.concatenate((truth[0, 0] + truth[0, 1] * before, truth[:, 0]))
+        speeds = np.concatenate((np.full(before.size, truth[0, 1]), truth[:, 1]))
+        errors = lasting(times.size, wanders_m, 30.0, seed + 300)
+        errors += white_m * np.random.default_rng(seed + 400).standard_normal(times.size)
+        found = Run(times, speeds, *followed(measurements(times, places + errors, told_m)))
+        braked = [each for each in found.estimates if each.t_ns > 42 * S]
+        off += [(each.speed_mps - found.speed_at(each)) / each.speed_std_mps for each in braked]
+        kept += [each.mu_lower < 0.03 for each in braked]
+    assert np.mean(np.abs(off) < 3.0) > 0.99
+    assert np.mean(kept) > 0.99
+
+
+def test_what_satellites_do_is_no_twin_of_what_a_receiver_declares() -> None:
+    own = {index: noise.least_slow_m for index, noise in enumerate(NOISES) if not noise.white}
+    for declared_m, of in ((0.2, {2.0}), (1.0, {2.0}), (2.0, {1.0}), (3.0, {1.0, 2.0}), (8.0, {1.0, 2.0})):
+        found = of_receiver(declared_m)
+        assert {own[index] for index in found if index in own} == of
+        assert set(range(len(NOISES))) - set(own) < set(found)
 
 
 @pytest.mark.parametrize("mu", [0.3, 0.06, 0.03])

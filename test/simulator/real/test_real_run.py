@@ -15,7 +15,7 @@ from rides import SPEED_MPS, ride
 from adhesion_node.wire.topics import POSITION
 from sim_node.real.drive import START_S, Drive, sense
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
-from sim_node.real.run import slid, ticks, truths
+from sim_node.real.run import ticks, truths
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.plant import ADHESION_LIMITED, BRAKE_LIMITED, COASTING
 from sim_node.train.scenario import SCENARIOS
@@ -52,13 +52,15 @@ def test_the_truth_comes_at_its_rate_with_the_adhesion_that_is_used() -> None:
 
 def test_adhesion_limits_where_half_of_the_groups_slid_within_3_s() -> None:
     time_s = RIDE.journey.time_s
-    share = np.where((time_s > 30.0) & (time_s < 31.0), 0.5, 0.25)
-    journey = RIDE.journey._replace(sliding=share)
-    assert time_s[slid(journey) >= 0.5][[0, -1]] == pytest.approx([30.02, 33.96], abs=0.05)
+    wheels = RIDE.journey.speed_mps[:, np.newaxis] / RIDE.journey.radius_m
+    for group in range(wheels.shape[1] // 2):  # one behind the other
+        wheels[(time_s > 30.0 + group / 10) & (time_s < 30.1 + group / 10), group] *= 0.9
+    journey = RIDE.journey._replace(wheel_radps=wheels)
     told = truths(journey)
     assert {truth.regime for truth in told if truth.t_ns < 20e9} == {COASTING}
     assert {truth.regime for truth in told if 21e9 < truth.t_ns < 30e9} == {BRAKE_LIMITED}
-    assert {truth.regime for truth in told if 30.1e9 < truth.t_ns < 33.8e9} == {ADHESION_LIMITED}
+    assert {truth.regime for truth in told if 30.2e9 < truth.t_ns < 33.0e9} == {ADHESION_LIMITED}
+    assert {truth.regime for truth in told if 33.2e9 < truth.t_ns < 40e9} == {BRAKE_LIMITED}
     assert told[0].speed_mps == SPEED_MPS
 
 

@@ -22,7 +22,7 @@ from adhesion_node.study.__main__ import main
 from adhesion_node.study.real import point_mass
 from adhesion_node.study.real.cases import CASES, chosen
 from adhesion_node.study.real.trials import arrays, found
-from adhesion_node.study.real.truth import slid
+from adhesion_node.study.real.truth import truth_at
 from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.sensors.fitted import FITTED
 
@@ -71,7 +71,7 @@ def test_the_point_mass_slides_all_the_way_to_its_standstill() -> None:
     journey = drive.journey
     assert journey.speed_mps[-1] == 0.0
     braked = (journey.time_s > journey.full_from_s + 0.1) & (journey.speed_mps > 0.1)
-    assert np.all(slid(journey)[braked] == 1.0)
+    assert np.all(truth_at(journey, journey.time_s).slid[braked] == 1.0)
     assert journey.used[braked] == pytest.approx(0.07)
     assert [at_s for at_s, _ in drive.messages] == sorted(at_s for at_s, _ in drive.messages)
 

@@ -18,7 +18,7 @@ from adhesion_node.core import Config, Estimate, Prediction, Regime
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.study.real.trials import arrays, naive, rows_of
-from adhesion_node.study.real.truth import averaged, borders, slid, truth_at
+from adhesion_node.study.real.truth import averaged, borders, truth_at
 from adhesion_node.study.trial.estimators import LaneResult, Output
 from sim_node.real.drive import START_S
 
@@ -38,8 +38,8 @@ def test_axles_that_slid_lately_count_and_rolling_ones_do_not() -> None:
     at = (MADE.time_s >= 20.0) & (MADE.time_s < 20.5)
     wheels[at, 0] *= 0.6
     wheels[(MADE.time_s >= 22.0) & (MADE.time_s < 22.1), 1] *= 0.6
-    share = np.interp([19.9, 20.2, 22.05, 23.2, 23.6, 25.2], MADE.time_s, slid(MADE._replace(wheel_radps=wheels)))
-    assert share == pytest.approx([0.0, 0.25, 0.5, 0.5, 0.25, 0.0])
+    truth = truth_at(MADE._replace(wheel_radps=wheels), np.array([19.9, 20.2, 22.05, 23.2, 23.6, 25.2]))
+    assert truth.slid == pytest.approx([0.0, 0.25, 0.5, 0.5, 0.25, 0.0])
 
 
 def test_the_way_that_remains_is_the_true_one_under_the_full_brake() -> None:

@@ -38,7 +38,7 @@ from .ahead import (
 if TYPE_CHECKING:
     from ...config import Config
 
-TWO_SIDED_95 = 3.92
+WIDTH_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
 SLOWING = 0.02
@@ -74,7 +74,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     used = use(config, bank, memory.braking, resistance(config, bank))
     wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
     low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
-    rail = Rail(max(middle, 0.0), (high - low) / TWO_SIDED_95, min(max(bound, 0.0), max(middle, 0.0)))
+    rail = Rail(max(middle, 0.0), (high - low) / WIDTH_95, min(max(bound, 0.0), max(middle, 0.0)))
     if not memory.braked:
         free = before
         if rail.mu > SLOWING:

@@ -44,6 +44,9 @@ LEARNING_MPS = 5.0
 BRAKE_BELOW = 0.05
 """Share of sliding axles below which the brake limits."""
 
+SOME_SLIDE, TOLD = 0.25, 4.0
+"""Share of sliding axles from which adhesion limits, and the log odds per second by which wheels tell which does."""
+
 RISEN = 1.02
 """Times its lowest speed from which the fastest rim has risen, more than by noise."""
 
@@ -194,5 +197,5 @@ def told(share: float | None, dumping: bool, fell: bool = False) -> float:
     if fell:
         return FALLS
     if share is None:
-        return 4.0 if dumping else 0.0
-    return 4.0 if share >= 0.25 else -4.0 if share < BRAKE_BELOW else math.copysign(0.0, 1.0)
+        return TOLD if dumping else 0.0
+    return TOLD if share >= SOME_SLIDE else -TOLD if share < BRAKE_BELOW else 0.0

@@ -36,9 +36,6 @@ for minutes four come by chance."""
 SPAN_NS, LEAST = round(max(LOOKS_S) * S), 8
 """Time of the positions that are kept, and how many must be looked at together."""
 
-RECEIVER = 1
-"""Index into `NOISES` of what satellites may always do."""
-
 BRAKE_ERROR, RESISTANCE_ERROR = 1.15, 1.2
 """Factors on the full brake and the running resistance that are still possible."""
 
@@ -118,12 +115,12 @@ UNBRAKED = Course()
 def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:
     """Mean variance of the white errors, m^2, and of the worst that wander over the time that they last, m^2/s."""
     white, slow = float(bank.weight @ white_variance(bank, declared_m)), _wandering(declared_m)
-    return white, max(slow[noise] for noise in {RECEIVER, *bank.noise.tolist()})
+    return white, max(slow[noise] for noise in {noises.RECEIVER, *bank.noise.tolist()})
 
 
 @lru_cache(maxsize=64)  # a receiver mostly declares the same
 def _wandering(declared_m: float) -> tuple[float, ...]:
-    return tuple(max(noise.slow * declared_m, noise.least_slow_m) ** 2 / noise.lasts_s for noise in noises.NOISES)
+    return tuple(noise.slow_m(declared_m) ** 2 / noise.lasts_s for noise in noises.NOISES)
 
 
 def _error(white: float, slow: float, span_s: float, count: int) -> float:

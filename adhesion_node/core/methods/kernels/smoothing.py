@@ -28,7 +28,6 @@ if TYPE_CHECKING:
     from .filtering import Particles
 
 Array = NDArray[np.float64]
-Singles = NDArray[np.float32]
 Indices = NDArray[np.int64]
 Bounds = NDArray[np.uint64]
 """Never negative, so that no index has to be asked whether it counts from the end."""

@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from sim_node.real.plant.journey import PERIOD_S, Journey
+from sim_node.real.plant.validation import slid
 
 from ....core.physics.train import Array
 from ....run.results.score import CONVERGED_AFTER_MPS
 from ..cases import Case
 from ..score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M, UNSEEN_S
 from ..trials import SLOWEST_MPS
-from ..truth import Border, borders, slid
+from ..truth import Border, borders
 from .unknown import STEP_S, Unknown, unknown_of
 
 SEEDS = (5000, 5001, 5002, 5003)
@@ -74,9 +75,10 @@ def _course(journey: Journey, built_after_s: float) -> Course:
     start = int(np.searchsorted(journey.time_s, journey.full_from_s - BEFORE_S))
     count = (journey.time_s.size - start) // stride
     demanded = np.maximum.accumulate(journey.demanded_pa > 0.0)
+    since_s, share = journey.time_s - journey.full_from_s, slid(journey).mean(axis=1)
     time_s, speed, used, sliding, braked = (
         column[start : start + count * stride].reshape(count, stride).mean(axis=1)
-        for column in (journey.time_s - journey.full_from_s, journey.speed_mps, journey.used, slid(journey), demanded)
+        for column in (since_s, journey.speed_mps, journey.used, share, demanded)
     )
     at_full = float(np.interp(0.0, time_s, speed))
     limits = (time_s >= built_after_s) & (sliding >= LIMITS_FROM) & (speed > SLOWEST_MPS)
