@@ -54,7 +54,7 @@ def _noises() -> Iterator[Sequence[str]]:
     for each in noises.NOISES:
         parts = ((each.white, each.least_white_m), (each.slow, each.least_slow_m))
         stds = (_std(*part) for part in parts)
-        yield *stds, f"{each.lasts_s:g}" if each.slow_m(1.0) else "–", f"{each.prior:g}"
+        yield *stds, f"{each.lasts_s:g}" if each.stds_m(1.0)[1] else "–", f"{each.prior:g}"
 
 
 def _std(of_declared: float, least_m: float) -> str:

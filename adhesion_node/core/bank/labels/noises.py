@@ -26,9 +26,9 @@ class Noise(NamedTuple):
     """Correlation time of the slow part."""
     prior: float
 
-    def slow_m(self, declared_m: float) -> float:
-        """Standard deviation of the slow part, m, where so much is declared."""
-        return max(self.slow * declared_m, self.least_slow_m)
+    def stds_m(self, declared_m: float) -> tuple[float, float]:
+        """Standard deviations of the white and the slow part, m, where so much is declared."""
+        return max(self.white * declared_m, self.least_white_m), max(self.slow * declared_m, self.least_slow_m)
 
 
 NOISES = (
@@ -36,10 +36,12 @@ NOISES = (
     Noise(0.03, 0.05, 1.0, 1.0, 30.0, 0.2),
     Noise(0.03, 0.05, 1.0, 1.0, 200.0, 0.05),
     Noise(0.03, 0.05, 1.0, 1.0, 2000.0, 0.05),
+    Noise(0.05, 0.05, 1.0, 1.0, 2000.0, 0.03),
     Noise(1.0, 0.0, 1.0, 2.0, 30.0, 0.2),
     Noise(0.25, 0.1, 1.0, 2.0, 30.0, 0.1),
-    Noise(0.0, 0.05, 0.0, 1.0, 30.0, 0.05),
-    Noise(0.0, 0.1, 0.0, 2.0, 30.0, 0.05),
+    Noise(0.0, 0.05, 0.0, 1.0, 30.0, 0.02),
+    Noise(0.0, 0.1, 0.0, 1.0, 30.0, 0.02),
+    Noise(0.0, 0.1, 0.0, 2.0, 30.0, 0.02),
 )
 """The last ones are satellites' own, whatever is declared: of a receiver that wanders by half of what it declares, or
 by ten times as much, the hypothesis nearest would else be one that hardly wanders, and takes the rest for the train."""
@@ -47,8 +49,9 @@ by ten times as much, the hypothesis nearest would else be one that hardly wande
 RECEIVER = 1
 """Index of what satellites may always do, by what they declare."""
 
-TWINS = 1.45
-"""Slow parts of satellites within this factor are the same: two such hypotheses leave the rail half of the room."""
+TWINS = 1.7, 1.45
+"""Where the white and the slow part of satellites are within these factors of another's they are the same: two such
+hypotheses leave the rail half of the room."""
 
 LASTS = np.array([noise.lasts_s for noise in NOISES])
 WHITE = np.array([(noise.white, noise.least_white_m) for noise in NOISES])
@@ -57,6 +60,10 @@ SLOW = np.array([(noise.slow, noise.least_slow_m) for noise in NOISES])
 
 def of_receiver(declared_m: float) -> list[int]:
     """Indices of how a receiver may err that declares so much, m."""
-    wanders_m = NOISES[RECEIVER].slow_m(declared_m)
-    own = (each.white > 0.0 or not 1.0 / TWINS < each.least_slow_m / wanders_m < TWINS for each in NOISES)
-    return [index for index, fits in enumerate(own) if fits]
+    by_declared = NOISES[RECEIVER].stds_m(declared_m)
+
+    def is_twin(noise: Noise) -> bool:
+        pairs = zip(TWINS, noise.stds_m(declared_m), by_declared, strict=True)
+        return not noise.white and all(1.0 / factor < own / std < factor for factor, own, std in pairs)
+
+    return [index for index, noise in enumerate(NOISES) if not is_twin(noise)]

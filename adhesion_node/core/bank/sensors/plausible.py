@@ -120,7 +120,7 @@ def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:
 
 @lru_cache(maxsize=64)  # a receiver mostly declares the same
 def _wandering(declared_m: float) -> tuple[float, ...]:
-    return tuple(noise.slow_m(declared_m) ** 2 / noise.lasts_s for noise in noises.NOISES)
+    return tuple(noise.stds_m(declared_m)[1] ** 2 / noise.lasts_s for noise in noises.NOISES)
 
 
 def _error(white: float, slow: float, span_s: float, count: int) -> float:
