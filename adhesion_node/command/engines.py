@@ -12,6 +12,7 @@ import errno
 import logging
 import multiprocessing
 import os
+import re
 import signal
 import threading
 from collections.abc import Iterator
@@ -56,6 +57,8 @@ def cluster(address: str) -> Iterator[Executor]:
         from distributed import CancelledError, Client, KilledWorker
     except ImportError as error:
         raise ValueError(f"scheduler = {address}: needs the extra cluster, pip install '.[cluster]'") from error
+    if not re.fullmatch(r"(\w+://)?[^/]+:\d+", address):
+        raise ValueError(f"scheduler = {address}: write tcp://HOST:PORT")
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # what matters is raised, in one line
     try:
         client = Client(address, timeout=CONNECT_S, set_as_default=False)

@@ -38,10 +38,9 @@ def address_options() -> argparse.ArgumentParser:
 
 
 def _port(text: str) -> int:
-    number = int(text)
-    if not 0 <= number <= 65535:
+    if not (text.isdecimal() and int(text) <= 65535):
         raise argparse.ArgumentTypeError(f"{text}: give a port from 0 to 65535")
-    return number
+    return int(text)
 
 
 if __name__ == "__main__":

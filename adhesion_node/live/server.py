@@ -128,8 +128,8 @@ class Server:
     async def _checked(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Answer those alone who ask for this server by a name of its own, and no other site's script."""
         self._guard.asked(request)
-        origin = request.headers.get("Origin", "").partition("://")[2]
-        if not allowed(request.host, self._host) or (origin and origin != request.host):
+        own = {None, f"http://{request.host}", f"https://{request.host}"}
+        if not allowed(request.host, self._host) or request.headers.get("Origin") not in own:
             raise web.HTTPForbidden(text=f"Host = {request.host!r}: ask for {self.url} or by an address\n")
         return await handler(request)
 

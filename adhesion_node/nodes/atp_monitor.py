@@ -22,6 +22,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -39,12 +40,13 @@ from adhesion_node.wire.settings.shared import ATP_SETTINGS, Watchdogs
 from adhesion_node.wire.topic import Topic
 
 from .ros import qos, runtime
-from .ros.diagnostics import Diagnostics, Finding, Told
+from .ros.diagnostics import Diagnostics, Finding, Told, doubled
 from .ros.managed import ManagedNode
 from .ros.params import current, declare
 from .ros.types import new
 
 PARAMETERS = ATP_SETTINGS
+TARGET = ("target_position_m", "target_speed_kmh")
 
 EXAMPLES = (
     "atp_monitor --ros-args -p target_position_m:=6000.0 -p target_speed_kmh:=100.0",
@@ -125,12 +127,17 @@ class AtpMonitor(ManagedNode):
         except Rejected as refusal:
             self._step(Refused(Part.TARGET, str(refusal)))
             return
-        asked = {
-            "target_position_m": self._line.sign * target.position_m,
-            "target_speed_kmh": target.speed_mps / KMH,
-        }
-        result = self.set_parameters_atomically([Parameter(name, value=value) for name, value in asked.items()])
-        self._step(Tick.TARGET if result.successful else Refused(Part.TARGET, result.reason))
+        asked = zip(TARGET, (self._line.sign * target.position_m, target.speed_mps / KMH), strict=True)
+        result = self.set_parameters_atomically([Parameter(name, value=value) for name, value in asked])
+        if not result.successful:
+            self._step(Refused(Part.TARGET, result.reason))
+
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+        """Set parameters together, or none of them; a target holds, and ends the refusal of another, also unchanged."""
+        result = super().set_parameters_atomically(parameter_list)
+        if result.successful and {each.name for each in parameter_list} & set(TARGET):
+            self._step(Tick.TARGET)
+        return result
 
     def _change(self, values: Mapping[str, Any]) -> Callable[[], None]:
         """A new target, or whatever of the supervision, holds from the next judgement on."""
@@ -138,8 +145,8 @@ class AtpMonitor(ManagedNode):
 
         def put_in_force() -> None:
             if self.configured:
-                before, self._config = _target(self._config), config
-                self._step(Tick.RULES if _target(config) == before else Tick.TARGET)
+                self._config = config
+                self._step(Tick.RULES)
 
         return put_in_force
 
@@ -183,11 +190,8 @@ class AtpMonitor(ManagedNode):
         if self._decision is None:
             return [Finding(Severity.ERROR, "nothing judged yet: does the clock run?")], {}
         finding = Finding(self._decision.severity, self._decision.message)
-        return [finding], self._decision.numbers(self._config)
-
-
-def _target(config: SupervisionConfig) -> tuple[float, float]:
-    return config.target_position_m, config.target_speed_kmh
+        findings = [finding, *doubled(self, (topics.STATE, topics.BRAKING_CURVE))]
+        return findings, self._decision.numbers(self._config)
 
 
 def _log(node: Node, decision: Decision, awaited: bool) -> None:

@@ -206,6 +206,9 @@ def test_who_asks_by_a_foreign_name_is_refused(live: Live, path: str) -> None:
 def test_another_sites_script_cannot_watch(live: Live) -> None:
     with pytest.raises(aiohttp.WSServerHandshakeError), viewer.watching(live.server.url, Origin="http://evil.example"):
         pass
+    for nobody in ("null", "file://", "data:"):  # a frame of any site that is shut in says so
+        with pytest.raises(aiohttp.WSServerHandshakeError), viewer.watching(live.server.url, Origin=nobody):
+            pass
     with viewer.watching(live.server.url, Origin=live.server.url.rstrip("/")) as watcher:
         assert watcher.receive()
 

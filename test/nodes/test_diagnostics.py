@@ -172,6 +172,24 @@ def test_two_publishers_of_a_sensor_are_told(make_line: Callable[..., Line]) -> 
     assert line.last.level != DiagnosticStatus.OK
 
 
+def test_two_estimators_of_a_monitor_are_told(make_line: Callable[..., Line]) -> None:
+    line = make_line(AtpMonitor, diagnostics_period_s=0.1, namespace="/train1")
+    _outputs = [line.outlet(topics.BRAKING_CURVE) for _ in range(2)]
+    line.wait_until_said("2 publishers of /train1/adhesion/braking_curve: stop all but one")
+
+
+def test_a_receiver_that_sends_what_is_refused_is_silent(make_line: Callable[..., Line]) -> None:
+    line = make_line(Estimator, diagnostics_period_s=0.1, sensor_timeout_s=0.5)
+    position = line.outlet(topics.POSITION)
+
+    def silent() -> bool:
+        position.publish(messages.position(S, float("nan"), 0.5))
+        return bool(line.told) and line.last.level == DiagnosticStatus.STALE
+
+    line.wait(silent)
+    assert "nothing that can be used for " in line.last.message.partition("position x = nan")[0]
+
+
 def test_a_second_clock_is_told_by_the_name_it_really_has(make_line: Callable[..., Line]) -> None:
     remapped = ["--ros-args", "-r", "/clock:=/simulated/clock"]
     line = make_line(partial(Estimator, cli_args=remapped), use_sim_time=True)

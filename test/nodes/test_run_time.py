@@ -215,3 +215,6 @@ def test_a_target_that_is_not_understood_is_an_emergency_until_one_is(
     assert levels(line)[0] == "EMERGENCY_BRAKE", "another parameter is no target"
     line.next_status(lambda: output.publish(topics.ATP_TARGET.build(new, 0, Target(5000.0, 0.0))))
     assert levels(line)[0] == "NORMAL"
+    line.next_status(lambda: output.publish(spoilt(spoil)))
+    assert ask(line, f"{NAMESPACE}/atp_monitor", target_position_m=5000.0).successful
+    assert levels(line)[0] == "NORMAL", "the parameter's target holds, which is the same"

@@ -152,7 +152,7 @@ def _heard(config: SupervisionConfig, known: Known, event: Event) -> Known:
             late = newest is not None and event.t_ns <= newest
             return known if late else _state_heard(config, known, event, event.t_ns > horizon_ns)
         case StampedCurve():
-            late = isinstance(known.curve, StampedCurve) and event.t_ns < known.curve.t_ns
+            late = isinstance(known.curve, StampedCurve) and event.t_ns <= known.curve.t_ns
             ahead = event.t_ns > horizon_ns
             curve = Unavailable(out_of_date(config, event.age_s(known.latest_ns))) if ahead else event
             return known if late else known._replace(curve=curve)

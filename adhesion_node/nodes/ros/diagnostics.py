@@ -12,7 +12,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from rclpy.clock import Clock
+from rclpy.clock import Clock, ROSClock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 
@@ -22,7 +22,7 @@ from adhesion_node.wire.line import TRAIN
 from adhesion_node.wire.messages.results import Status
 from adhesion_node.wire.settings.telling import Telling
 from adhesion_node.wire.topic import Topic
-from adhesion_node.wire.topics import DIAGNOSTICS
+from adhesion_node.wire.topics import CLOCK, DIAGNOSTICS
 
 from . import qos
 from .types import new
@@ -40,6 +40,19 @@ class Finding(NamedTuple):
 
 Told = tuple[list[Finding], dict[str, str]]
 """What there is to tell: findings, at least one, and numbers by name."""
+
+
+def doubled(node: Node, inputs: Iterable[Topic]) -> list[Finding]:
+    """Name what is published by more than one: sensors or estimators that get mixed up, a time that jumps."""
+    clock = node.get_clock()
+    clocks = (CLOCK,) if isinstance(clock, ROSClock) and clock.ros_time_is_active else ()
+    names = [node.resolve_topic_name(topic.name) for topic in (*inputs, *clocks)]
+    counts = {name: node.count_publishers(name) for name in names}
+    return [
+        Finding(Severity.WARN, f"{count} publishers of {name}: stop all but one")
+        for name, count in counts.items()
+        if count > 1
+    ]
 
 
 class Diagnostics:

@@ -12,7 +12,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from rclpy.clock import ROSClock
 from rclpy.node import Node
 
 from adhesion_node.core import Event
@@ -24,13 +23,15 @@ from adhesion_node.wire.messages.refused import Reason, Rejected
 from adhesion_node.wire.topic import Topic
 
 from . import qos
-from .diagnostics import Finding
+from .diagnostics import Finding, doubled
 from .silence import Silence
 
 BY_SPEED = "no position: the train is followed by its speed alone, wherever it is on the track"
 
 
 AS_WANTED = (Reason.OTHER_SOURCE.name, Reason.SWITCHED_OFF.name)
+UNUSED = (*AS_WANTED, Reason.DISABLED.name)
+"""Reasons of a refusal that say nothing against the message: its sensor is alive."""
 
 
 class Listener(Protocol):
@@ -64,6 +65,7 @@ class Intake:
         self._counts: Counter[str] = Counter()
         self._refusals: dict[str, str] = {}
         self._events: dict[str, str] = {}
+        self._refused = ""
         self._silence = Silence(node, timeout_s, self._on_silence)
         for topic in reader.inputs:
             qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
@@ -107,7 +109,7 @@ class Intake:
             found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
-        return found + self._doubled()
+        return found + doubled(self._node, self._reader.inputs)
 
     @property
     def _watched(self) -> list[str]:
@@ -115,21 +117,11 @@ class Intake:
         source = self._reader.source
         return [self._node.resolve_topic_name(one.name) for one in ((source,) if source else self._reader.anchors)]
 
-    def _doubled(self) -> list[Finding]:
-        """Name what is published by more than one: sensors that get mixed up, a time that jumps."""
-        clock = self._node.get_clock()
-        clocks = (topics.CLOCK,) if isinstance(clock, ROSClock) and clock.ros_time_is_active else ()
-        names = [self._node.resolve_topic_name(topic.name) for topic in (*self._reader.inputs, *clocks)]
-        counts = {name: self._node.count_publishers(name) for name in names}
-        return [
-            Finding(Severity.WARN, f"{count} publishers of {name}: stop all but one")
-            for name, count in counts.items()
-            if count > 1
-        ]
-
     def _silent(self, for_s: float) -> str:
         names = self._watched
         name = " or ".join(names)
+        if self._refused:
+            return f"{name}: nothing that can be used for {for_s:.1f} s: {self._refused}"
         if self._silence.ever_heard:
             return f"{name}: nothing for {for_s:.1f} s: is the sensor alive? If it is that slow, raise sensor_timeout_s"
         publishers = sum(map(self._node.count_publishers, names))
@@ -145,21 +137,28 @@ class Intake:
             self.heard[topic] += 1
             if not self._listener.active:
                 return
-            if topic in self._reader.anchors and self._reader.source in (None, topic):
-                self._silence.heard()
-                self._events.pop(self._node.resolve_topic_name(topic.name), None)
             try:
                 sample = self._sample(topic, message)
             except Rejected as refusal:
+                self._heard(topic, str(refusal) if refusal.reason not in UNUSED else "")
                 self._listener.refuse(topic, refusal)
                 if refusal.reason not in AS_WANTED:  # nothing is wrong: it is counted
                     self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
             else:
+                self._heard(topic)
                 for event in self._listener.take(sample):
                     if event.is_told:
                         self.note(event.outcome.name, str(event))
 
         return receive
+
+    def _heard(self, topic: Topic, refused: str = "") -> None:
+        """Note that the watched topic is not silent; with what is refused it is."""
+        if topic in self._reader.anchors and self._reader.source in (None, topic):
+            self._refused = refused
+            if not refused:
+                self._silence.heard()
+                self._events.pop(self._node.resolve_topic_name(topic.name), None)
 
     def _sample(self, topic: Topic, message: Any) -> Any:
         if not self.enabled:

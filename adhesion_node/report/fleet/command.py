@@ -29,7 +29,7 @@ def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
     if recordings:
         raise ValueError(f"bags = {', '.join(recordings)}: give recordings, or tables of brakings, not both")
     if parameters_of(options) or options.estimate or options.remap or options.target or options.out:
-        raise ValueError(f"tables = {', '.join(paths)}: are shown as written, give settings to `brakings`")
+        raise ValueError(f"tables = {', '.join(paths)}: are shown as written: leave out settings, --target and --out")
     fleet = read_fleet([Path(path) for path in paths])
     html, spots = fleet_page(fleet, options.low), low_spots(fleet.rail, options.low)
     output = Path(options.output)

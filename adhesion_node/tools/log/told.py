@@ -60,7 +60,7 @@ def units_read(form: Format) -> Iterator[str]:
     options = dict.fromkeys(f"--{FAMILIES[ours]}-unit" for ours in told if ours in FAMILIES)
     if told:
         units = ", ".join(f"{ours} in {unit}" for ours, unit in told.items())
-        yield f"units that the log names: {units}" + (f"; {', '.join(options)} say otherwise" if options else "")
+        yield f"units that the log names: {units}" + (f"; otherwise: {', '.join(options)}" if options else "")
 
 
 def ranges(log: Log) -> Iterator[str]:

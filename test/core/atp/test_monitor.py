@@ -92,6 +92,16 @@ def test_a_curve_that_comes_late_does_not_replace_a_worse_one() -> None:
     assert after.reading.braking_distance_m == before.reading.braking_distance_m
 
 
+def test_a_second_curve_of_the_same_time_does_not_replace_a_worse_one() -> None:
+    """Another estimator's, that should not be there; the node tells of it."""
+    better, worse = pair(0.5, 20.0), pair(0.5, 20.0, slowing_mps2=0.2)
+    _, said = run([*at(0.5, *worse), *at(0.6, better[0])], SUPERVISED)
+    (_, before), (_, after) = said
+    assert before.reading is not None
+    assert after.reading is not None
+    assert after.reading.braking_distance_m == before.reading.braking_distance_m
+
+
 def test_a_late_state_is_judged_by_the_newest_one() -> None:
     _, said = run([*at(0.5, *pair(0.5, 20.0)), *at(0.6, pair(0.4, 16.0)[1])], SUPERVISED)
     assert [one.state_age_s for _, one in said] == pytest.approx([0.0, 0.1])

@@ -126,7 +126,10 @@ def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture
         (["broken.parquet"], "broken.parquet: not readable"),
         (["nothing.csv"], "hold no braking"),
         (["brakings.csv", "--low", "0"], "low = 0.0: give"),
-        (["brakings.csv", "--set", "train.mass_kg=400000"], "are shown as written, give settings to `brakings`"),
+        (
+            ["brakings.csv", "--set", "train.mass_kg=400000"],
+            "are shown as written: leave out settings, --target and --out",
+        ),
     ],
 )
 def test_what_cannot_be_shown_is_said(
