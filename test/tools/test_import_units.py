@@ -49,8 +49,8 @@ def test_units_that_the_log_names_count_and_are_said(
     assert speeds == pytest.approx(ride().speed.tolist())
     assert BRAKE_PRESSURE.read(importing.messages("brake_pressure")[-1]).pressure_pa == pytest.approx(3e5)
     import_csv.main([str(importing.log), "--dry-run"])
-    said = "units that the log names: time in ms, position in ft, brake_pressure in bar, speed in kmh; --time-unit, "
-    assert said + "otherwise: --position-unit, --pressure-unit, --speed-unit" in capsys.readouterr().out
+    said = "units that the log names: time in ms, position in ft, brake_pressure in bar, speed in kmh; otherwise: "
+    assert said + "--time-unit, --position-unit, --pressure-unit, --speed-unit" in capsys.readouterr().out
 
 
 def test_a_column_is_named_with_its_unit_or_without(importing: Import) -> None:

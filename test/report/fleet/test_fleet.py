@@ -128,7 +128,7 @@ def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture
         (["brakings.csv", "--low", "0"], "low = 0.0: give"),
         (
             ["brakings.csv", "--set", "train.mass_kg=400000"],
-            "are shown as written: leave out settings, --target and --out",
+            "are shown as written: leave out settings",
         ),
     ],
 )
