@@ -22,7 +22,6 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock, ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -132,7 +131,7 @@ class AtpMonitor(ManagedNode):
         if not result.successful:
             self._step(Refused(Part.TARGET, result.reason))
 
-    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
+    def set_parameters_atomically(self, parameter_list: list[Parameter]) -> Any:
         """Set parameters together, or none of them; a target holds, and ends the refusal of another, also unchanged."""
         result = super().set_parameters_atomically(parameter_list)
         if result.successful and {each.name for each in parameter_list} & set(TARGET):
