@@ -134,7 +134,7 @@ class AtpMonitor(ManagedNode):
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> Any:
         """Set parameters together, or none of them; a target holds, and ends the refusal of another, also unchanged."""
         result = super().set_parameters_atomically(parameter_list)
-        if result.successful and {each.name for each in parameter_list} & set(TARGET):
+        if self.configured and result.successful and {each.name for each in parameter_list} & set(TARGET):
             self._step(Tick.TARGET)
         return result
 

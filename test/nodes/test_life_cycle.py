@@ -200,6 +200,13 @@ def test_a_monitor_that_is_activated_knows_nothing_of_before(make_managed: Calla
     managed.wait_until_said("state: none received yet")
 
 
+def test_a_target_may_be_set_before_the_monitor_is_configured(make_managed: Callable[..., Managed]) -> None:
+    managed = make_managed(AtpMonitor, autostart=False)
+    assert managed.node.set_parameters_atomically([Parameter("target_position_m", value=900.0)]).successful
+    assert managed.change("configure")
+    assert managed.node._config.target_position_m == 900.0
+
+
 def test_what_stands_against_a_configuration_is_told_and_the_node_stays_as_it_was(
     make_managed: Callable[..., Managed], capfd: pytest.CaptureFixture[str]
 ) -> None:

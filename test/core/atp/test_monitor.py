@@ -83,18 +83,10 @@ def test_states_sent_twice_or_out_of_order_do_not_hide_that_the_train_runs_back(
     assert "the train runs back" in late[-1].message
 
 
-def test_a_curve_that_comes_late_does_not_replace_a_worse_one() -> None:
-    better, worse = pair(0.4, 16.0), pair(0.5, 20.0, slowing_mps2=0.2)
-    _, said = run([*at(0.5, *worse), *at(0.6, better[0])], SUPERVISED)
-    (_, before), (_, after) = said
-    assert before.reading is not None
-    assert after.reading is not None
-    assert after.reading.braking_distance_m == before.reading.braking_distance_m
-
-
-def test_a_second_curve_of_the_same_time_does_not_replace_a_worse_one() -> None:
-    """Another estimator's, that should not be there; the node tells of it."""
-    better, worse = pair(0.5, 20.0), pair(0.5, 20.0, slowing_mps2=0.2)
+@pytest.mark.parametrize("stamp_s", [0.4, 0.5])
+def test_a_curve_that_comes_late_does_not_replace_a_worse_one(stamp_s: float) -> None:
+    """Nor does a second one of its stamp: another estimator's, that should not be there; the node tells of it."""
+    better, worse = pair(stamp_s, 40.0 * stamp_s), pair(0.5, 20.0, slowing_mps2=0.2)
     _, said = run([*at(0.5, *worse), *at(0.6, better[0])], SUPERVISED)
     (_, before), (_, after) = said
     assert before.reading is not None
