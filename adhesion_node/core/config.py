@@ -259,7 +259,7 @@ class Config:
         60.0,
     )
     tick_for_s: float = _intake(
-        60.0, "For how long they are so used behind the last position and speed", "s", 0.0, 3600.0
+        600.0, "For how long they are so used behind the last position, speed and wheel speed", "s", 0.0, 3600.0
     )
     gate_sigma: float = _intake(
         6.0, "Innovation in standard deviations from which a position is an outlier", low=3.0, high=1e6

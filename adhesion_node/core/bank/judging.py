@@ -30,9 +30,6 @@ from .seeing import wheels_seen
 if TYPE_CHECKING:
     from ..config import Config
 
-BRANCH_S = 0.5
-"""How often it is asked whether rail or limit have changed."""
-
 PAST_NS = 4 * S
 """How far back it can go."""
 
@@ -68,7 +65,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         return memory._replace(bank=closed(bank), seen=0)
     if not before:
         return _coasted(memory)
-    if memory.since_s >= BRANCH_S - 1e-6:
+    if memory.asks:
         if memory.course.is_impossible(config, bank, memory.declared_m):
             return misled(config, memory)
         if memory.braking.told:
@@ -82,7 +79,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
 def _coasted(memory: Memory) -> Memory:
     """No brake is applied: nothing is forgotten, and twice a second it is asked whether traction is steady."""
     memory = memory._replace(bank=unlikely_kept(memory.bank, FORGOTTEN))
-    if memory.since_s < BRANCH_S - 1e-6:
+    if not memory.asks:
         return memory
     return memory._replace(bank=mixed(memory.bank, memory.since_s), since_s=0.0)
 

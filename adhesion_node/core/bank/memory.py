@@ -40,6 +40,9 @@ HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 STEP_S = 0.2
 """Longest step in time."""
 
+ASKED_S = 0.5
+"""How often it is asked what has changed: the rail, what limits, traction, a train that hardly moves."""
+
 
 @quick
 class Memory(NamedTuple):
@@ -92,6 +95,11 @@ class Memory(NamedTuple):
     def braked(self) -> bool:
         """Whether a braking is open."""
         return self.seen > 0
+
+    @property
+    def asks(self) -> bool:
+        """Whether it is time to ask again what has changed."""
+        return self.since_s >= ASKED_S - 1e-6
 
     @property
     def is_placed(self) -> bool:

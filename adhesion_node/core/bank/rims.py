@@ -19,7 +19,6 @@ import numpy as np
 from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement
 from ..physics.train import GRAVITY
-from .gear.axles import ROLLS
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import RADIUS, SPEED, Bank
@@ -46,6 +45,9 @@ SLIDES = 0.2
 MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
 
+SLOW_MPS = 0.5
+"""Error of a rim that turns slowly or stands, as sensors tell little of it."""
+
 TRUSTED_NS = 450_000_000
 """How often the fastest rim is taken for the train's speed, as its errors last."""
 
@@ -67,10 +69,11 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
         newest = sample.without(axles.lying(memory.slowed_mps))
         wheels = wheels.after(config, newest, rim, std, pressed)
     rims = wheels.rims(config, newest)
-    wheels = wheels.agreeing(rims, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
+    known = rims if wheels.is_learnt else []
+    wheels = wheels.agreeing(known, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
-        return _beside_fastest(config, memory, wheels.fastest(rims), newest.t_ns) if rims else memory
+        return _beside_fastest(config, memory, wheels.fastest(known), newest.t_ns) if known else memory
     return _unbraked(config, memory, rims, newest.t_ns, pressed)
 
 
@@ -78,15 +81,30 @@ def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pres
     """Take in how fast the middle rim is, as some may spin; where it may slide, the train is not slower than that."""
     trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
     bank, middle = as_rolled(memory.bank, memory.wheels.wander.rolled), median(rims) if rims else 0.0
-    wheels = memory.wheels.beside(middle, t_ns) if rims else memory.wheels
+    learnt = memory.wheels.is_learnt
+    wheels = memory.wheels.beside(middle, t_ns) if rims and learnt else memory.wheels
     memory = memory._replace(
         bank=bank,
         wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander()),
     )
     if middle <= LEARNING_MPS:
+        return _slow(memory, max(rims) if pressed else middle) if rims else memory
+    if not learnt:  # the middle may lie between those that turn and those that are dead
         return memory
-    taken = not_slower if pressed else rolling
-    return memory._replace(bank=taken(memory.bank, middle).normalised())
+    bank = not_slower(bank, middle, FASTEST_SHARE * middle) if pressed else rolling(bank, middle)
+    return memory._replace(bank=bank.normalised())
+
+
+def _slow(memory: Memory, rim_mps: float) -> Memory:
+    """Take in now and then, as its error lasts, how slow a rim is: as the train, or it is locked, or dead.
+
+    Of radii that tells nothing.
+    """
+    if not memory.asks:
+        return memory
+    mean, covariance = memory.bank.moments()
+    bank = as_fast(not_slower(memory.bank, rim_mps, SLOW_MPS), rim_mps, SLOW_MPS).normalised()
+    return memory._replace(bank=as_rolled(bank, (float(mean[RADIUS]), float(covariance[RADIUS, RADIUS]))))
 
 
 def _telling(memory: Memory) -> Memory:
@@ -102,14 +120,14 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
     rim_mps -= slowing * (memory.t_ns - t_ns) / S
     if rim_mps <= config.slowest_mps:
         return memory
-    bank, wheels = not_slower(bank, rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
+    bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
     if wheels.fall_mps2 > memory.wheels.fall_mps2:
         bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)
     if memory.t_ns >= wheels.trusted_ns:
         wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
-        bank = as_fast(bank, rim_mps, errors.quick)
+        bank = as_fast(bank, rim_mps, errors.quick * rim_mps)
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
@@ -123,7 +141,7 @@ def rim_speed(bank: Bank) -> tuple[float, float]:
 
 
 def as_rolled(bank: Bank, rolled: tuple[float, float] | None) -> Bank:
-    """Where axles have slid: radii are again what they were, and their variance, before all of them crept."""
+    """Radii are again what they were, and their variance: before all of them crept, where axles have slid."""
     if rolled is None:
         return bank
     mean, covariance = bank.mean.copy(), bank.covariance.copy()
@@ -137,9 +155,8 @@ def rolling(bank: Bank, rim_mps: float) -> Bank:
     return corrected(bank, speed_seen(bank, rim_mps, (ROLLING_SHARE * rim_mps) ** 2, RADIUS))
 
 
-def not_slower(bank: Bank, rim_mps: float) -> Bank:
-    """Take in that under the brake no rim is faster than the train: only what contradicts it is corrected."""
-    std = FASTEST_SHARE * rim_mps
+def not_slower(bank: Bank, rim_mps: float, std: float) -> Bank:
+    """Take in that no rim is faster than the train but for an error, m/s: only what contradicts it is corrected."""
     seen = speed_seen(bank, rim_mps, std**2, RADIUS)
     slower = seen.innovation > 0.0
     after = corrected(bank, seen._replace(variance=np.where(slower, std**2, UNSEEN)))
@@ -162,15 +179,12 @@ def _creeping(bank: Bank, wander: Wander, rim_mps: float) -> tuple[Bank, Wander,
     return bank._replace(covariance=covariance), wander, errors
 
 
-def as_fast(bank: Bank, rim_mps: float, rolls: float = ROLLS) -> Bank:
-    """Take in that the fastest rim under the brake is as fast as the train, or slides.
-
-    `rolls` is its error where it rolls, relative.
+def as_fast(bank: Bank, rim_mps: float, error: float) -> Bank:
+    """Take in that a rim is as fast as the train but for an error, m/s, or slides.
 
     Each Gaussian becomes the one with the moments of both (probabilistic data association, Bar-Shalom and Tse 1975).
     The weights are not normalised.
     """
-    error = rolls * rim_mps
     seen = speed_seen(bank, rim_mps * (1.0 + CREEP), error**2, RADIUS)
     gain = np.einsum("hij,hj->hi", bank.covariance, seen.slope)
     std = np.sqrt(np.einsum("hi,hi->h", gain, seen.slope) + error**2)

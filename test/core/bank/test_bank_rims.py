@@ -45,28 +45,28 @@ WORN = np.array([0.975, 0.96, 0.98, 0.965])
 
 
 def test_a_slower_rim_says_nothing() -> None:
-    after = not_slower(BANK, 30.0)
+    after = not_slower(BANK, 30.0, 0.24)
     assert after.mean == pytest.approx(BANK.mean, abs=1e-6)
     assert after.covariance == pytest.approx(BANK.covariance, rel=1e-6, abs=1e-9)
     assert np.array_equal(after.log_weight, BANK.log_weight)
 
 
 def test_a_faster_rim_corrects_and_weighs() -> None:
-    after, before = not_slower(BANK, 41.5), BANK
+    after, before = not_slower(BANK, 41.5, 0.3), BANK
     assert np.all(after.mean[:, SPEED] > before.mean[:, SPEED])
     assert np.all(after.covariance[:, SPEED, SPEED] < before.covariance[:, SPEED, SPEED])
     assert np.all(after.log_weight < before.log_weight)
     rims = before.mean[:, SPEED] * (1.0 + before.mean[:, RADIUS])
     lost = before.log_weight - after.log_weight
     assert lost[np.argmin(rims)] >= lost[np.argmax(rims)]
-    assert np.all(not_slower(BANK, 1000.0).mean[:, SPEED] < 60.0)  # clipped
+    assert np.all(not_slower(BANK, 1000.0, 8.0).mean[:, SPEED] < 60.0)  # clipped
 
 
 @pytest.mark.parametrize(("off", "loses"), [(-1.0, 0.0), (1.0, 0.5), (2.0, 2.0)])
 def test_what_is_slower_than_a_rim_loses_by_the_square_of_its_deviation(off: float, loses: float) -> None:
     for index, (speed, radius) in enumerate(BANK.mean[:, (SPEED, RADIUS)]):
         rim = speed * (1.0 + radius) / (1.0 - off * FASTEST_SHARE)
-        lost = BANK.log_weight - not_slower(BANK, rim).log_weight
+        lost = BANK.log_weight - not_slower(BANK, rim, FASTEST_SHARE * rim).log_weight
         assert lost[index] == pytest.approx(loses)
 
 
@@ -75,7 +75,7 @@ def test_the_fastest_rim_is_the_trains_speed_or_slides(off: float) -> None:
     """Mean, variance and evidence of a speed known to 0.4 m/s, against sums over a grid of it."""
     bank = ALONE.with_fresh(RADIUS, 0.0, 0.0).with_fresh(SPEED, 40.0, 0.4)
     rim = (40.0 + off) / (1.0 + CREEP)
-    after = as_fast(bank, rim)
+    after = as_fast(bank, rim, ROLLS * rim)
     speed, error = np.linspace(34.0, 46.0, 24001), ROLLS * rim
     likely = norm.pdf(40.0 + off, speed, error) + SLIDES / error
     density = norm.pdf(speed, 40.0, 0.4) * likely
@@ -89,7 +89,7 @@ def test_the_fastest_rim_is_the_trains_speed_or_slides(off: float) -> None:
 
 @pytest.mark.parametrize("rim", [33.0, 1000.0])
 def test_a_rim_that_no_hypothesis_foresees_moves_nothing(rim: float) -> None:
-    after = as_fast(BANK, rim)
+    after = as_fast(BANK, rim, ROLLS * rim)
     assert after.mean == pytest.approx(BANK.mean, abs=1e-2)
     assert after.covariance == pytest.approx(BANK.covariance, rel=0.05, abs=1e-2)
     assert np.ptp(after.log_weight - BANK.log_weight) < 1e-2

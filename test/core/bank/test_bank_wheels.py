@@ -60,7 +60,7 @@ NOW = 100 * S + 900 * MS
 def test_radii_are_learnt_while_coasting() -> None:
     wheels = coasted(WORN)
     assert wheels.radius == pytest.approx(WORN / np.median(WORN), rel=1e-3)
-    assert wheels.learnt == 300
+    assert (wheels.learnt, wheels.is_learnt) == (300, True)
     assert 1e-3 < math.sqrt(wheels.noise) < 3e-3
     rims = wheels.rims(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN))
     assert rims == pytest.approx([35.0 / np.median(WORN)] * 4, rel=2e-3)
@@ -70,7 +70,7 @@ def test_radii_are_learnt_while_coasting() -> None:
 def test_nothing_is_learnt_slowly() -> None:
     wheels = coasted(WORN, speed=4.0)
     assert wheels.radius == (1.0,) * 4
-    assert wheels.rims(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN)) == []
+    assert not wheels.is_learnt
 
 
 def test_of_many_that_roll_the_fastest_is_fast_by_chance() -> None:

@@ -184,6 +184,16 @@ def test_without_position_and_speed_ticks_end_after_tick_for_s_and_a_speed_begin
     assert ticks[-1] > 109.0
 
 
+def test_wheels_carry_the_ticks_on_for_as_long_as_they_tell() -> None:
+    """A long tunnel: positions end, wheels 60 s later, and come back once nothing is left that could be followed."""
+    wheels = Sensor("wheels", 4, silent=(65.0, 100.0))
+    ticks = run(
+        [Sensor("position", 10, silent=(5.0, 1e3)), wheels, PRESSURE], 130.0, gate_of(Config(tick_for_s=20.0))
+    ).ticks_s
+    assert max(later - before for before, later in pairwise([5.0, *(t for t in ticks if t < 84.9)])) < 0.26
+    assert [t for t in ticks if t > 85.3] == []
+
+
 def test_every_sample_is_given_out_once_and_in_order() -> None:
     sensors = [Sensor("position", 1, 0.1, silent=(10.0, 20.0)), *(Sensor(name, 17) for name in list(MAKE)[1:])]
     came = run(sensors, 30.0)

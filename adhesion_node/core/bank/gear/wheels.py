@@ -138,9 +138,14 @@ class WheelsSeen(NamedTuple):
         noise = self.noise + max(LEARNT, 1.0 / self.learnt) * (sum(off) / len(off) - self.noise) if self.learnt else 0.0
         return self._replace(radius=radius, learnt=self.learnt + 1, noise=noise)
 
+    @property
+    def is_learnt(self) -> bool:
+        """Whether the radii are learnt."""
+        return self.learnt >= LEAST_LEARNT
+
     def rims(self, config: Config, sample: WheelSample) -> list[float]:
-        """Speeds of the rims that are heard, of the middle radius all, m/s; none while the radii are not learnt."""
-        if self.learnt < LEAST_LEARNT or len(self.radius) != len(sample.speeds_radps):
+        """Speeds of the rims that are heard, of the middle radius all, as far as that is learnt, m/s."""
+        if len(self.radius) != len(sample.speeds_radps):
             return []
         own = (radius * each for radius, each in zip(self.radius, sample.speeds_radps, strict=True))
         return [each * config.train.wheel_radius_m for each in own if not math.isnan(each)]
