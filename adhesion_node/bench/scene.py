@@ -69,7 +69,7 @@ def braking_window(steps: int, rng: np.random.Generator) -> Scene:
     """So many steps of 0.1 s at the nominal noise, behind a prior as earlier windows leave it."""
     motion = Config().motion
     full = np.ones(steps)
-    dt, brake = 0.1 * full, motion.train.specific_brake(motion.train.full_pressure_pa) * full
+    dt, brake = 0.1 * full, motion.train.full_brake * full
     prior = Gaussian(np.array([0.0, FASTEST_MPS]), np.array([[0.015, 0.002], [0.002, 0.0017]]))
     noise = np.sqrt(np.stack(motion.noise(dt))) * rng.standard_normal((2, steps))
     state = prior.mean + np.linalg.cholesky(prior.covariance) @ rng.standard_normal(2)

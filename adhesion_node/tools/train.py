@@ -94,13 +94,12 @@ def _work(options: argparse.Namespace) -> int:
 def figures(file: TrainFile) -> dict[str, Any]:
     """What follows from the file, by name."""
     train = file.train
-    brake = train.brake_force(train.full_pressure_pa) / train.mass_kg
     return {
         "name": file.name,
         "mass_kg": train.mass_kg,
-        "brake_per_mass_mps2": brake,
-        "deceleration_mps2": brake / (1.0 + train.rotating_mass_fraction),
-        "adhesion_used": train.specific_brake(train.full_pressure_pa) / (1.0 + train.rotating_mass_fraction),
+        "brake_per_mass_mps2": train.brake_force(train.full_pressure_pa) / train.mass_kg,
+        "deceleration_mps2": train.full_brake_mps2,
+        "adhesion_used": train.full_brake / (1.0 + train.rotating_mass_fraction),
         "build_up_s": file.build_up_s,
     }
 

@@ -76,9 +76,7 @@ class Found(NamedTuple):
     @property
     def full_brake_mps2(self) -> float:
         """What the full brake gives by this, m/s^2, with the rotating mass."""
-        train = self.config.train
-        believed = train.brake_force(train.full_pressure_pa) / train.mass_kg / (1.0 + train.rotating_mass_fraction)
-        return believed * (1.0 if self.brake is None else self.brake.mean)
+        return self.config.train.full_brake_mps2 * (1.0 if self.brake is None else self.brake.mean)
 
     @property
     def coefficients(self) -> tuple[float, float, float]:

@@ -59,7 +59,7 @@ class Slowdown(NamedTuple):
         if not callable(mu):
             _require(mu=mu)
         train, adhesion = self.train, mu(self.speed_mps) if callable(mu) else mu
-        found = train.deceleration(adhesion, train.specific_brake(train.full_pressure_pa), self.resistance)
+        found = train.deceleration(adhesion, train.full_brake, self.resistance)
         weakest = float(np.minimum.reduce(found))  # what found.min() calls
         if not weakest > 0.0:
             slowing = f"deceleration {weakest:.4g} m/s^2 at grade {self.grade:g}"

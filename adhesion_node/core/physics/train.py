@@ -92,7 +92,8 @@ class Train:
 
     def resistance_slope(self, speed_mps: Array) -> Array:
         """Derivative of `specific_resistance` with respect to the speed, s/m."""
-        return 3.6e-3 * (self.resistance_c1 + 7.2 * self.resistance_c2 * speed_mps)
+        _, c1, c2 = self.resistance_si
+        return c1 + 2.0 * c2 * speed_mps
 
     def basic_resistance(self, speed_mps: Array) -> Array:
         """Basic running resistance R1, N (6).
@@ -109,6 +110,20 @@ class Train:
         0.0952
         """
         return self.brake_force(pressure_pa) / (self.mass_kg * GRAVITY)
+
+    @property
+    def full_brake(self) -> float:
+        """B/(M g) of the full brake, N/N."""
+        return self.specific_brake(self.full_pressure_pa)
+
+    @property
+    def full_brake_mps2(self) -> float:
+        """Deceleration by the full brake alone, with the rotating mass.
+
+        >>> round(CRH3.full_brake_mps2, 2)
+        0.93
+        """
+        return GRAVITY * self.full_brake / (1.0 + self.rotating_mass_fraction)
 
     @overload
     def used_adhesion(self, mu: float, specific_brake: float, resistance: float) -> float: ...

@@ -21,8 +21,7 @@ HARDER = 4.0 / 3.0
 
 def odd_brake(seen: Seen, pipeline: Pipeline) -> str | None:
     """Say that the brake is another than it is told to be, by the deceleration or by what was learnt; None if not."""
-    train = pipeline.config.train
-    gives = train.brake_force(train.full_pressure_pa) / train.mass_kg / (1.0 + train.rotating_mass_fraction)
+    gives = pipeline.config.train.full_brake_mps2
     remedy = "check the units of speed and pressure, and the train (--train)"
     if seen.full_mps2 is not None and seen.full_mps2 > HARDER * gives:
         return f"the train slows by {seen.full_mps2:.2f} m/s^2, its full brake gives {gives:.2f}: {remedy}"

@@ -119,7 +119,7 @@ def _cases(
     last = _last(said, speed_mps)
     fixed = {
         f"fixed {WORST}": WORST,
-        f"K_wet {kwet:g}": kwet * CRH3.specific_brake(CRH3.full_pressure_pa),
+        f"K_wet {kwet:g}": kwet * CRH3.full_brake,
         f"slippery {SLIPPERY_MPS2:g}": SLIPPERY_MPS2 / GRAVITY,
     }
     return {

@@ -95,8 +95,8 @@ def preset(settings: Sequence[Setting], given: Mapping[str, Any]) -> tuple[Setti
 
 
 def _in_words(name: str, train: Train) -> str:
-    brake = train.brake_force(train.full_pressure_pa) / train.mass_kg / (1.0 + train.rotating_mass_fraction)
-    return f"{name}: {1e-3 * train.mass_kg:.4g} t, {train.length_m:.4g} m, full brake {brake:.3g} m/s^2"
+    size = f"{1e-3 * train.mass_kg:.4g} t, {train.length_m:.4g} m"
+    return f"{name}: {size}, full brake {train.full_brake_mps2:.3g} m/s^2"
 
 
 def _track_line(values: Mapping[str, Any]) -> "TrackLine | None":

@@ -145,18 +145,12 @@ def surely(config: Config, bank: Bank) -> float:
     """What the whole brake surely asks for, by what is known of its force; of a strong one what its papers say."""
     std, missed = np.sqrt(bank.covariance[:, BRAKE, BRAKE]), KNOWN_SHARE * (1.0 - config.curve_confidence)
     factor = float(quantiles(bank.weight, bank.mean[:, BRAKE], std, (missed,)).item())
-    return min(max(factor, 0.0), 1.0) * whole_brake(config)
+    return min(max(factor, 0.0), 1.0) * config.train.full_brake
 
 
 def is_partial(config: Config, braking: Braking) -> bool:
     """Whether only a part of the brake is applied."""
-    return braking.applied < PARTIAL * whole_brake(config)
-
-
-@once
-def whole_brake(config: Config) -> float:
-    """B/(M g) by the train's papers."""
-    return config.train.specific_brake(config.train.full_pressure_pa)
+    return braking.applied < PARTIAL * config.train.full_brake
 
 
 def _speeds_ahead(bank: Bank) -> Array:

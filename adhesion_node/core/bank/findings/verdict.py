@@ -32,7 +32,6 @@ from .ahead import (
     quantiles,
     surely,
     unfelt,
-    whole_brake,
 )
 
 if TYPE_CHECKING:
@@ -106,8 +105,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     part, error = mu / max(demanded, 1e-6), config.brake_error
     if slides > CLAIMED and (part < 1.0 - 2.0 * error or memory.braking.told > 0.0):
         return Regime.ADHESION_LIMITED
-    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * whole_brake(config)
-    weak = whole_brake(config) <= SLIPPERY  # a film may give what such a brake asks for, to within its error
+    dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake
+    weak = config.train.full_brake <= SLIPPERY  # a film may give what such a brake asks for, to within its error
     if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not (dumps or weak):
         return Regime.BRAKE_LIMITED
     return Regime.COASTING

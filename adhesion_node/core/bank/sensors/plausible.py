@@ -88,7 +88,7 @@ class Course(NamedTuple):
         if self.braked_ns is None or len(self.recent) < LEAST:
             return False
         speed = max(bank.mean_of(SPEED), 0.0)
-        brake = config.train.specific_brake(config.train.full_pressure_pa)
+        brake = config.train.full_brake
         c0, c1, c2 = config.train.resistance_si
         grade = 2.0 * config.grade_error
         most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * (c0 + speed * (c1 + c2 * speed)) + grade)
