@@ -123,15 +123,15 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser("bench", parents=[json_option()], **texts)
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
-    add("--rounds", type=int, default=50, help="calls of each contender (default %(default)s)")
-    add("--journeys", type=int, default=5, help="brakings for the latency (default %(default)s)")
-    add("--minutes", type=float, default=60.0, help="of simulated time for the memory (default %(default)s)")
-    add("--trains", type=int, default=20, help="in one process (default %(default)s)")
-    add("--seconds", type=float, default=20.0, help="of them on their way (default %(default)s)")
-    add("--hours", type=float, default=0.5, help="of the recording that is replayed and reported (default %(default)s)")
+    add("--rounds", type=int, default=50, help="calls of each contender")
+    add("--journeys", type=int, default=5, help="brakings for the latency")
+    add("--minutes", type=float, default=60.0, help="of simulated time for the memory")
+    add("--trains", type=int, default=20, help="in one process")
+    add("--seconds", type=float, default=20.0, help="of them on their way")
+    add("--hours", type=float, default=0.5, help="of the recording that is replayed and reported")
     add("--against", metavar="REV", help="a revision of this clone, for the benchmark against, which is then run, too")
     add_figure_options(parser, "how the cost grows")
-    add("--seed", type=int, default=1, help="of window and noise (default %(default)s)")
+    add("--seed", type=int, default=1, help="of window and noise")
     return run_tool(parser, _run, args)
 
 

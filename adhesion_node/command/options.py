@@ -56,8 +56,18 @@ def help_texts(purpose: str, *examples: str, more: str = "") -> dict[str, Any]:
     return {
         "description": "\n\n".join(paragraphs),
         "epilog": "\n\n".join(filter(None, (more, shown))),
-        "formatter_class": argparse.RawDescriptionHelpFormatter,
+        "formatter_class": _Formatter,
     }
+
+
+class _Formatter(argparse.RawDescriptionHelpFormatter):
+    """Says the default of an option behind its help, unless that says in words what holds else."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        default, text = action.default, action.help or ""
+        if default in (None, "", argparse.SUPPRESS) or isinstance(default, bool | list) or "default: " in text:
+            return text
+        return f"{text} (default: %(default){'g' if isinstance(default, float) else 's'})"
 
 
 def json_option() -> argparse.ArgumentParser:

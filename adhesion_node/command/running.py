@@ -82,7 +82,7 @@ def add_running_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="DIR",
         default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
-        help="where finished runs are kept, so that a killed call goes on (default %(default)s)",
+        help="where finished runs are kept, so that a killed call goes on",
     )
 
 

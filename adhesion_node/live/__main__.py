@@ -30,10 +30,8 @@ def main(args: Sequence[str] | None = None) -> int:
 def address_options() -> argparse.ArgumentParser:
     """Return the parent of the parsers of programs that serve the page."""
     parent = argparse.ArgumentParser(add_help=False)
-    parent.add_argument(
-        "--host", default="127.0.0.1", help="address to serve the page at; 0.0.0.0: for everybody (default: 127.0.0.1)"
-    )
-    parent.add_argument("--port", type=_port, default=8080, help="0: any that is free (default: 8080)")
+    parent.add_argument("--host", default="127.0.0.1", help="address to serve the page at; 0.0.0.0: for everybody")
+    parent.add_argument("--port", type=_port, default=8080, help="0: any that is free")
     return parent
 
 

@@ -242,8 +242,8 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--output", metavar="DIR", required=True, help="the recording, a new directory")
     add("--max-size-mb", metavar="MB", type=float, default=math.inf, help="go on in a new file before this size")
-    longest = f"go on in a new file after this log time; inf: never (default: {MAX_DURATION_S:g})"
+    longest = "go on in a new file after this log time; inf: never"
     add("--max-duration-s", metavar="S", type=float, default=MAX_DURATION_S, help=longest)
-    room = f"end before less is free on the disk (default: {MIN_FREE_MB:g})"
+    room = "end before less is free on the disk"
     add("--min-free-mb", metavar="MB", type=float, default=MIN_FREE_MB, help=room)
     return parser

@@ -112,8 +112,8 @@ def _parser() -> argparse.ArgumentParser:
     chosen = "replay these (after --remap) instead of the sensors and the truth"
     add("--topics", metavar="TOPIC", nargs="+", help=chosen)
     live = parser.add_argument_group("to topics").add_argument
-    live("--rate", type=float, default=1.0, help="speed; 0 = as fast as reliable subscribers take it (default: 1)")
-    awaited = "of position, for 10 s at most; 0 = none (default: 1)"
+    live("--rate", type=float, default=1.0, help="speed; 0 = as fast as reliable subscribers take it")
+    awaited = "of position, for 10 s at most; 0 = none"
     live("--wait-for-subscribers", metavar="N", type=int, default=1, help=awaited)
     straight = parser.add_argument_group("offline").add_argument
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")

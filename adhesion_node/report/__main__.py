@@ -136,9 +136,9 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("bags", metavar="BAG", nargs="+", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not; tables")
     add("--output", metavar="DIR", required=True, help="folder of the report; one that is there is written over")
-    add("--target", metavar="KMH", type=float, default=0.0, help="speed to which distances count (default: 0)")
+    add("--target", metavar="KMH", type=float, default=0.0, help="speed to which distances count")
     add("--estimate", action="store_true", help="estimate anew, whatever results the recording holds")
-    low = "of tables: an adhesion below it is a low spot (default: %(default)g)"
+    low = "of tables: an adhesion below it is a low spot"
     add("--low", metavar="MU", type=float, default=FIXED_MU, help=low)
     out_option(add)
     remap_option(add)

@@ -111,7 +111,7 @@ def main(args: Sequence[str] | None = None) -> int:
         metavar="M",
         type=float,
         default=CELL_M,
-        help="length of a piece of track (default: %(default)g)",
+        help="length of a piece of track",
     )
     remap_option(add)
     add_running_options(parser)

@@ -100,7 +100,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument("--scenario", default="tunnel_entry", choices=(*SCENARIOS, *REAL), help="what happens")
     fitted = f"of a real train, which has the scenarios from {next(iter(REAL))} on (default: {SENSORS.default})"
     parser.add_argument("--sensors", choices=tuple(FITTED), help=fitted)
-    parser.add_argument("--seed", type=int, default=1, help="seed of the noise (default: 1)")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the noise")
     folder = "default: adhesion_demo, numbered"
     parser.add_argument("--output", type=Path, default=Path("adhesion_demo"), metavar="DIR", help=folder)
     usual = address_options().parse_args([])

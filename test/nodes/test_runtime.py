@@ -264,7 +264,7 @@ def test_help_shows_the_parameters(start: Start) -> None:
     shown, errors = program.communicate(timeout=30.0)
     assert (program.returncode, errors) == (0, "")
     assert "A node that says what it does." in shown
-    assert "gain (default 0.5): a gain; a value from 0 to 1 dB" in shown
+    assert "gain (default: 0.5): a gain; a value from 0 to 1 dB" in shown
 
 
 def test_a_full_disk_is_one_line_and_code_1(start: Start) -> None:

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import argparse
 import importlib
 import re
 import subprocess
@@ -20,6 +21,7 @@ from conftest import ROOT
 from forked import ended
 from test_package import console_scripts
 
+from adhesion_node.command.options import help_texts
 from adhesion_node.study.__main__ import STUDIES, main
 
 
@@ -43,6 +45,25 @@ def test_help_says_the_purpose_and_gives_examples(
     examples = shown.split("\nexamples:\n")[1].splitlines()
     assert examples
     assert all(line.startswith(f"  {called}") for line in examples)
+    assert all(told.startswith("default: ") for told in re.findall(r"\bdefault\b.*", options_of(shown)))
+
+
+def options_of(shown: str) -> str:
+    """The part of a help that lists options or parameters, as one line."""
+    return " ".join(shown.partition("\noptions:")[2].partition("\nexamples:")[0].split())
+
+
+def test_the_default_of_an_option_is_told_in_one_way(capsys: pytest.CaptureFixture[str]) -> None:
+    parser = argparse.ArgumentParser("tool", **help_texts("Does it."))
+    parser.add_argument("--share", type=float, default=100.0, help="in per cent, 50 %% for one")
+    parser.add_argument("--folder", default="here", help="where to (default: here, numbered)")
+    parser.add_argument("--name", default="", help="of it")
+    parser.add_argument("--all", action="store_true", help="of them")
+    parser.add_argument("--set", action="append", default=[], help="a setting")
+    parser.print_help()
+    told = options_of(capsys.readouterr().out)
+    assert "in per cent, 50 % for one (default: 100)" in told
+    assert told.count("default") == 2
 
 
 def test_what_a_study_does_not_know_is_answered_with_its_own_usage(capsys: pytest.CaptureFixture[str]) -> None:

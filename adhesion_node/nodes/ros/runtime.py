@@ -110,7 +110,7 @@ def _parser(
         for group, members in by_group(parameters).items()
         for line in (
             f"{group} parameters:".lstrip(),
-            *(f"  {one.name} (default {one.default}): {one.description}; {one.allowed()}" for one in members),
+            *(f"  {one.name} (default: {one.default}): {one.description}; {one.allowed()}" for one in members),
         )
     )
     parser = argparse.ArgumentParser(

@@ -58,8 +58,8 @@ WITHHELD = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Give the study its options."""
-    parser.add_argument("--runs", type=int, default=RUNS, metavar="N", help=f"seeds per experiment (default {RUNS})")
-    parser.add_argument("--seed", type=int, default=SEED, metavar="N", help=f"first seed (default {SEED})")
+    parser.add_argument("--runs", type=int, default=RUNS, metavar="N", help="seeds per experiment")
+    parser.add_argument("--seed", type=int, default=SEED, metavar="N", help="first seed")
     add_figure_options(parser, "Figs. 1-3 and 5-11")
     parser.add_argument("--sensitivity", action="store_true", help="also other numbers of samples and other gains")
     add_running_options(parser)

@@ -53,13 +53,9 @@ PICTURE = "supervision"
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study intervention`."""
-    parser.add_argument(
-        "--bags", type=Path, default=Path("bags"), metavar="DIR", help="reference recordings (default: bags)"
-    )
-    parser.add_argument(
-        "--kwet", type=float, default=0.8, help="K_wet_rst, a datum of each train; 0.8 is an example (default: 0.8)"
-    )
-    parser.add_argument("--seed", type=int, default=1, help="seed of the particle filter (default: 1)")
+    parser.add_argument("--bags", type=Path, default=Path("bags"), metavar="DIR", help="reference recordings")
+    parser.add_argument("--kwet", type=float, default=0.8, help="K_wet_rst, a datum of each train; 0.8 is an example")
+    parser.add_argument("--seed", type=int, default=1, help="seed of the particle filter")
     add_figure_options(parser, "the limits at 200 km/h of tunnel_entry")
 
 

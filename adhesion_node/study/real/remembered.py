@@ -108,8 +108,8 @@ def _predictions(drive: Drive, config: Config) -> Iterable[Any]:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study remembered`."""
-    parser.add_argument("--runs", type=int, default=8, help="later trains of each rail (default %(default)s)")
-    parser.add_argument("--earlier", type=int, default=6, help="trains before them (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=8, help="later trains of each rail")
+    parser.add_argument("--earlier", type=int, default=6, help="trains before them")
     add_running_options(parser)
 
 

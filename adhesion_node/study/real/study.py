@@ -70,14 +70,12 @@ COLUMNS = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study real`."""
-    parser.add_argument("--runs", type=int, default=20, help="runs of each case (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=20, help="runs of each case")
     parser.add_argument("--only", default="", metavar="TEXT,...", help="cases whose names hold one of the texts")
     other = "a setting of the estimator that shall differ from what it is told else; repeatable"
     parser.add_argument("--set", metavar="NAME=VALUE", action="append", default=[], help=other)
     seeds = parser.add_mutually_exclusive_group()
-    seeds.add_argument(
-        "--first-seed", type=int, default=JUDGED_SEEDS, metavar="SEED", help="of the first run (default %(default)s)"
-    )
+    seeds.add_argument("--first-seed", type=int, default=JUDGED_SEEDS, metavar="SEED", help="of the first run")
     seeds.add_argument(
         "--tune",
         action="store_const",

@@ -32,7 +32,7 @@ TABLES = {"rails": rails, "faults": faults}
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study robust`."""
-    parser.add_argument("--runs", type=int, default=40, help="runs of each case (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=40, help="runs of each case")
     parser.add_argument("--only", choices=TABLES, help="one of the tables")
     add_running_options(parser)
     add_figure_options(parser, "errors and bounds of all cases")

@@ -70,8 +70,8 @@ class Chunk:
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study safety`."""
-    parser.add_argument("--cases", type=int, default=100_000, help="cases of all faults together (default %(default)s)")
-    parser.add_argument("--seed", type=int, default=1, help="of the cases (default %(default)s)")
+    parser.add_argument("--cases", type=int, default=100_000, help="cases of all faults together")
+    parser.add_argument("--seed", type=int, default=1, help="of the cases")
     add_running_options(parser)
 
 

@@ -41,8 +41,8 @@ class Figures(NamedTuple):
 def add_figure_options(parser: argparse.ArgumentParser, what: str) -> None:
     """Options of a study that draws."""
     parser.add_argument("--figures", type=Path, metavar="DIR", help=f"draw {what} into DIR")
-    parser.add_argument("--format", choices=FORMATS, default="png", help="of the figures (default %(default)s)")
-    widths = "of the figures, mm: a column of a journal, or both (default %(default)s)"
+    parser.add_argument("--format", choices=FORMATS, default="png", help="of the figures")
+    widths = "of the figures, mm: a column of a journal, or both"
     parser.add_argument("--width", type=int, choices=(COLUMN_MM, PAGE_MM), default=PAGE_MM, help=widths)
 
 

@@ -146,7 +146,7 @@ def identified(cells: Mapping[tuple[str, str], Results]) -> Iterator[dict[str, A
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study distances`."""
     parser.add_argument(
-        "--runs", type=int, default=0, help="also by the adhesion identified in so many Monte-Carlo runs (default: 0)"
+        "--runs", type=int, default=0, help="also by the adhesion identified in so many Monte-Carlo runs"
     )
     add_running_options(parser)
     add_figure_options(parser, "Figs. 2, 3, 10-13, 20 and 21")

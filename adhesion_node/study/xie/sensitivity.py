@@ -50,7 +50,7 @@ Line = tuple[str, float, str]
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study sensitivity`."""
-    parser.add_argument("--runs", type=int, default=10, help="Monte-Carlo runs from each start (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=10, help="Monte-Carlo runs from each start")
     add_running_options(parser)
 
 

@@ -61,7 +61,7 @@ COLUMNS = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study tables`."""
-    parser.add_argument("--runs", type=int, default=200, help="Monte-Carlo runs from each start (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=200, help="Monte-Carlo runs from each start")
     add_running_options(parser)
     add_figure_options(parser, "Figs. 4-9 and 14-19")
 

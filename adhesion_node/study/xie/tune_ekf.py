@@ -43,7 +43,7 @@ COLUMNS = (
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """Options of `study tune-ekf`."""
-    parser.add_argument("--runs", type=int, default=10, help="runs of each scenario and start (default %(default)s)")
+    parser.add_argument("--runs", type=int, default=10, help="runs of each scenario and start")
     add_running_options(parser)
 
 

@@ -70,21 +70,20 @@ def _text_options(add: Callable[..., Any]) -> None:
         "--time-zone",
         metavar="ZONE",
         default="UTC",
-        help="of dates that name none, such as Europe/Berlin (default: UTC)",
+        help="of dates that name none, such as Europe/Berlin",
     )
     add("--sort", action="store_true", help="sort the rows by time")
 
 
 def _unit_options(add: Callable[..., Any]) -> None:
-    turned = "down: the chainage falls as the train runs, and is turned (default: up)"
+    turned = "down: the chainage falls as the train runs, and is turned"
     add("--direction", choices=["up", "down"], default="up", help=turned)
     add("--position-unit", choices=list(POSITION_UNITS), help=f"{_TOLD} m; variance is in m^2")
     std = "of all positions, where there is no variance (default: 0.5; of latitude and longitude: unknown)"
     add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
     add("--pressure-unit", choices=list(PRESSURE_UNITS), help=f"{_TOLD} pa")
-    add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="default: gauge")
+    add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="of all pressures")
     air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
-    air += f" (default: {AMBIENT.default:g})"
     add("--ambient-pressure", dest=AMBIENT.name, type=float, default=AMBIENT.default, metavar="PA", help=air)
     released = "of the brake pipe while the brake is released, in the unit of pressures (default: its 9th decile)"
     add("--pipe-released", type=float, metavar="P", help=released)

@@ -197,7 +197,7 @@ def test_help_lists_every_parameter_with_its_default() -> None:
         [sys.executable, "-c", code], env=os.environ, capture_output=True, text=True, check=True, timeout=30.0
     ).stdout
     for name, value in sections()["estimator"].items():
-        assert f"  {name} (default {value}): " in shown
+        assert f"  {name} (default: {value}): " in shown
 
 
 @pytest.mark.parametrize("name", NODES)
