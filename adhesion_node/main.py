@@ -16,7 +16,6 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
-from pathlib import Path
 
 from .command.signals import interrupted, stop_on_signals
 from .command.streams import open_closed_streams
@@ -39,7 +38,7 @@ def _node(module: str) -> Program:
             program = _main_of(module)
             return 0 if stop.requested else program()
 
-    return _saying_what_is_missing(main)
+    return _saying_what_is_missing(_name_of(module), main)
 
 
 def _replay() -> int:
@@ -59,12 +58,16 @@ def _tool(module: str) -> Program:
                 program = _main_of(module)
             if not stop.requested:
                 return program()
-        return interrupted(module.removesuffix(".__main__").rpartition(".")[2])
+        return interrupted(_name_of(module))
 
-    return _saying_what_is_missing(main)
+    return _saying_what_is_missing(_name_of(module), main)
 
 
-def _saying_what_is_missing(program: Program) -> Program:
+def _name_of(module: str) -> str:
+    return module.removesuffix(".__main__").rpartition(".")[2]
+
+
+def _saying_what_is_missing(called: str, program: Program) -> Program:
     def main() -> int:
         open_closed_streams()
         try:
@@ -76,14 +79,14 @@ def _saying_what_is_missing(program: Program) -> Program:
             from .command import options, without_ros  # only here: nothing comes before the signals that is not needed
 
             if "--version" in sys.argv[1:]:
-                print(options.version_of(Path(sys.argv[0]).name))
+                print(options.version_of(called))
                 return options.DONE
             if without_ros.is_of_ros(name) and without_ros.is_help_asked():
                 with without_ros.stand_ins():
                     return program()
             what = "." if name in _ALWAYS else f"'.[{_EXTRAS.get(name, 'tools')}]'"
             remedy = without_ros.REMEDY if without_ros.is_of_ros(name) else f"pip install {what}"
-            print(f"{name} is missing: {remedy}", file=sys.stderr)
+            print(f"{called}: {name} is missing: {remedy}", file=sys.stderr)
             return 2
 
     return main
@@ -96,7 +99,7 @@ recorder = _node("adhesion_node.nodes.recorder")
 live = _node("adhesion_node.live.__main__")
 simulator = _node("sim_node.nodes.simulator")
 slip_simulator = _node("sim_node.nodes.slip_simulator")
-replay = _saying_what_is_missing(_replay)
+replay = _saying_what_is_missing("replay", _replay)
 import_csv = _tool("adhesion_node.tools.import_csv")
 train = _tool("adhesion_node.tools.train")
 brakings = _tool("adhesion_node.tools.brakings")

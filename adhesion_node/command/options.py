@@ -145,7 +145,7 @@ def run_tool(
     except OSError as error:
         with suppress(io.UnsupportedOperation):  # what waits to be written would complain at the program's end
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return FAILED if isinstance(error, BrokenPipeError) else _failed(parser, error)
+        return FAILED if isinstance(error, BrokenPipeError) else complain(parser.prog, error, FAILED)
 
 
 def _worked(
@@ -161,11 +161,11 @@ def _worked(
     try:
         return work(options)
     except ValueError as error:
-        return _complain(parser, str(error), BAD_INPUT)
+        return complain(parser.prog, error, BAD_INPUT)
     except BrokenPipeError:
         raise
     except OSError as error:
-        return _failed(parser, error)
+        return complain(parser.prog, error, FAILED)
     except (KeyboardInterrupt, SystemError) as error:
         if not _is_interrupt(error):
             raise
@@ -219,11 +219,10 @@ def progress(items: Iterable[Item], noun: str, total: int | None = None) -> Iter
         yield item
 
 
-def _failed(parser: argparse.ArgumentParser, error: OSError) -> int:
-    remedy = REMEDIES.get(type(error), "")
-    return _complain(parser, f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}", FAILED)
-
-
-def _complain(parser: argparse.ArgumentParser, message: str, code: int) -> int:
-    print(f"{parser.prog}: {' '.join(message.split())}", file=sys.stderr)
+def complain(program: str, error: Exception, code: int) -> int:
+    """Say in one line under the program's name what is wrong, and return the exit code."""
+    message = str(error)
+    if isinstance(error, OSError):
+        message = f"{error.filename or 'input/output'}: {error.strerror or error}{REMEDIES.get(type(error), '')}"
+    print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
     return code

@@ -24,7 +24,7 @@ def main(args: Sequence[str] | None = None) -> int:
     own, ros = runtime.split_ros_arguments(sys.argv[1:] if args is None else args)
     usage = "%(prog)s [options] [--ros-args ...]"
     parser = argparse.ArgumentParser("live", parents=[address_options()], usage=usage, **help_texts(__doc__, *EXAMPLES))
-    return run_tool(parser, lambda options: runtime.run(lambda: Live(options.host, options.port), ros), own)
+    return run_tool(parser, lambda options: runtime.run("live", lambda: Live(options.host, options.port), ros), own)
 
 
 def address_options() -> argparse.ArgumentParser:

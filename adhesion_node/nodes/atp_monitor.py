@@ -209,4 +209,4 @@ def _log(node: Node, decision: Decision, awaited: bool) -> None:
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
-    return runtime.run(AtpMonitor, args, PARAMETERS, EXAMPLES)
+    return runtime.run("atp_monitor", AtpMonitor, args, PARAMETERS, EXAMPLES)

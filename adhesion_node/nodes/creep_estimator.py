@@ -78,4 +78,4 @@ KIND = Kind(
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
-    return runtime.run(CreepEstimator, args, PARAMETERS, EXAMPLES)
+    return runtime.run("creep_estimator", CreepEstimator, args, PARAMETERS, EXAMPLES)

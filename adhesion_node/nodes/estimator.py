@@ -134,4 +134,4 @@ KIND = Kind(
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
-    return runtime.run(Estimator, args, PARAMETERS, EXAMPLES)
+    return runtime.run("estimator", Estimator, args, PARAMETERS, EXAMPLES)

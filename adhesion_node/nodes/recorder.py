@@ -227,7 +227,7 @@ def _record(options: argparse.Namespace, ros: Sequence[str]) -> int:
         max_duration_ns=_at_least(1.0, "max-duration-s", options.max_duration_s) * 1e9,
         min_free_bytes=_at_least(0.0, "min-free-mb", options.min_free_mb) * MB,
     )
-    return runtime.run(lambda: Recorder(Path(options.output), limits), ros)
+    return runtime.run("recorder", lambda: Recorder(Path(options.output), limits), ros)
 
 
 def _at_least(least: float, name: str, value: float) -> float:

@@ -69,7 +69,7 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
             nodes.append(Replay(reader, selection, options.rate, options.wait_for_subscribers))
             return nodes[0]
 
-        code = runtime.run(make_node, ros)
+        code = runtime.run("replay", make_node, ros)
         if code != DONE or not nodes:  # a signal may come before there is one
             return code
         (node,) = nodes

@@ -142,7 +142,7 @@ def _live(options: argparse.Namespace, executor: SingleThreadedExecutor, progres
             return wait(lambda: time.monotonic() >= due_s)
 
         if page.warning:
-            _say(page.warning)
+            _say(f"demo: {page.warning}")
         _say(f"open {page.server.url}: the train starts when the page is open; Ctrl-C ends")
         if not wait(lambda: page.server.viewers > 0):
             return DONE

@@ -60,7 +60,7 @@ def recover(source: Path, output: Path, drop_undecodable: bool = False) -> dict[
 def _work(options: argparse.Namespace) -> int:
     summary = recover(Path(options.bag), Path(options.output), options.drop_undecodable)
     for loss in summary["damage"]:
-        print(loss, file=sys.stderr)
+        print(f"recover: {loss}", file=sys.stderr)
     lines = [f"{sum(summary['messages'].values())} messages written to {options.output}"]
     lines += [f"{count} {name}" for name, count in summary["messages"].items()]
     lines += [f"{count} {name} left out, they do not decode" for name, count in summary["undecodable"].items()]

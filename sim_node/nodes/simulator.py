@@ -111,4 +111,4 @@ class Simulator(RunNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the simulator until its scenario ends or a signal comes."""
-    return runtime.run(Simulator, args, PARAMETERS, EXAMPLES)
+    return runtime.run("simulator", Simulator, args, PARAMETERS, EXAMPLES)

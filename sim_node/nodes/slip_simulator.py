@@ -57,4 +57,4 @@ class SlipSimulator(RunNode):
 
 def main(args: Sequence[str] | None = None) -> int:
     """Run the slip simulator until its scenario ends or a signal comes."""
-    return runtime.run(SlipSimulator, args, PARAMETERS, EXAMPLES)
+    return runtime.run("slip_simulator", SlipSimulator, args, PARAMETERS, EXAMPLES)

@@ -175,7 +175,7 @@ def test_a_taken_address_is_one_line_with_a_remedy_and_code_2(
 def test_a_host_of_another_machine_is_one_line_with_a_remedy(capfd: pytest.CaptureFixture[str]) -> None:
     assert main(["--host", "192.0.2.1", "--port", "0"]) == 2
     (line,) = capfd.readouterr().err.splitlines()
-    assert line.startswith("host = 192.0.2.1: Cannot assign requested address: give --host an address of")
+    assert line.startswith("live: host = 192.0.2.1: Cannot assign requested address: give --host an address of")
 
 
 def test_without_aiohttp_it_says_what_to_install(
@@ -184,7 +184,7 @@ def test_without_aiohttp_it_says_what_to_install(
     monkeypatch.delitem(sys.modules, "adhesion_node.live.server", raising=False)
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     assert main(["--port", "0"]) == 2
-    assert capfd.readouterr().err.strip() == "aiohttp is missing: pip install '.[live]'"
+    assert capfd.readouterr().err.strip() == "live: aiohttp is missing: pip install '.[live]'"
 
 
 def status_of(url: str, **headers: str) -> int:

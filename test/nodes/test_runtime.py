@@ -84,7 +84,7 @@ class Probe(Node):
         for number in range(50):
             self.words.publish(Float64(data=float(number)))
 
-sys.exit(runtime.run(Probe, parameters=SPECS))
+sys.exit(runtime.run("probe", Probe, parameters=SPECS))
 """
 
 Program = subprocess.Popen[str]
@@ -227,6 +227,7 @@ def test_bad_ros_arguments_are_one_line_and_code_2(start: Start, args: tuple[str
     code, errors = end(start("--ros-args", *args))
     assert code == BAD_INPUT
     (complaint,) = [line for line in errors if not line.startswith("[ERROR]")]  # rcl logs some of them itself
+    assert complaint.startswith("probe: ")
     assert message in complaint
 
 
@@ -268,7 +269,7 @@ def test_help_shows_the_parameters(start: Start) -> None:
 
 
 def test_a_full_disk_is_one_line_and_code_1(start: Start) -> None:
-    assert end(start(TASK="fill the disk")) == (FAILED, ["[Errno 28] No space left on device"])
+    assert end(start(TASK="fill the disk")) == (FAILED, ["probe: input/output: No space left on device"])
 
 
 def test_own_and_ros_arguments_are_told_apart() -> None:
@@ -293,8 +294,8 @@ def test_a_fault_of_our_own_is_not_hidden() -> None:
         return node
 
     with pytest.raises(ZeroDivisionError):
-        runtime.run(make_node, [])
-    assert runtime.run(_Finished, []) == DONE, "the context of the failed run is still there"
+        runtime.run("faulty", make_node, [])
+    assert runtime.run("finished", _Finished, []) == DONE, "the context of the failed run is still there"
 
 
 class _Finished(Node):

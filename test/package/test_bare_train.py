@@ -102,13 +102,13 @@ def test_any_other_program_says_what_to_install(program: str, others: dict[str, 
         assert (told.returncode, told.stderr) == (0, "")
     else:
         assert told.returncode == 2
-        assert re.fullmatch(r"(rosbags|pandas) is missing: pip install '\.\[tools\]'\n", told.stderr)
+        assert re.fullmatch(rf"{program}: (rosbags|pandas) is missing: pip install '\.\[tools\]'\n", told.stderr)
 
 
 def test_without_the_compiler_it_says_so() -> None:
     with on_bare("estimator", "--help", without=frozenset({"numba"})) as process:
         _, told = process.communicate(timeout=60.0)
-    assert (process.returncode, told) == (2, "numba is missing: pip install .\n")
+    assert (process.returncode, told) == (2, "estimator: numba is missing: pip install .\n")
 
 
 def test_the_estimator_drags_nothing_else_in() -> None:

@@ -67,7 +67,7 @@ def test_what_needs_ros_says_how_to_get_it_in_one_line(program: str, without_ros
     told = without_ros[" ".join([program, *ARGUMENTS.get(program, [])])]
     assert (told.returncode, told.stdout) == (2, "")
     assert told.stderr.count("\n") == 1
-    assert told.stderr.startswith("rclpy is missing: ")
+    assert told.stderr.startswith(f"{program}: rclpy is missing: ")
     assert "source /opt/ros/jazzy/setup.bash" in told.stderr
     assert "pip install '.[ros]'" in told.stderr
 

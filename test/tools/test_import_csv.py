@@ -210,7 +210,7 @@ def test_every_kind_of_fault_is_named_and_counted(importing: Import, row: str, r
     text = f"time,position,variance,brake_pressure,speed\n1,1,1,0,0\n{row}\n3,1,1,0,0\n"
     assert importing(text.encode("latin-1")) == 1
     assert len(importing.errors) == 1
-    assert importing.errors[0].startswith(message)
+    assert importing.errors[0].startswith(f"import_csv: {message}")
     assert importing.summary["refused"] == {reason: 1}
     assert (importing.summary["rows"], importing.summary["written"]) == (3, 2)
     assert [t_ns for t_ns, _, _ in importing.positions()] == [10**9, 3 * 10**9]
@@ -222,7 +222,8 @@ def test_one_stamp_that_is_too_high_costs_its_row_alone(
 ) -> None:
     assert importing("time,position\n" + "".join(f"{time},{time}\n" for time in times)) == 1
     assert importing.errors == [
-        f"FILE:{line}: time = 999 s: time must rise, the row behind it has {behind} s: its stamp is too high"
+        f"import_csv: FILE:{line}: time = 999 s: time must rise, the row behind it has {behind} s: "
+        "its stamp is too high"
     ]
     assert [t_ns // 10**9 for t_ns, _, _ in importing.positions()] == [1, 2, 3, 4, 5]
 
@@ -240,7 +241,9 @@ def test_rows_that_are_there_twice_are_told_apart_from_coarse_times(importing: I
 def test_a_wrong_iso_time_is_named(importing: Import) -> None:
     text = "time,position\n2024-01-01T00:00:00Z,1\nyesterday,1\n2024-02-30T00:00:00Z,1\n"
     assert importing(text, "--time-unit", "iso") == 1
-    assert importing.errors[0].startswith("FILE:3: time = 'yesterday': it is not written as 'ISO8601': say how with")
+    assert importing.errors[0].startswith(
+        "import_csv: FILE:3: time = 'yesterday': it is not written as 'ISO8601': say how with"
+    )
     assert importing.summary["refused"] == {"not_a_time": 2}
 
 
@@ -250,7 +253,7 @@ def test_all_faults_together_are_told_five_of_a_kind_then_counted(importing: Imp
     counts = importing.summary["refused"]
     assert counts["not_a_number"] > 5
     assert [line for line in importing.errors if " more: " in line] == [
-        f"{count - 5} more: {reason}" for reason, count in counts.items() if count > 5
+        f"import_csv: {count - 5} more: {reason}" for reason, count in counts.items() if count > 5
     ]
     assert len([line for line in importing.errors if "write a finite number" in line]) == 5
     assert sum(importing.summary["refused"].values()) == len(FAULTS)
@@ -288,7 +291,7 @@ def test_what_gives_no_recording_leaves_nothing(importing: Import, text: str, op
 
 def test_no_good_row_tells_every_row_and_leaves_nothing(importing: Import) -> None:
     assert importing("time,position\na,1\nb,1\n") == 2
-    assert [line.split(":")[1] for line in importing.errors[:2]] == ["2", "3"]
+    assert [line.split(":")[2] for line in importing.errors[:2]] == ["2", "3"]
     assert importing.errors[-1].startswith("import_csv: FILE: no good row in 2: nothing was written; read as utf-8, ")
     assert not importing.output.exists()
 

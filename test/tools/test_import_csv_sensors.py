@@ -116,7 +116,7 @@ def test_a_receiver_without_a_fix_tells_0_and_0(importing: Import) -> None:
 )
 def test_bad_cells_are_named(importing: Import, row: str, message: str) -> None:
     assert importing(f"time,lat,lon,wheel_speed_1\n{row}\n2,47,8,40\n") == 1
-    assert importing.errors[0].startswith(message)
+    assert importing.errors[0].startswith(f"import_csv: {message}")
 
 
 @pytest.mark.parametrize(

@@ -99,6 +99,25 @@ def test_a_parameter_given_as_an_option_is_told_where_it_goes(
     assert capsys.readouterr().err.rstrip().endswith(f"a node takes its parameters from ROS: {hint}")
 
 
+NODES: dict[str, tuple[str, ...]] = {
+    **dict.fromkeys(("estimator", "creep_estimator", "atp_monitor", "simulator", "slip_simulator", "live"), ()),
+    "recorder": ("--output", "nowhere"),
+    "replay": (str(ROOT / "bags" / "tunnel_entry"),),
+}
+"""With what they need to start."""
+
+
+@pytest.mark.parametrize("program", NODES)
+def test_what_is_wrong_at_the_start_of_a_node_is_said_under_its_name(
+    program: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["/a/launcher", *NODES[program], "--ros-args", "-p", "use_sim_time:=1"])
+    module, function = console_scripts()[program]
+    assert getattr(importlib.import_module(module), function)() == 2
+    said = f"{program}: use_sim_time = 1: give a value of type bool (true or false)\n"
+    assert capsys.readouterr() == ("", said)
+
+
 def test_lines_on_one_machine_have_domains_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
     assert os.environ["ROS_DOMAIN_ID"], "that of the tests"
     with line.own_domain() as told:

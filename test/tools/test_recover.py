@@ -53,7 +53,7 @@ def test_an_interrupted_recording_becomes_complete(tmp_path: Path, capsys: pytes
     out, err = capsys.readouterr()
     summary = json.loads(out)
     assert summary["complete"] is False
-    assert summary["damage"] == err.splitlines()
+    assert [f"recover: {loss}" for loss in summary["damage"]] == err.splitlines()
     assert "breaks off" in err
     with (
         BagReader(tmp_path / "bag") as before,
@@ -106,7 +106,7 @@ def test_a_topic_whose_type_is_lost_is_said_and_all_others_are_rescued(
         stream.truncate(last.chunk_start_offset + last.chunk_length)
     assert recover.main([str(file), "--output", str(tmp_path / "whole")]) == 0
     out, err = capsys.readouterr()
-    assert f"{file}: 10 messages of /late are left out, their type is lost" in err.splitlines()
+    assert f"recover: {file}: 10 messages of /late are left out, their type is lost" in err.splitlines()
     assert "10 /pressure" in out.splitlines()
     with BagReader(tmp_path / "whole") as reader:
         assert reader.counts == {"/pressure": 10}
@@ -202,7 +202,7 @@ def test_it_says_what_is_lost_where_the_metadata_tells(tmp_path: Path, capsys: p
     out, err = capsys.readouterr()
     summary = json.loads(out)
     assert (summary["messages"], summary["lost"]) == ({"/position": 20}, {"/position": 20})
-    assert summary["damage"] == err.splitlines()
+    assert [f"recover: {loss}" for loss in summary["damage"]] == err.splitlines()
     last, missing, lost = summary["damage"]
     assert f"{file_name(3)} breaks off at byte" in last
     assert last.endswith(" bytes there are left out")

@@ -30,7 +30,7 @@ from rclpy.utilities import ok, try_shutdown
 
 from adhesion_node.command.signals import StopRequest, stop_on_signals
 
-from ...command.options import BAD_INPUT, DONE, FAILED, complete, help_texts, version_option
+from ...command.options import BAD_INPUT, DONE, FAILED, complain, complete, help_texts, version_option
 from ...core.setting import Setting, by_group
 from ...wire.files.parameters import unheeded
 
@@ -48,28 +48,29 @@ _BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidat
 
 
 def run(
+    program: str,
     make_node: Callable[[], Node],
     args: Sequence[str] | None = None,
     parameters: Sequence[Setting] = (),
     examples: Sequence[str] = (),
 ) -> int:
-    """Run one node as a program and return its exit code: 0 after a clean stop, 1 failed, 2 bad input.
+    """Run one node as the program of that name and return its exit code: 0 after a clean stop, 1 failed, 2 bad input.
 
     `args` are ROS arguments alone, without the program's name (None: those of the command line); anything else
     is refused, a forgotten --ros-args for one. --help shows the first paragraph of the docstring of `make_node`,
     `parameters` and `examples`; both end the program, as argparse does. A ValueError, OSError or rclpy error at
-    start is one line on stderr and code 2; an OSError later, a full disk for one, is one line and code 1. The node
-    ends on SIGINT or SIGTERM or when it sets its attribute `finished`; it still takes what has come, and its method
-    `close`, if it has one, may publish a last time.
+    start is one line on stderr and code 2; an OSError later, a full disk for one, is one line and code 1. Both begin
+    with the program's name. The node ends on SIGINT or SIGTERM or when it sets its attribute `finished`; it still
+    takes what has come, and its method `close`, if it has one, may publish a last time.
     """
     with stop_on_signals() as stop:
         own, ros = split_ros_arguments(sys.argv[1:] if args is None else args)
-        parser = _parser(make_node, parameters, examples)
+        parser = _parser(program, make_node, parameters, examples)
         for hint in _misplaced(own, parameters):
             parser.error(hint)
         parser.parse_args(own)
         try:
-            return _start_and_spin(make_node, ros, stop)
+            return _start_and_spin(program, make_node, ros, stop)
         finally:
             try_shutdown()
 
@@ -101,7 +102,7 @@ def _misplaced(own: Sequence[str], parameters: Sequence[Setting]) -> Iterator[st
 
 
 def _parser(
-    make_node: Callable[[], Node], parameters: Sequence[Setting], examples: Sequence[str]
+    program: str, make_node: Callable[[], Node], parameters: Sequence[Setting], examples: Sequence[str]
 ) -> argparse.ArgumentParser:
     """Return the parser of a node's own arguments; asked by a shell, it answers for those of ROS too and ends."""
     purpose, _, _ = (inspect.getdoc(make_node) or "").partition("\n\n")
@@ -114,6 +115,7 @@ def _parser(
         )
     )
     parser = argparse.ArgumentParser(
+        program,
         usage="%(prog)s [--help] [--ros-args -p NAME:=VALUE ... --params-file FILE -r FROM:=TO ...]",
         **help_texts(purpose, *examples, more=listed),
     )
@@ -126,14 +128,14 @@ def _parser(
     return parser
 
 
-def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopRequest) -> int:
+def _start_and_spin(program: str, make_node: Callable[[], Node], ros: list[str], stop: StopRequest) -> int:
     if stop.requested:
         return DONE
     try:
         rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
     except _BAD_START as error:
-        return _complain(error, BAD_INPUT)
+        return complain(program, error, BAD_INPUT)
     for warning in unheeded(ros, node.get_fully_qualified_name()):
         node.get_logger().warning(warning)
     executor = SingleThreadedExecutor()
@@ -143,7 +145,7 @@ def _start_and_spin(make_node: Callable[[], Node], ros: list[str], stop: StopReq
         _spin(executor, node, stop)
         return DONE
     except OSError as error:
-        return _complain(error, FAILED)
+        return complain(program, error, FAILED)
     finally:
         executor.shutdown()
         node.destroy_node()
@@ -183,8 +185,3 @@ def _say_goodbye(node: Node) -> None:
     deadline = time.monotonic() + GOODBYE_S
     for publisher in node.publishers:
         publisher.wait_for_all_acked(Duration(seconds=max(deadline - time.monotonic(), 0.0)))
-
-
-def _complain(error: Exception, code: int) -> int:
-    print(" ".join(str(error).split()), file=sys.stderr)
-    return code

@@ -32,12 +32,12 @@ class Refused:
     def tell(self, refusal: Refusal) -> None:
         self.counts[refusal.reason] += 1
         if self.counts[refusal.reason] <= SHOWN:
-            print(refusal.message, file=sys.stderr)
+            print(f"import_csv: {refusal.message}", file=sys.stderr)
 
     def end(self) -> None:
         for reason, count in sorted(self.counts.items()):
             if count > SHOWN:
-                print(f"{count - SHOWN} more: {reason}", file=sys.stderr)
+                print(f"import_csv: {count - SHOWN} more: {reason}", file=sys.stderr)
 
 
 def read_as(form: Format) -> str:
