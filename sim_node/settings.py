@@ -24,15 +24,19 @@ from .slip.plant import SlipNoise
 from .train import scenario
 from .train.sensors import SensorSettings
 
+SLOWEST = 0.001
+"""Simulated seconds per second; no timer waits for ever."""
+
 
 def _run(scenarios: Iterable[str], usual: str, rate_hz: float, awaited: Topic) -> tuple[Setting, ...]:
     """The settings of every simulated run."""
+    pace = f"Simulated seconds per second, from {SLOWEST:g}; 0 = any speed"
     waiting = f"Start when so many subscribers to {awaited.name} are there"
     return (
         Setting("scenario", usual, "What happens", choices=tuple(scenarios), group="run"),
         Setting("seed", 1, "Seed of all noise", "", 0, 2**31 - 1, group="run"),
         Setting("rate_hz", rate_hz, "Samples per simulated second", "Hz", 0.1, 1000.0, group="run"),
-        Setting("real_time_factor", 1.0, "Simulated seconds per second; 0 = any speed", "", 0.0, 1000.0, group="run"),
+        Setting("real_time_factor", 1.0, pace, "", 0.0, 1000.0, group="run"),
         Setting("start_time_s", 1000.0, "Stamp of the first sample", "s", 0.0, 2e9, group="run"),
         Setting("wait_for", 0, waiting, "", 0, 100, group="run"),
         Setting("exit_at_end", True, "End the program with the scenario", group="run"),

@@ -32,6 +32,8 @@ from adhesion_node.wire.messages.parts import NS
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import CLOCK
 
+from ..settings import SLOWEST
+
 MAX_BURST = 10
 """Samples that one timer callback publishes at most, so that the node stays responsive while it catches up."""
 
@@ -45,6 +47,9 @@ class RunNode(SettingsNode, ABC):
         """Read the parameters; ValueError when one is out of range."""
         super().__init__(name, automatically_declare_parameters_from_overrides=True, **kwargs)
         self.values = declare(self, specs)
+        factor = self.values["real_time_factor"]
+        if 0.0 < factor < SLOWEST:
+            raise ValueError(f"real_time_factor = {factor!r}: give 0 (any speed) or at least {SLOWEST:g}")
         self.finished = False
         self.samples = 0
         """Number of samples published."""

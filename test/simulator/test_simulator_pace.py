@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import defaultdict
 from typing import Any
@@ -28,6 +29,7 @@ from adhesion_node.nodes.ros.qos import subscribe
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH
 from sim_node.nodes.pace import MAX_BURST, due_s
 from sim_node.nodes.simulator import Simulator
+from sim_node.settings import SLOWEST
 
 __all__ = ["sent"]
 
@@ -133,6 +135,16 @@ def test_the_real_time_factor_sets_the_pace(
     assert time.monotonic() - begun > 0.59
 
 
+def test_the_slowest_pace_publishes_the_first_sample(
+    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    simulator = _simulator(context, paced=True, **{**RUN_OF_61, "rate_hz": 0.1, "real_time_factor": SLOWEST})
+    executor.add_node(simulator)
+    spin_until(executor, lambda: simulator._begun_ns > 0)
+    simulator._on_timer()
+    assert simulator.samples == 1
+
+
 def test_use_sim_time_does_not_stop_the_clock_that_the_node_itself_drives(
     context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
@@ -167,6 +179,9 @@ def test_a_jittering_timer_still_publishes_one_sample_per_call(jitter_s: float) 
         ),
         ({"rate_hz": 0.0}, r"rate_hz = 0\.0: give a value from 0\.1 to 1000 Hz"),
         ({"real_time_factor": -1.0}, r"real_time_factor = -1\.0: give"),
+        ({"real_time_factor": math.nan}, "real_time_factor = nan: give a value from 0 to 1000"),
+        ({"real_time_factor": 1e12}, r"real_time_factor = 1000000000000\.0: give a value from 0 to 1000"),
+        ({"real_time_factor": 1e-12}, r"real_time_factor = 1e-12: give 0 \(any speed\) or at least 0\.001"),
         ({"position_std_m": 0.0}, r"position_std_m = 0\.0: give"),
         ({"outlier_fraction": 1.5}, r"outlier_fraction = 1\.5: give"),
         ({"student_dof": 0.5}, r"student_dof = 0\.5: give 0 \(Gaussian\) or at least 1"),
