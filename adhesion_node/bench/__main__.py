@@ -18,7 +18,7 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
 
-from ..command.options import DONE, help_texts, json_option, report, run_tool
+from ..command.options import DONE, at_least, help_texts, json_option, report, run_tool
 from ..study.trial.figures import add_figure_options, figures_of
 from . import against, growth, step
 from .peers import gaussian, normal, particle
@@ -162,8 +162,7 @@ def _check(options: Options) -> None:
         value = getattr(options, name)
         if not value > 0 or value == float("inf"):
             raise ValueError(f"{name} = {value}: give a number above 0")
-    if options.seed < 0:
-        raise ValueError(f"seed = {options.seed}: give an integer of at least 0")
+    at_least(options, seed=0)
 
 
 def versions() -> dict[str, str]:

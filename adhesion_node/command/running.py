@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import engines
+from .options import at_least
 
 Arrays = Mapping[str, NDArray[Any]]
 """A task's result by name."""
@@ -88,8 +89,7 @@ def add_running_options(parser: argparse.ArgumentParser) -> None:
 
 def running(options: argparse.Namespace) -> Running:
     """Read the options of `add_running_options`. Raises ValueError naming a bad one."""
-    if options.workers < 1:
-        raise ValueError(f"workers = {options.workers}: give at least 1")
+    at_least(options, workers=1)
     return Running(options.cache, options.workers, options.scheduler)
 
 

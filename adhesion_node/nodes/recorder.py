@@ -24,7 +24,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ..bag import BagWriter, Limits, deserialize, serialize
 from ..bag.write.writer import MB
-from ..command.options import help_texts, run_tool
+from ..command.options import at_least, help_texts, run_tool
 from ..core.atp.supervision import Severity
 from ..wire import topics
 from ..wire.messages.parts import stamp_ns
@@ -222,18 +222,13 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _record(options: argparse.Namespace, ros: Sequence[str]) -> int:
+    at_least(options, max_size_mb=1, max_duration_s=1, min_free_mb=0)
     limits = LIMITS._replace(
-        max_bytes=_at_least(1.0, "max-size-mb", options.max_size_mb) * MB,
-        max_duration_ns=_at_least(1.0, "max-duration-s", options.max_duration_s) * 1e9,
-        min_free_bytes=_at_least(0.0, "min-free-mb", options.min_free_mb) * MB,
+        max_bytes=options.max_size_mb * MB,
+        max_duration_ns=options.max_duration_s * 1e9,
+        min_free_bytes=options.min_free_mb * MB,
     )
     return runtime.run("recorder", lambda: Recorder(Path(options.output), limits), ros)
-
-
-def _at_least(least: float, name: str, value: float) -> float:
-    if not value >= least:
-        raise ValueError(f"{name} = {value}: give a number of at least {least:g}")
-    return value
 
 
 def _parser() -> argparse.ArgumentParser:

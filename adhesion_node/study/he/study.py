@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ...command.options import at_least
 from ...command.running import add_running_options, run_all, running
 from ...core.physics.train import Array
 from ..trial.figures import add_figure_options, figures_of
@@ -67,8 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run the study; draw the figures where asked."""
-    if options.runs < 2 or options.seed < 0:
-        raise ValueError(f"runs = {options.runs}, seed = {options.seed}: give at least 2 runs and a seed of at least 0")
+    at_least(options, runs=2, seed=0)
     wanted = experiments(options.runs, options.seed)
     if options.sensitivity:
         wanted |= sensitivity(options.runs, options.seed)

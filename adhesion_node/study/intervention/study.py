@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...bag import BagReader, select
-from ...command.options import progress
+from ...command.options import at_least, progress
 from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
 from ...core.atp.received import TrainState
@@ -63,6 +63,7 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Return the table."""
     if not 0.0 < options.kwet <= 1.0:
         raise ValueError(f"kwet = {options.kwet}: give a factor above 0 up to 1")
+    at_least(options, seed=0)
     table: list[dict[str, Any]] = []
     for scenario in BRAKINGS:
         said = predictions(options.bags / scenario, options.seed)

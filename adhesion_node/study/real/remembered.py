@@ -23,6 +23,7 @@ import pandas as pd
 
 from sim_node.real.drive import START_S, Drive
 
+from ...command.options import at_least
 from ...command.running import Arrays, add_running_options, run_all, running
 from ...core import Config
 from ...core.belief.rail_map import RailMap
@@ -115,9 +116,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing; return two rows per pair of rails, without and with the map."""
-    for name in ("runs", "earlier"):
-        if vars(options)[name] < 1:
-            raise ValueError(f"{name} = {vars(options)[name]}: give at least 1")
+    at_least(options, runs=1, earlier=1)
     tasks = [Remembering(before, now, options.earlier, options.runs) for before, now in PAIRS]
     table = [
         {

@@ -109,9 +109,7 @@ class Found(NamedTuple):
 
 
 def found(cases: Iterable[Case], first_seed: int, seeds: int, where: Running) -> Mapping[Case, Found]:
-    """Run what the cache lacks. Raises ValueError without runs."""
-    if seeds < 1:
-        raise ValueError(f"runs = {seeds}: give at least 1")
+    """Run what the cache lacks."""
     chunks = [(first, min(SEEDS_OF_TASK, seeds - first)) for first in range(0, seeds, SEEDS_OF_TASK)]
     tasks = [RealTrials(case, first_seed + first, count) for case in cases for first, count in chunks]
     parts: dict[Case, list[Arrays]] = {}

@@ -22,6 +22,7 @@ from typing import Any
 
 import numpy as np
 
+from ...command.options import at_least
 from ...command.running import Arrays, add_running_options, run_all, running
 from ..trial.text import Column, lines
 from .faults.table import FAULTS
@@ -77,10 +78,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing and return a row per fault and one of all."""
-    if options.cases < len(FAULTS):
-        raise ValueError(f"cases = {options.cases}: give at least {len(FAULTS)}, one of each fault")
-    if options.seed < 0:
-        raise ValueError(f"seed = {options.seed}: give an integer of at least 0")
+    at_least(options, cases=len(FAULTS), seed=0)
     firsts = range(0, options.cases, CHUNK)
     chunks = [Chunk(options.seed, first, min(CHUNK, options.cases - first)) for first in firsts]
     parts = list(run_all(chunks, running(options)))

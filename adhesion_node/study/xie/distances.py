@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ...command.options import at_least
 from ...command.running import Running, add_running_options, running
 from ...core.physics import braking
 from ...core.physics.adhesion import WET, AdhesionLaw
@@ -154,8 +155,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Return the table and the savings, and the distances by the identified adhesion where runs are asked for."""
-    if options.runs < 0:
-        raise ValueError(f"runs = {options.runs}: give at least 0")
+    at_least(options, runs=0)
     table = list(rows())
     text = [*lines(COLUMNS, table), "", f"saved by the wet law against the fixed {WORST}"]
     text += lines(SAVED, savings(table))

@@ -166,7 +166,7 @@ def test_equal_runs_leave_equal_bytes_however_busy_the_recorder_is(
 def test_bad_limits_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str], option: str, value: str) -> None:
     assert recorder.main(["--output", str(tmp_path / "bag"), option, value]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith(f"recorder: {option[2:]} = {float(value)}: give a number")
+    assert line.startswith(f"recorder: {option[2:]} = {float(value)}: give at least ")
     assert not (tmp_path / "bag").exists()
 
 

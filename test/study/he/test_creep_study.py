@@ -133,4 +133,6 @@ def test_a_run_does_not_depend_on_how_many_there_are() -> None:
 
 def test_bad_numbers_are_refused_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["creep", "--runs", "1"]) == 2
-    assert capsys.readouterr().err == "study: runs = 1, seed = 1: give at least 2 runs and a seed of at least 0\n"
+    assert capsys.readouterr().err == "study: runs = 1: give at least 2\n"
+    assert main(["creep", "--seed", "-1"]) == 2
+    assert capsys.readouterr().err == "study: seed = -1: give at least 0\n"

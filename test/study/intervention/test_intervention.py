@@ -116,7 +116,11 @@ def test_without_a_curve_there_is_no_figure(
 
 @pytest.mark.parametrize(
     ("options", "message"),
-    [(["--kwet", "0"], "kwet = 0.0: give a factor above 0"), (["--bags", "nowhere"], "nowhere")],
+    [
+        (["--kwet", "0"], "kwet = 0.0: give a factor above 0"),
+        (["--bags", "nowhere"], "nowhere"),
+        (["--seed", "-1"], "study: seed = -1: give at least 0"),
+    ],
 )
 def test_bad_input_is_one_line_and_code_2(options: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["intervention", *options]) == 2

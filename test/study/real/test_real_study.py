@@ -115,8 +115,12 @@ def test_rows_and_pictures_of_a_case(tmp_path: Path, capsys: pytest.CaptureFixtu
     assert len(again) == 1
 
 
-def test_no_runs_and_no_cases_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_no_runs_no_seeds_and_no_cases_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["real", "--runs", "0", "--cache", str(tmp_path)]) == 2
     assert capsys.readouterr().err == "study: runs = 0: give at least 1\n"
+    assert main(["real", "--first-seed", "-1", "--cache", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "study: first-seed = -1: give at least 0\n"
+    assert main(["real", "--first-seed", "99999999999999999999", "--cache", str(tmp_path)]) == 2
+    assert capsys.readouterr().err == "study: first-seed = 99999999999999999999: give at most 2147483647\n"
     assert main(["real", "--only", "nowhere", "--cache", str(tmp_path)]) == 2
     assert capsys.readouterr().err.startswith("study: only = nowhere: give parts of ")
