@@ -18,9 +18,11 @@ from importlib.metadata import version
 from importlib.util import find_spec
 from typing import Any
 
-from ..command.options import DONE, at_least, help_texts, json_option, report, run_tool
+from ..command.checks import at_least
+from ..command.options import DONE, help_texts, json_option, report, run_tool
 from ..study.trial.figures import add_figure_options, figures_of
 from . import against, growth, step
+from .amounts import add_amounts, put_in_amounts, refuse_unless
 from .peers import gaussian, normal, particle
 
 PURPOSE = "Times the estimator beside its peers in one run, and prints versions and settings with the times."
@@ -123,12 +125,7 @@ def main(args: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser("bench", parents=[json_option()], **texts)
     add = parser.add_argument
     add("names", nargs="*", metavar="NAME", help=f"of {', '.join(BENCHMARKS)} (default: all)")
-    add("--rounds", type=int, default=50, help="calls of each contender")
-    add("--journeys", type=int, default=5, help="brakings for the latency")
-    add("--minutes", type=float, default=60.0, help="of simulated time for the memory")
-    add("--trains", type=int, default=20, help="in one process")
-    add("--seconds", type=float, default=20.0, help="of them on their way")
-    add("--hours", type=float, default=0.5, help="of the recording that is replayed and reported")
+    add_amounts(parser)
     add("--against", metavar="REV", help="a revision of this clone, for the benchmark against, which is then run, too")
     add_figure_options(parser, "how the cost grows")
     add("--seed", type=int, default=1, help="of window and noise")
@@ -136,10 +133,11 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _run(options: Options) -> int:
-    _check(options)
-    names = options.names or [name for name in BENCHMARKS if name != "against"]
-    if options.against and "against" not in names:
-        names = [*names, "against"] if options.names else ["against"]
+    names = _names(options)
+    put_in_amounts(options, names)
+    refuse_unless(names, ["growth"], options, "figures")
+    figures_of(options)
+    at_least(options, seed=0)
     missing = sorted({peer for name in names for peer in BENCHMARKS[name][1] if find_spec(peer) is None})
     if missing:
         raise ValueError(f"{', '.join(missing)} not installed: pip install '.[ros,bench]'")
@@ -152,17 +150,16 @@ def _run(options: Options) -> int:
     return DONE
 
 
-def _check(options: Options) -> None:
+def _names(options: Options) -> Sequence[str]:
+    """The benchmarks that are asked for."""
     for name in options.names:
         if name not in BENCHMARKS:
             raise ValueError(f"benchmark {name!r}: choose of {', '.join(BENCHMARKS)}")
     if "against" in options.names and not options.against:
         raise ValueError("benchmark against: name the revision, --against REV")
-    for name in ("rounds", "journeys", "minutes", "trains", "seconds", "hours"):
-        value = getattr(options, name)
-        if not value > 0 or value == float("inf"):
-            raise ValueError(f"{name} = {value}: give a number above 0")
-    at_least(options, seed=0)
+    if options.against and "against" not in options.names:
+        return [*options.names, "against"]
+    return options.names or [name for name in BENCHMARKS if name != "against"]
 
 
 def versions() -> dict[str, str]:

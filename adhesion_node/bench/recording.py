@@ -84,7 +84,7 @@ def report(hours: float, rate_hz: float, seed: int) -> list[dict[str, Any]]:
             bag = Path(folder) / holds
             took_s = _write(bag, total, rate_hz, seed, pipeline)
             with ProcessPoolExecutor(1, get_context("spawn")) as alone:
-                cpu_s, peak_mb = alone.submit(_reported, bag, Path(folder) / f"{holds}_report", seed).result()
+                cpu_s, peak_mb = alone.submit(_reported, bag, Path(folder) / f"{holds}_report").result()
             beside_s = cpu_s - estimating_s
             estimating_s += took_s
             rows.append(
@@ -99,12 +99,12 @@ def report(hours: float, rate_hz: float, seed: int) -> list[dict[str, Any]]:
     return rows
 
 
-def _reported(bag: Path, output: Path, seed: int) -> tuple[float, float]:
+def _reported(bag: Path, output: Path) -> tuple[float, float]:
     """Processor time, s, and peak memory, MB, of a process that does nothing else, its imports included."""
     from ..report.__main__ import main
 
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
-        main([str(bag), "--output", str(output), "--seed", str(seed)])
+        main([str(bag), "--output", str(output)])
     return time.process_time(), resident_mb("VmHWM")
 
 

@@ -43,9 +43,6 @@ ESCAPED = "backslashreplace"
 PROGRESS_S = 1.0
 """Time between two signs of life."""
 
-MOST = 2**31 - 1
-"""Of a count, and of a seed."""
-
 
 def help_texts(purpose: str, *examples: str, more: str = "") -> dict[str, Any]:
     r"""Return what makes --help readable, for a parser: the purpose by paragraphs, `more` as it stands, examples last.
@@ -128,20 +125,6 @@ def setting_options(add: Callable[..., Any]) -> None:
     )
     add("--train", metavar="FILE", help=train)
     add("--node", metavar="NAME", help="whose, where that file has several, such as /train1/estimator")
-
-
-def at_least(options: argparse.Namespace, **least: float) -> None:
-    """Raise ValueError for the first of these options whose number is below that, or no number; counts have an end.
-
-    >>> at_least(argparse.Namespace(first_seed=-1), first_seed=0)
-    Traceback (most recent call last):
-    ValueError: first-seed = -1: give at least 0
-    """
-    for name, bound in least.items():
-        value = getattr(options, name)
-        if not value >= bound or (isinstance(value, int) and value > MOST):
-            remedy = f"at most {MOST}" if value > MOST else f"at least {bound:g}"
-            raise ValueError(f"{name.replace('_', '-')} = {value}: give {remedy}")
 
 
 def run_tool(

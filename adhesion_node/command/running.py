@@ -30,10 +30,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import engines
-from .options import at_least
+from .checks import at_least, refuse
 
 Arrays = Mapping[str, NDArray[Any]]
 """A task's result by name."""
+
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node"
+"""Where finished runs are kept unless another folder is named."""
 
 PACKAGES = Path(__file__).parents[2]
 """The folder that holds the packages."""
@@ -74,7 +77,7 @@ class Running(NamedTuple):
 
 def add_running_options(parser: argparse.ArgumentParser) -> None:
     """Options of every program that runs tasks; `running` reads them."""
-    parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
+    parser.add_argument("--workers", type=int, help="processes (default: one per core)")
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="compute on the Dask cluster of tcp://HOST:PORT instead (extra cluster)"
     )
@@ -82,15 +85,16 @@ def add_running_options(parser: argparse.ArgumentParser) -> None:
         "--cache",
         type=Path,
         metavar="DIR",
-        default=Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node",
-        help="where finished runs are kept, so that a killed call goes on",
+        help=f"where finished runs are kept, so that a killed call goes on (default: {CACHE})",
     )
 
 
 def running(options: argparse.Namespace) -> Running:
     """Read the options of `add_running_options`. Raises ValueError naming a bad one."""
     at_least(options, workers=1)
-    return Running(options.cache, options.workers, options.scheduler)
+    if options.scheduler:
+        refuse(options, ["workers"], "the cluster of --scheduler has its own: leave the one or the other out")
+    return Running(options.cache or CACHE, options.workers or os.cpu_count() or 1, options.scheduler)
 
 
 def run_all(wanted: Sequence[Task], where: Running, *, as_given: bool = False) -> Iterator[Arrays]:

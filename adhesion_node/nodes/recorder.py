@@ -24,7 +24,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from ..bag import BagWriter, Limits, deserialize, serialize
 from ..bag.write.writer import MB
-from ..command.options import at_least, help_texts, run_tool
+from ..command.checks import at_least
+from ..command.options import help_texts, run_tool
 from ..core.atp.supervision import Severity
 from ..wire import topics
 from ..wire.messages.parts import stamp_ns

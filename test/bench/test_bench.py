@@ -211,6 +211,10 @@ def test_command_prints_a_table_and_json(capsys: pytest.CaptureFixture[str], mon
         (["--rounds", "0"], "rounds = 0"),
         (["memory", "--minutes", "inf"], "minutes = inf"),
         (["--seed", "-1"], "seed = -1"),
+        (["step", "--hours", "3"], "--hours 3.0: is for recording and report: name one, or leave this out"),
+        (["--against", "HEAD", "--rounds", "9"], "--rounds 9: is for particle and gaussian and normal: name one"),
+        (["step", "--figures", "here"], "--figures here: is for growth: name one, or leave this out"),
+        (["growth", "--width", "85"], "--width 85: nothing is drawn without --figures: add that, or leave this out"),
     ],
 )
 def test_bad_options_are_one_line_and_code_2(args: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:

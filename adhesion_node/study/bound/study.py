@@ -61,8 +61,9 @@ def row(case: Case) -> dict[str, Any]:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Return the table."""
+    figures = figures_of(options)
     table = [row(case) for case in CASES]
-    if (figures := figures_of(options)) is not None:
+    if figures is not None:
         from .figures import draw
 
         draw({case: nominal(case) for case in CASES if case.speed_std_kmh is None}, figures)

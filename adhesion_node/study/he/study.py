@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import at_least
+from ...command.checks import at_least
 from ...command.running import add_running_options, run_all, running
 from ...core.physics.train import Array
 from ..trial.figures import add_figure_options, figures_of
@@ -69,6 +69,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run the study; draw the figures where asked."""
     at_least(options, runs=2, seed=0)
+    figures = figures_of(options)
     wanted = experiments(options.runs, options.seed)
     if options.sensitivity:
         wanted |= sensitivity(options.runs, options.seed)
@@ -79,7 +80,7 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     *noises, covered, withheld, difference = map(value_of, found[len(wanted) :])
     rows[0] |= {"dfp_difference": difference, "coverage95": covered, "withholding": withheld}
     rows += [row for rows_of_std in noises for row in rows_of_std]
-    if (figures := figures_of(options)) is not None:
+    if figures is not None:
         from .figures import draw
 
         draw(thetas, figures)

@@ -21,7 +21,8 @@ from typing import Any
 import numpy as np
 
 from ...bag import BagReader, select
-from ...command.options import at_least, progress
+from ...command.checks import at_least
+from ...command.options import progress
 from ...core.atp import limits as etcs
 from ...core.atp.config import SupervisionConfig
 from ...core.atp.received import TrainState
@@ -64,11 +65,12 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     if not 0.0 < options.kwet <= 1.0:
         raise ValueError(f"kwet = {options.kwet}: give a factor above 0 up to 1")
     at_least(options, seed=0)
+    figures = figures_of(options)
     table: list[dict[str, Any]] = []
     for scenario in BRAKINGS:
         said = predictions(options.bags / scenario, options.seed)
         table += rows(scenario, said, options.kwet)
-        if scenario == "tunnel_entry" and (figures := figures_of(options)) is not None:
+        if scenario == "tunnel_entry" and figures is not None:
             _draw(said, figures.place(PICTURE))
     return table, "\n".join(lines(table))
 

@@ -23,7 +23,7 @@ import pandas as pd
 
 from sim_node.real.drive import START_S, Drive
 
-from ...command.options import at_least
+from ...command.checks import at_least
 from ...command.running import Arrays, add_running_options, run_all, running
 from ...core import Config
 from ...core.belief.rail_map import RailMap

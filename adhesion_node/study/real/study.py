@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import at_least
+from ...command.checks import at_least
 from ...command.running import add_running_options, running
 from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
@@ -91,12 +91,13 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing, return a row per case, draw the figures."""
     at_least(options, runs=1, first_seed=0)
+    figures = figures_of(options)
     wanted, where = chosen(options.only, options.set), running(options)
     cases, bounds = found(wanted, options.first_seed, options.runs, where), least(wanted, where)
     table = [row(case, score(of_case), bounds[case]) for case, of_case in cases.items()]
     for entry in table:
         entry["first_seed"] = options.first_seed
-    if (figures := figures_of(options)) is not None:
+    if figures is not None:
         from .figures import draw, draw_all
 
         draw_all(table, figures)

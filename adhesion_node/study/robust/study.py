@@ -40,9 +40,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing and return a line per case."""
+    figures = figures_of(options)
     names = [options.only] if options.only else list(TABLES)
     tables = {name: TABLES[name].rows(options.runs, running(options)) for name in names}
-    if (figures := figures_of(options)) is not None:
+    if figures is not None:
         for name, table in tables.items():
             _draw(name, table, figures)
     texts = ["\n".join(lines(TABLES[name].COLUMNS, table)) for name, table in tables.items()]

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import at_least
+from ...command.checks import at_least
 from ...command.running import Arrays, add_running_options, run_all, running
 from ..trial.text import Column, lines
 from .faults.table import FAULTS

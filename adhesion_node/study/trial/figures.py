@@ -12,6 +12,8 @@ import argparse
 from pathlib import Path
 from typing import NamedTuple
 
+from ...command.checks import refuse
+
 FORMATS = ("png", "pdf", "svg")
 
 COLUMN_MM, PAGE_MM = 85, 170
@@ -41,11 +43,14 @@ class Figures(NamedTuple):
 def add_figure_options(parser: argparse.ArgumentParser, what: str) -> None:
     """Options of a study that draws."""
     parser.add_argument("--figures", type=Path, metavar="DIR", help=f"draw {what} into DIR")
-    parser.add_argument("--format", choices=FORMATS, default="png", help="of the figures")
-    widths = "of the figures, mm: a column of a journal, or both"
-    parser.add_argument("--width", type=int, choices=(COLUMN_MM, PAGE_MM), default=PAGE_MM, help=widths)
+    parser.add_argument("--format", choices=FORMATS, help=f"of the figures (default: {FORMATS[0]})")
+    widths = f"of the figures, mm: a column of a journal, or both (default: {PAGE_MM})"
+    parser.add_argument("--width", type=int, choices=(COLUMN_MM, PAGE_MM), help=widths)
 
 
 def figures_of(options: argparse.Namespace) -> Figures | None:
-    """What the options ask for."""
-    return Figures(options.figures, options.format, options.width) if options.figures else None
+    """What the options ask for. Raises ValueError where one means nothing: ask before what takes long."""
+    if options.figures is None:
+        refuse(options, ["format", "width"], "nothing is drawn without --figures: add that, or leave this out")
+        return None
+    return Figures(options.figures, options.format or FORMATS[0], options.width or PAGE_MM)

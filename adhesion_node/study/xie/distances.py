@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...command.options import at_least
+from ...command.checks import at_least, refuse
 from ...command.running import Running, add_running_options, running
 from ...core.physics import braking
 from ...core.physics.adhesion import WET, AdhesionLaw
@@ -155,7 +155,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Return the table and the savings, and the distances by the identified adhesion where runs are asked for."""
+    figures = figures_of(options)
     at_least(options, runs=0)
+    if not options.runs:
+        refuse(options, ["workers", "scheduler", "cache"], "is for --runs: add that, or leave this out")
     table = list(rows())
     text = [*lines(COLUMNS, table), "", f"saved by the wet law against the fixed {WORST}"]
     text += lines(SAVED, savings(table))
@@ -164,7 +167,7 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
         text += ["", f"by the mu identified in {options.runs} runs from each start; saved against the fixed {WORST}"]
         text += lines(IDENTIFIED, found)
         table += found
-    if (figures := figures_of(options)) is not None:
+    if figures is not None:
         from .figures import draw_brakings
 
         draw_brakings(figures)

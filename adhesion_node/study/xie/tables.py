@@ -68,6 +68,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     """Run what is missing, return the tables, draw the figures."""
+    figures = figures_of(options)
     wanted = [
         ((scenario, method), trials(scenario, estimator, options.runs))
         for method, estimator in METHODS.items()
@@ -75,7 +76,7 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     ]
     cells = grouped(wanted, running(options))
     table = [row for cell, found in cells.items() for row in rows(cell, found)]
-    if (figures := figures_of(options)) is not None:
+    if figures is not None:
         from .figures import draw_estimates
 
         draw_estimates(cells, figures)

@@ -135,6 +135,29 @@ def test_bad_usage_ends_with_code_2(args: list[str], capsys: pytest.CaptureFixtu
     assert "Traceback" not in err
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--workers", "2"], "--workers 2: is for --runs: add that, or leave this out"),
+        (["--cache", "here"], "--cache here: is for --runs: add that, or leave this out"),
+        (["--format", "png"], "--format png: nothing is drawn without --figures: add that, or leave this out"),
+    ],
+)
+def test_an_option_without_effect_is_refused(options: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["distances", *options]) == 2
+    assert capsys.readouterr() == ("", f"study: {said}\n")
+
+
+@pytest.mark.parametrize(
+    "study", ["tables", "creep", "robust", "bound", "intervention", "real"], ids=lambda name: f"study {name}"
+)
+def test_how_figures_look_is_refused_before_anything_is_computed(
+    study: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([study, "--width", "85"]) == 2
+    assert capsys.readouterr().err.startswith("study: --width 85: nothing is drawn without --figures")
+
+
 def test_a_file_that_cannot_be_written_is_one_line_and_code_1(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
