@@ -38,6 +38,8 @@ def test_parquet_as_well(importing: Import, tmp_path: Path, capsys: pytest.Captu
     assert [sample.position_m for sample in importing.positions()] == rows["position"].tolist()
     assert importing.positions()[1].t_ns == 1_732_176_903 * S + S // 10
     assert BRAKE_PRESSURE.read(importing.messages("brake_pressure")[-1]).pressure_pa == pytest.approx(3e5)
+    assert import_csv.main([str(tmp_path / "log.parquet"), "--dry-run", "--decimal", ","]) == 2
+    assert capsys.readouterr().err == "import_csv: --decimal ,: a Parquet file is no text: leave it out\n"
     (tmp_path / "none.parquet").write_bytes(b"PAR1")
     assert import_csv.main([str(tmp_path / "none.parquet"), "--dry-run"]) == 2
     assert "is no Parquet file" in capsys.readouterr().err

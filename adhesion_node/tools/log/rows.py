@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pandas as pd
 
+from ...command.checks import refuse
 from .cells import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, PRESSURES, Format
@@ -50,6 +51,7 @@ class Source(NamedTuple):
 def open_log(path: Path, form: Format) -> Source:
     """Look how a log is written. Raises ValueError when it is empty or a column is missing."""
     if path.suffix.lower() in (".parquet", ".pq"):
+        refuse(form, ["encoding", "delimiter", "decimal", "skip_rows"], "a Parquet file is no text: leave it out")
         table = _parquet(path)
         names, rows = list(table), iter([Block(table.set_axis(table.index + 1), [])])
         form = replace(form, decimal=".")
