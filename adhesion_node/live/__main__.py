@@ -16,6 +16,9 @@ from ..command.options import help_texts, run_tool
 from ..nodes.ros import runtime
 from .node import Live
 
+HOST, PORT = "127.0.0.1", 8080
+"""Where the page is served unless another place is named."""
+
 EXAMPLES = ("live", "live --port 9000 --ros-args -r __ns:=/train1")
 
 
@@ -24,15 +27,20 @@ def main(args: Sequence[str] | None = None) -> int:
     own, ros = runtime.split_ros_arguments(sys.argv[1:] if args is None else args)
     usage = "%(prog)s [options] [--ros-args ...]"
     parser = argparse.ArgumentParser("live", parents=[address_options()], usage=usage, **help_texts(__doc__, *EXAMPLES))
-    return run_tool(parser, lambda options: runtime.run("live", lambda: Live(options.host, options.port), ros), own)
+    return run_tool(parser, lambda options: runtime.run("live", lambda: Live(*address_of(options)), ros), own)
 
 
 def address_options() -> argparse.ArgumentParser:
     """Return the parent of the parsers of programs that serve the page."""
     parent = argparse.ArgumentParser(add_help=False)
-    parent.add_argument("--host", default="127.0.0.1", help="address to serve the page at; 0.0.0.0: for everybody")
-    parent.add_argument("--port", type=_port, default=8080, help="0: any that is free")
+    parent.add_argument("--host", help=f"address to serve the page at; 0.0.0.0: for everybody (default: {HOST})")
+    parent.add_argument("--port", type=_port, help=f"0: any that is free (default: {PORT})")
     return parent
+
+
+def address_of(options: argparse.Namespace) -> tuple[str, int]:
+    """Return what they ask for."""
+    return options.host or HOST, PORT if options.port is None else options.port
 
 
 def _port(text: str) -> int:

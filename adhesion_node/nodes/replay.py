@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from ..bag import BagReader, select_from
+from ..command.checks import at_least, refuse
 from ..command.options import (
     DONE,
     FAILED,
@@ -57,16 +58,17 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
     from .player import Replay
     from .ros import runtime
 
-    own_options = (options.set, options.params, options.train, options.node, options.estimator, options.out)
-    if any(own_options) or options.seed is not None:
-        own = "--set, --params, --train, --node, --seed, --estimator and --out are for --offline"
-        raise ValueError(f"{own}: start the live estimator of your choice with its own parameters")
+    own = "is for --offline: add that, or start the live estimator of your choice with its own parameters"
+    refuse(options, ["set", "params", "train", "node", "seed", "estimator", "out"], own)
+    at_least(options, wait_for_subscribers=0)
+    asked = {"rate": options.rate, "subscribers": options.wait_for_subscribers}
+    given = {name: value for name, value in asked.items() if value is not None}
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
         nodes: list[Replay] = []
 
         def make_node() -> Replay:
-            nodes.append(Replay(reader, selection, options.rate, options.wait_for_subscribers))
+            nodes.append(Replay(reader, selection, **given))
             return nodes[0]
 
         code = runtime.run("replay", make_node, ros)
@@ -85,13 +87,12 @@ def _live(options: argparse.Namespace, ros: Sequence[str]) -> int:
 def _offline(options: argparse.Namespace) -> int:
     from ..run import creep_offline, offline
 
+    refuse(options, ["rate", "wait_for_subscribers"], "is for a replay to topics: leave it out, or --offline")
     with BagReader(options.bag) as reader:
         selection = _selection(reader, options)
         names = set(selection.values())
         has_place = any(topic.name in names for topic in POSITIONS)
         wanted = options.estimator or (ADHESION if has_place or TRACTION_FORCE.name not in names else CREEP)
-        if options.out and wanted == CREEP:
-            raise ValueError(f"out = {options.out}: rows are there of the adhesion alone, not of the creep curve")
         run = offline.run if wanted == ADHESION else creep_offline.run
         return run(options, reader, selection)
 
@@ -112,9 +113,9 @@ def _parser() -> argparse.ArgumentParser:
     chosen = "replay these (after --remap) instead of the sensors and the truth"
     add("--topics", metavar="TOPIC", nargs="+", help=chosen)
     live = parser.add_argument_group("to topics").add_argument
-    live("--rate", type=float, default=1.0, help="speed; 0 = as fast as reliable subscribers take it")
-    awaited = "of position, for 10 s at most; 0 = none"
-    live("--wait-for-subscribers", metavar="N", type=int, default=1, help=awaited)
+    live("--rate", type=float, help="speed; 0 = as fast as reliable subscribers take it (default: 1)")
+    awaited = "of position, for 10 s at most; 0 = none (default: 1)"
+    live("--wait-for-subscribers", metavar="N", type=int, help=awaited)
     straight = parser.add_argument_group("offline").add_argument
     straight("--offline", action="store_true", help="straight through the estimator, without ROS")
     either = "the adhesion under the brake, or the creep curve (default: by whether there is a position or no force)"

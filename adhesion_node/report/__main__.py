@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from ..bag import BagReader, select_from
+from ..command.checks import refuse
 from ..command.options import (
     DONE,
     FAILED,
@@ -47,6 +48,9 @@ from .found.rows import KEYS, rows_of
 from .read.estimated import estimate_run
 from .read.recorded import RESULTS, read_run
 
+RECORDED = "as recorded"
+"""Where the results of a run are from."""
+
 PICTURES = (".png", ".pdf")
 
 EXAMPLES = (
@@ -66,6 +70,8 @@ def _work(options: argparse.Namespace) -> int:
         from .fleet.command import report_fleet  # only here: a recording needs no pandas
 
         return report_fleet(options.bags, options)
+    refuse(options, ["low"], "is for tables of brakings, not for recordings: leave it out")
+    options.target = 0.0 if options.target is None else options.target
     if not 0.0 <= options.target <= 500.0:
         raise ValueError(f"target = {options.target}: give a speed from 0 to 500 km/h")
     if options.out and len(options.bags) > 1:
@@ -73,6 +79,8 @@ def _work(options: argparse.Namespace) -> int:
     given = parameters_of(options)
     setup, output = setup_of(given), Path(options.output)
     subjects = [_subject(path, printable(name), options, setup) for path, name in _named(options.bags)]
+    if all(subject.source == RECORDED for subject in subjects):
+        refuse(options, ["seed", "remap"], "results are shown as recorded: add --estimate, or leave this out")
     page = _page(output, subjects, options, given)
     from .drawn.picture import draw  # only now: what the messages and the page took is free, and no table is drawn
 
@@ -108,7 +116,7 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
-            run, source = read_run(reader, setup.line, KEYS if options.out else (), targets), "as recorded"
+            run, source = read_run(reader, setup.line, KEYS if options.out else (), targets), RECORDED
             lost: Mapping[str, int] = reader.undecodable
             for row in rows_of(run, setup.line.sign) if options.out else ():
                 write(row)
@@ -136,10 +144,10 @@ def _parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("bags", metavar="BAG", nargs="+", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not; tables")
     add("--output", metavar="DIR", required=True, help="folder of the report; one that is there is written over")
-    add("--target", metavar="KMH", type=float, default=0.0, help="speed to which distances count")
+    add("--target", metavar="KMH", type=float, help="speed to which distances count (default: 0)")
     add("--estimate", action="store_true", help="estimate anew, whatever results the recording holds")
-    low = "of tables: an adhesion below it is a low spot"
-    add("--low", metavar="MU", type=float, default=FIXED_MU, help=low)
+    low = f"of tables: an adhesion below it is a low spot (default: {FIXED_MU:g})"
+    add("--low", metavar="MU", type=float, help=low)
     out_option(add)
     remap_option(add)
     setting_options(add)

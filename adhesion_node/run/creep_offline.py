@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..bag import BagReader
+from ..command.checks import refuse
 from ..command.options import DONE, FAILED, progress, report
 from ..wire.settings.given import given
 from ..wire.settings.nodes import CREEP_SETTINGS
@@ -31,8 +32,9 @@ CURVE = ("p1", "p2", "p1_std", "p2_std")
 
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of the tool."""
-    if options.seed is not None:
-        raise ValueError(f"seed = {options.seed}: the creep identification draws nothing, leave it out")
+    refuse(options, ["seed"], "the creep identification draws nothing: leave it out")
+    refuse(options, ["train"], "the locomotive of the creep identification is told by --set: leave it out")
+    refuse(options, ["out"], "rows are there of the adhesion alone, not of the creep curve: leave it out")
     if WHEEL_SPEED.name not in selection.values():
         raise ValueError(f"bag = {reader.path}: holds no {WHEEL_SPEED.name}, without which there is no creep")
     setup = creep_setup_of(given(options, NODE, CREEP_SETTINGS))

@@ -26,6 +26,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from ..bag import BagReader, select_from
+from ..command.checks import refuse
 from ..command.options import (
     DONE,
     FAILED,
@@ -106,13 +107,7 @@ def main(args: Sequence[str] | None = None) -> int:
     add("bags", metavar="[TRAIN=]BAG", nargs="+", help="recordings, each with the name of its train, or under its own")
     add("--output", metavar="FILE", required=True, help="the table of all brakings, .parquet or .csv")
     add("--map", metavar="FILE", help="the rail by place and date, .parquet or .csv")
-    add(
-        "--cell",
-        metavar="M",
-        type=float,
-        default=CELL_M,
-        help="length of a piece of track",
-    )
+    add("--cell", metavar="M", type=float, help=f"length of a piece of track of the map (default: {CELL_M:g})")
     remap_option(add)
     add_running_options(parser)
     setting_options(parser.add_argument_group("the estimator").add_argument)
@@ -121,6 +116,9 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _work(options: argparse.Namespace) -> int:
     _check_files(options)
+    if not options.map:
+        refuse(options, ["cell"], "there is no map without --map: add that, or leave this out")
+    options.cell = CELL_M if options.cell is None else options.cell
     if not 1.0 <= options.cell <= 1e5:
         raise ValueError(f"cell = {options.cell}: give a length of 1 to 100000 m")
     values = offline.parameters_of(options)

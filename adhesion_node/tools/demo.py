@@ -34,11 +34,12 @@ from sim_node.settings import SENSORS
 from sim_node.train.scenario import SCENARIOS
 
 from ..bag import BagReader, select
+from ..command.checks import refuse
 from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
 from ..command.signals import stop_on_signals
 from ..core import Estimate, Regime
 from ..core.physics.train import KMH
-from ..live.__main__ import address_options
+from ..live.__main__ import address_of, address_options
 from ..live.node import Live
 from ..report.drawn.picture import draw
 from ..report.drawn.table import table
@@ -103,21 +104,16 @@ def main(args: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=1, help="seed of the noise")
     folder = "default: adhesion_demo, numbered"
     parser.add_argument("--output", type=Path, default=Path("adhesion_demo"), metavar="DIR", help=folder)
-    usual = address_options().parse_args([])
-    return run_tool(parser, lambda options: _demo(options, usual), args)
+    return run_tool(parser, _demo, args)
 
 
-def _demo(options: argparse.Namespace, usual: argparse.Namespace) -> int:
+def _demo(options: argparse.Namespace) -> int:
     """Run it; ValueError where an option would mean nothing."""
-    for name, value in vars(usual).items():
-        given = getattr(options, name)
-        if not options.live and given != value:
-            raise ValueError(f"--{name} {given}: there is no page without --live: add that, or leave this out")
-    if options.scenario not in REAL and options.sensors:
+    if not options.live:
+        refuse(options, ["host", "port"], "there is no page without --live: add that, or leave this out")
+    if options.scenario not in REAL:
         real = f"a scenario of a real train: {', '.join(REAL)}"
-        raise ValueError(
-            f"--sensors {options.sensors}: {options.scenario} has its own: leave them out, or choose {real}"
-        )
+        refuse(options, ["sensors"], f"{options.scenario} has its own: leave them out, or choose {real}")
     options.sensors = options.sensors or SENSORS.default
     progress = _Progress()
     with executor_of_line() as executor:
@@ -127,7 +123,7 @@ def _demo(options: argparse.Namespace, usual: argparse.Namespace) -> int:
 def _live(options: argparse.Namespace, executor: SingleThreadedExecutor, progress: _Progress) -> int:
     """Run at real time with a page in the browser, until Ctrl-C."""
     page_of = partial(Live, parameter_overrides=parameters(**UNASKED), context=executor.context)
-    with stop_on_signals() as stop, closing(page_of(options.host, options.port)) as page:
+    with stop_on_signals() as stop, closing(page_of(*address_of(options))) as page:
         executor.add_node(page)
 
         def wait(done: Callable[[], bool]) -> bool:

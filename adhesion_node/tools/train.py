@@ -21,6 +21,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..bag import BagReader, select_from
+from ..command.checks import refuse
 from ..command.options import (
     DONE,
     FAILED,
@@ -84,6 +85,8 @@ def main(args: Sequence[str] | None = None) -> int:
 def _work(options: argparse.Namespace) -> int:
     if options.check is None:
         return _estimate(options)
+    of_estimate = ["output", "remap", "seed", "set", "params", "train", "node"]
+    refuse(options, of_estimate, "is for --estimate: --check takes the train's file alone, leave this out")
     file = read_train(options.check)
     rows, odd = stopping(file), [one.told for one in likely(file) if not one.low <= one.value <= one.high]
     result = {**figures(file), "stopping": rows, "unlikely": odd}
@@ -155,6 +158,7 @@ def _told(file: TrainFile, rows: Sequence[dict[str, float]]) -> Iterator[str]:
 
 
 def _estimate(options: argparse.Namespace) -> int:
+    refuse(options, ["seed"], "nothing is drawn by chance: leave it out")
     if options.output and Path(options.output).exists():
         raise ValueError(f"output = {options.output}: is there already: name a new file")
     setup = setup_of(given(options, "estimator", SETTINGS))

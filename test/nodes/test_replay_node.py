@@ -286,7 +286,13 @@ def test_a_bag_without_position_says_what_there_is(tmp_path: Path, capsys: pytes
         (["--remap", "/brake_pressure:=position"], "topic /brake_pressure: type = sensor_msgs/msg/FluidPressure: "),
         (["--topics", "wheel_speed"], "topic wheel_speed: not in the recording"),
         (["--rate", "-1"], "rate = -1.0: give a finite factor, or 0"),
-        (["--set", "a=1"], "--set, --params, --train, --node, --seed, --estimator and --out are for --offline"),
+        (["--wait-for-subscribers", "-1"], "wait-for-subscribers = -1: give at least 0"),
+        (["--set", "a=1"], "--set a=1: is for --offline: add that, or start the live estimator of your choice"),
+        (["--params", "p.yaml"], "--params p.yaml: is for --offline"),
+        (["--train", "metro"], "--train metro: is for --offline"),
+        (["--node", "estimator"], "--node estimator: is for --offline"),
+        (["--seed", "0"], "--seed 0: is for --offline"),
+        (["--estimator", "creep"], "--estimator creep: is for --offline"),
     ],
 )
 def test_what_does_not_fit_is_one_line_and_code_2(

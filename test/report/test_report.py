@@ -239,6 +239,10 @@ def test_changes_of_a_text() -> None:
         (["nowhere"], "does not exist"),
         (["mine", "--target", "-1"], "target = -1.0: give"),
         (["mine", "--set", "windov=3"], "windov"),
+        (["mine", "--low", "0.05"], "--low 0.05: is for tables of brakings, not for recordings: leave it out"),
+        (["mine", "--seed", "1"], "--seed 1: results are shown as recorded: add --estimate, or leave this out"),
+        (["mine", "--remap", "/a:=position"], "--remap /a:=position: results are shown as recorded: add --est"),
+        (["mine", "--node", "/a"], "--node /a: says whose of --params: add that, or leave this out"),
     ],
 )
 def test_bad_input_is_one_line_and_leaves_nothing(

@@ -131,7 +131,8 @@ def test_with_positions_the_estimator_is_chosen_by_name(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--seed", "2"], "seed = 2: the creep identification draws nothing, leave it out"),
+        (["--seed", "2"], "--seed 2: the creep identification draws nothing: leave it out"),
+        (["--train", "metro"], "--train metro: the locomotive of the creep identification is told by --set"),
         (
             ["--set", "particles=20"],
             "setting 'particles=20': write NAME=VALUE with one of sensor_timeout_s, use_speed,",

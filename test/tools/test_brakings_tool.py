@@ -169,7 +169,12 @@ def test_the_map_says_how_often_where_and_when() -> None:
     [
         (["--output", "brakings.xlsx"], "output = brakings.xlsx: give a file that ends in .csv or .parquet"),
         (["--output", "b.csv", "--map", "m.txt"], "map = m.txt: give a file that ends in .csv or .parquet"),
-        (["--output", "b.csv", "--cell", "0"], "cell = 0.0: give a length of 1 to 100000 m"),
+        (["--output", "b.csv", "--cell", "100"], "--cell 100.0: there is no map without --map: add that, or leave"),
+        (
+            ["--output", "b.csv", "--workers", "2", "--scheduler", "tcp://a:1"],
+            "--workers 2: the cluster of --scheduler has its own: leave the one or the other out",
+        ),
+        (["--output", "b.csv", "--map", "m.csv", "--cell", "0"], "cell = 0.0: give a length of 1 to 100000 m"),
         (["--output", "b.csv", "--workers", "0"], "workers = 0: give at least 1"),
         (["--output", "b.csv", "--set", "start_mu=2"], "start_mu = 2.0: give a value from 0 to 1"),
     ],

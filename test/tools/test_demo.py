@@ -216,6 +216,7 @@ def test_bad_usage_ends_with_code_2(capsys: pytest.CaptureFixture[str]) -> None:
     ("options", "said"),
     [
         (["--sensors", "full"], "demo: --sensors full: tunnel_entry has its own: leave them out, or choose a scenario"),
+        (["--port", "8080"], "demo: --port 8080: there is no page without --live"),
         (["--port", "9000"], "demo: --port 9000: there is no page without --live"),
         (["--host", "0.0.0.0"], "demo: --host 0.0.0.0: there is no page without --live"),
     ],

@@ -102,6 +102,25 @@ def test_a_bad_file_is_bad_input(capfd: pytest.CaptureFixture[str]) -> None:
     assert err.startswith("train: train = nowhere.yaml: not readable")
 
 
+@pytest.mark.parametrize(
+    "option",
+    [
+        *(("--output", "new.yaml"), ("--train", "metro"), ("--set", "train.mass_kg=1e5"), ("--params", "p.yaml")),
+        *(("--seed", "1"), ("--node", "/a"), ("--remap", "/a:=position")),
+    ],
+)
+def test_what_is_for_a_recording_is_refused_beside_check(
+    option: tuple[str, str], capfd: pytest.CaptureFixture[str]
+) -> None:
+    said = f"train: {' '.join(option)}: is for --estimate: --check takes the train's file alone, leave this out\n"
+    assert told(capfd, "--check", "metro", *option) == (2, "", said)
+
+
+def test_a_seed_is_refused_where_nothing_is_drawn(capfd: pytest.CaptureFixture[str]) -> None:
+    said = "train: --seed 1: nothing is drawn by chance: leave it out\n"
+    assert told(capfd, "--estimate", "nowhere", "--seed", "1") == (2, "", said)
+
+
 def test_a_file_of_something_else_is_not_printed(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "log.csv"
     log.write_text("time,position\n" + "0.1,4.0\n" * 1000, encoding="utf-8")

@@ -14,24 +14,28 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from ...command.checks import refuse
 from ...command.options import DONE, FAILED, report
-from ...run.offline import parameters_of
+from ..found.distances import FIXED_MU
 from . import is_table
 from .page import fleet_page
 from .rail import low_spots, read_fleet
 
+OF_RECORDINGS = ("seed", "set", "params", "train", "node", "estimate", "remap", "target", "out")
+"""Options that say how recordings are estimated and shown."""
+
 
 def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
     """Write the page and say what it shows; the exit code of the tool."""
-    if not 0.0 < options.low <= 1.0:
-        raise ValueError(f"low = {options.low}: give an adhesion coefficient above 0, to 1")
+    low = FIXED_MU if options.low is None else options.low
+    if not 0.0 < low <= 1.0:
+        raise ValueError(f"low = {low}: give an adhesion coefficient above 0, to 1")
     recordings = [path for path in paths if not is_table(path)]
     if recordings:
         raise ValueError(f"bags = {', '.join(recordings)}: give recordings, or tables of brakings, not both")
-    if parameters_of(options) or options.estimate or options.remap or options.target or options.out:
-        raise ValueError(f"tables = {', '.join(paths)}: are shown as written: leave out settings, --target and --out")
+    refuse(options, OF_RECORDINGS, "tables are shown as written: leave it out")
     fleet = read_fleet([Path(path) for path in paths])
-    html, spots = fleet_page(fleet, options.low), low_spots(fleet.rail, options.low)
+    html, spots = fleet_page(fleet, low), low_spots(fleet.rail, low)
     output = Path(options.output)
     output.mkdir(parents=True, exist_ok=True)
     page = output / "report.html"

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 from typing import Any
 
+from ...command.checks import refuse
 from ...core.setting import Setting
 from ..files import parameters
 from .nodes import SETTINGS, TRAIN_FILE
@@ -23,8 +24,10 @@ def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -
 
     `--node` names the node whose parameters are meant where a file has them for several.
     """
-    values = parameters.read(options.params, getattr(options, "node", None) or node) if options.params else {}
-    if getattr(options, "train", None):
+    if not options.params:
+        refuse(options, ["node"], "says whose of --params: add that, or leave this out")
+    values = parameters.read(options.params, options.node or node) if options.params else {}
+    if options.train:
         values |= {TRAIN_FILE.name: options.train}
     return values | dict(parse_setting(text, settings) for text in options.set)
 

@@ -126,10 +126,9 @@ def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture
         (["broken.parquet"], "broken.parquet: not readable"),
         (["nothing.csv"], "hold no braking"),
         (["brakings.csv", "--low", "0"], "low = 0.0: give"),
-        (
-            ["brakings.csv", "--set", "train.mass_kg=400000"],
-            "are shown as written: leave out settings",
-        ),
+        (["brakings.csv", "--set", "train.mass_kg=400000"], "--set train.mass_kg=400000: tables are shown as written"),
+        (["brakings.csv", "--estimate"], "report: --estimate: tables are shown as written: leave it out"),
+        (["brakings.csv", "--target", "0"], "--target 0.0: tables are shown as written: leave it out"),
     ],
 )
 def test_what_cannot_be_shown_is_said(
