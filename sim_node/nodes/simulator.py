@@ -22,7 +22,7 @@ from typing import Any
 
 from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.core.physics.train import KMH
-from adhesion_node.core.setting import make
+from adhesion_node.core.setting import Setting, make, settings_of
 from adhesion_node.nodes.ros import runtime
 from adhesion_node.nodes.ros.diagnostics import Finding, Told
 from adhesion_node.wire import topics
@@ -34,13 +34,16 @@ from ..real.drive import drive
 from ..real.plant.scenarios import SCENARIOS as REAL
 from ..real.run import ticks
 from ..real.sensors.fitted import FITTED
-from ..settings import SIMULATOR
+from ..settings import SENSORS, SIMULATOR
 from ..train import scenario
 from ..train.plant import Truth
 from ..train.sensors import SensorMessage, SensorSettings, Tick
 from .pace import RunNode
 
 PARAMETERS = SIMULATOR
+
+NOISE, FAULT = settings_of(SensorSettings), settings_of(Plan)
+"""What a scenario of the paper heeds alone."""
 
 EXAMPLES = (
     "simulator --ros-args -p scenario:=tunnel_exit -p seed:=2",
@@ -62,8 +65,23 @@ class Simulator(RunNode):
         self._real = self.values["scenario"] in REAL
         self._fault: list[tuple[float, str]] = []
         """When, s of the run, it begins and ends, in words."""
+        self._refuse_unheeded()
         run, there, period_s = self._real_run() if self._real else self._run_of_paper()
         self.begin(run, (*topics.TRUTH, *there), period_s, paced=paced)
+
+    def _refuse_unheeded(self) -> None:
+        """Raise ValueError for the first parameter that is set though this scenario does not heed it."""
+        if self._real:
+            self._refuse((*NOISE, *FAULT), "a real train has its noise and faults by `sensors`: give none")
+            return
+        self._refuse((SENSORS,), "are those of a real train: leave them out, or choose a scenario of one")
+        if self.values["fault"] == NONE:
+            self._refuse(FAULT, "nothing goes wrong without `fault`: name one, or leave this out")
+
+    def _refuse(self, settings: Sequence[Setting], why: str) -> None:
+        for one in settings:
+            if self.values[one.name] != one.default:
+                raise ValueError(f"{one.name} = {self.values[one.name]!r}: {why}")
 
     def _run_of_paper(self) -> tuple[Iterator[Tick], tuple[Topic, ...], float]:
         """The run, its topics and its period."""
@@ -78,8 +96,6 @@ class Simulator(RunNode):
 
     def _real_run(self) -> tuple[Iterator[Tick], tuple[Topic, ...], float]:
         """The same of a real train; the period is that of truth and messages together."""
-        if self.values["fault"] != NONE:
-            raise ValueError(f"fault = {self.values['fault']!r}: a real train has its faults by `sensors`: give none")
         (driven,) = drive(REAL[self.values["scenario"]], FITTED[self.values["sensors"]], [self.values["seed"]])
         sent = {message.topic for _, message in driven.messages}
         there = tuple(topic for topic in topics.ADHESION_INPUTS if topic in sent)

@@ -153,9 +153,21 @@ def test_a_real_train_keeps_the_pace_of_its_clock(
     assert time.monotonic() - begun > 0.95 * lasted_s
 
 
-def test_a_real_train_takes_no_fault_of_the_paper(context: Context) -> None:
-    with pytest.raises(ValueError, match="fault = 'late': a real train has its faults by `sensors`: give none"):
-        _simulator(context, scenario="leaves", fault="late")
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"scenario": "leaves", "fault": "late"}, "fault = 'late': a real train has its noise and faults by `sensors`"),
+        (
+            {"scenario": "leaves", "speed_std_mps": 0.1},
+            r"speed_std_mps = 0\.1: a real train has its noise and faults by",
+        ),
+        ({"sensors": "full"}, "sensors = 'full': are those of a real train: leave them out, or choose a scenario of"),
+        ({"fault_size": 3.0}, r"fault_size = 3\.0: nothing goes wrong without `fault`: name one, or leave this out"),
+    ],
+)
+def test_what_a_scenario_does_not_heed_is_refused(context: Context, given: dict[str, Any], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        _simulator(context, **given)
 
 
 def test_same_seed_same_messages_another_seed_others(context: Context, sent: Sent) -> None:
