@@ -199,6 +199,21 @@ def test_a_train_that_stands_for_long_is_not_odd(importing: Import) -> None:
     assert importing(text(pd.concat([rows, stands]))) == 0, importing.errors
 
 
+@pytest.mark.parametrize("stands_s", [60, 600])
+@pytest.mark.parametrize("drop", ["position", "speed"])
+def test_the_pipe_of_a_train_that_stands_longer_than_it_runs_is_told(
+    importing: Import, stands_s: int, drop: str
+) -> None:
+    """It stands braked: by all the time that it does not brake the pipe would seem to be low where the train runs."""
+    rows = ride(82)
+    stands = pd.DataFrame({"time": 82.0 + np.arange(10 * stands_s) / 10.0, "brake_pressure": 3e5, "speed": 0.0})
+    rows = pd.concat([rows, stands.assign(position=rows.position.iloc[-1])])
+    noise = np.random.default_rng(1).normal(0.0, 0.5, len(rows))
+    rows = rows.assign(brake_pressure=5e5 - rows.brake_pressure / 2, position=rows.position + noise)
+    assert importing(text(rows.drop(columns=drop))) == 1
+    assert [odd for odd in importing.summary["odd"] if "5.0 bar while the train runs" in odd and "--pipe" in odd]
+
+
 def test_a_stop_of_ten_minutes_without_rows_is_no_step_of_the_clock(importing: Import) -> None:
     rows = ride(89)
     rows = pd.concat([rows, ride().assign(time=rows.time + 700.0, position=rows.position.iloc[-1] + ride().position)])

@@ -25,7 +25,7 @@ from ..whole import Log, moment
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
-from .ways import resets, slow_or_falling, speed_against_positions
+from .ways import MOVES_MPS, resets, slow_or_falling, speed_against_positions
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
@@ -152,12 +152,12 @@ def _too_fast(motion: Motion, form: Format) -> Iterator[str]:
 
 
 def _pipe(motion: Motion) -> Iterator[str]:
-    """The pressure of a cylinder rises when the train brakes, that of the pipe falls."""
-    slows = motion.slows_mps2
+    """The pressure of a cylinder rises when the train brakes, that of the pipe falls; it stands braked as well."""
+    slows, moves = motion.slows_mps2, motion.fastest_mps > MOVES_MPS
     known = np.isfinite(motion.pressure_pa)
     braking, running = (
         motion.pressure_pa[known & (slows < BRAKES_MPS2)],
-        motion.pressure_pa[known & (slows > RUNS_MPS2)],
+        motion.pressure_pa[known & moves & (slows > RUNS_MPS2)],
     )
     if len(braking) > 2 and len(running) > 2:
         brakes_pa, runs_pa = np.median(braking), np.median(running)
