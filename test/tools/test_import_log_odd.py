@@ -255,6 +255,37 @@ def test_a_number_that_stands_for_no_value_is_said(importing: Import, column: st
 
 
 @pytest.mark.parametrize(
+    ("column", "mark", "options"),
+    [
+        *(("speed", mark, []) for mark in (-9999, -999, 9999, 65535, 32767, 6553.5, 4294967295)),
+        ("speed", 999999, ["--speed-unit", "kmh"]),
+        ("brake_pressure", -9999, ["--pressure-unit", "kpa"]),
+        ("wheel_speed_1", -32768, []),
+        ("acceleration", 3276.7, []),
+    ],
+)
+def test_a_number_that_no_train_has_and_that_stands_for_no_value_is_named(
+    importing: Import, column: str, mark: float, options: list[str]
+) -> None:
+    """The unit is right: what helps is an empty cell, of which the rest of the row is read."""
+    rows = ride().assign(wheel_speed_1=ride().speed / 0.46, acceleration=0.0, brake_pressure=3.0)[:190]
+    gaps = rows.index % 10 == 3
+    importing(text(rows.assign(**{column: rows[column].mask(gaps, mark)})), *options)
+    assert importing.errors[0].startswith(f"FILE:5: {column} = '{float(mark)}': it stands for no value: leave")
+    assert importing.summary["refused"] == {"no_value": gaps.sum()}
+    importing.output = importing.output.with_name("cured")
+    importing(text(rows.assign(**{column: rows[column].mask(gaps)})), *options)
+    assert (importing.summary["refused"], importing.summary["empty"]) == ({}, {column: gaps.sum()})
+
+
+@pytest.mark.parametrize("mark", [655.35, 327.67])
+def test_the_end_of_an_integer_of_hundredths_is_no_speed(importing: Import, mark: float) -> None:
+    rows = ride().assign(speed=3.6 * ride().speed).drop(columns="position")
+    importing(text(rows.assign(speed=rows.speed.mask(rows.index % 10 == 3, mark))), "--speed-unit", "kmh")
+    assert f"speed is {mark:g} in 60 rows, far from all others: no value? Leave" in str(importing.summary["odd"])
+
+
+@pytest.mark.parametrize(
     "change",
     [
         lambda rows: rows.assign(acceleration=np.where(rows.time < 20.0, 0.0, -0.8 + 0.01 * np.sin(rows.time))),

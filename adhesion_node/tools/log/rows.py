@@ -21,6 +21,7 @@ from ...command.checks import refuse
 from .cells import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, PRESSURES, Format
+from .marks import marks
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
 from .units import known
 
@@ -34,6 +35,7 @@ NO_NUMBER = (
     "or is the --decimal another?"
 )
 
+NO_VALUE = "it stands for no value: leave such cells empty, the rest of the row is read then"
 
 IN_GROUPS = "is it in groups of thousands? Export it without them; or is the --decimal another?"
 
@@ -127,7 +129,7 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
         if bad.any():
             refuse(bad & grouped(theirs[name], decimal), "not_a_number", name, lambda _: IN_GROUPS)
             refuse(bad, "not_a_number", name, lambda _: NO_NUMBER)
-        factor = factors.get(kind, 1.0)
+        factor, stands_in = factors.get(kind, 1.0), marks(read)
         with np.errstate(over="ignore"):  # 1e300 km are out of range
             read *= factor
             read = read.round(6) if factor >= 10.0 else read  # 4.1 bar are 410000 Pa, not less
@@ -135,6 +137,7 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
             read += form.ambient_pressure_pa
         least, most, remedy = LIMITS[kind]
         outside = (read < least) | (read > most)
+        refuse(outside & stands_in, "no_value", name, lambda _: NO_VALUE)
         refuse(outside, "out_of_range", name, _out_of_range(read, least, most, remedy))
         rows[name] = read
     return pd.DataFrame(rows, index=cells.index)[good], list(against.values())

@@ -14,18 +14,14 @@ import numpy as np
 
 from ....core.physics.train import Array
 from ..format import PRESSURES
+from ..marks import marks
 from ..whole import Log
 
 LEAST_ROWS = 3
 """A single number far from the others is an outlier."""
 
 FAR, FAR_MARK = 3.0, 0.01
-"""From the next number: in spreads of all others; for one of `MARKS` in its own size."""
-
-MARKS = {*(-(10.0**digits - 1.0) for digits in range(3, 8)), *(10.0**digits - 1.0 for digits in range(4, 8))}
-MARKS |= {-32768.0, 32767.0, 65535.0}
-"""What devices write where they know nothing, in the unit of the log."""
-
+"""From the next number: in spreads of all others; for one of the marks in its own size."""
 
 OF_A_PLACE = ("position", "lat", "lon", "height")
 """They change little by little, whereas a pressure or an acceleration may leave 0 at once."""
@@ -42,7 +38,7 @@ def sentinels(log: Log) -> Iterator[str]:
             written = mark / factors.get(kind, 1.0)
             others = values[values != mark]
             away = float(np.abs(others - mark).min())
-            is_mark = float(np.round(written, 6)) in MARKS and away > FAR_MARK * abs(mark)
+            is_mark = bool(marks(np.array(written))) and away > FAR_MARK * abs(mark)
             if is_mark or (name in OF_A_PLACE and away > FAR * np.ptp(others) > 0.0):
                 yield f"{name} is {written:.6g} in {rows} rows, far from all others: no value? Leave those cells empty"
 
