@@ -213,6 +213,32 @@ def test_options_that_cannot_be_are_refused(importing: Import, options: list[str
     assert importing.errors[-1].startswith(f"import_csv: {message}")
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--pipe-released", "5"], "pipe-released = 5.0: the log has no column of which it tells: name one"),
+        (["--full-pressure", "3e5"], "full-pressure = 300000.0: the log has no column of which it tells: name one"),
+        (["--pressure-kind", "absolute"], "pressure-kind = absolute: the log has no column of which it tells: name"),
+        (["--acceleration-unit", "g"], "acceleration-unit = g: the log has no column of which it tells: name one"),
+        (["--wheel-radius", "0.4"], "wheel-radius = 0.4: the log has no column of which it tells: name one"),
+        (["--position-std", "2"], "position-std = 2.0: the log has no column of which it tells: name one with --posit"),
+        (["--direction", "down"], "direction = down: the log has no column of which it tells: name one with --positio"),
+        (["--time-zone", "Europe/Berlin"], "time-zone = Europe/Berlin: the times have no date, and no zone: leave it"),
+    ],
+)
+def test_an_option_that_means_nothing_for_a_log_is_refused(importing: Import, options: list[str], message: str) -> None:
+    """Its column is there under a name that is not read, and all would be taken without it."""
+    assert importing("time,speed,HL\n1,2,5\n", *options) == 2
+    assert importing.errors[0].startswith(f"import_csv: {message}")
+    assert "leave it out" in importing.errors[0]
+    assert not importing.output.exists()
+
+
+def test_what_is_usual_and_what_the_train_tells_is_refused_for_no_log(importing: Import) -> None:
+    usual = ["--pressure-kind", "gauge", "--direction", "up", "--time-zone", "UTC"]
+    assert importing("time,speed\n1,2\n", *usual, "--train", "metro") == 0, importing.errors
+
+
 def test_a_guess_from_the_beginning_does_not_spoil_the_rest(importing: Import) -> None:
     """Whole numbers first, then commas: said with the option that helps, and cured by it."""
     log = "time;speed\n" + "".join(f"{i};20\n" for i in range(SAMPLE)) + f"{SAMPLE};20,5\n"

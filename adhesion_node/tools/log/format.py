@@ -104,6 +104,8 @@ class Format:
 
     named: Mapping[str, str]
     axles: Sequence[str] = ()
+    asked: Mapping[str, Any] = field(default_factory=dict)
+    """What options ask for that may mean nothing for a log (idle.py)."""
     encoding: str | None = None
     delimiter: str | None = None
     decimal: str | None = None

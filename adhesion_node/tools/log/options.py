@@ -27,6 +27,7 @@ from .format import (
     Format,
     option,
 )
+from .idle import asked
 
 OF_TRAIN = ("wheel_radius_m", "full_pressure_pa")
 """What of a log's format the train's file knows."""
@@ -50,8 +51,9 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def format_of(options: argparse.Namespace) -> Format:
     """Return what they say. Raises ValueError naming what is out of range."""
     given = vars(options)
+    asked_for = asked(given)
     names = {column: given[column] for column in ("time", *OPTIONAL) if given[column] is not None}
-    given |= {"named": names, "pressure_is_gauge": options.pressure_kind == "gauge"}
+    given |= {"named": names, "pressure_is_gauge": options.pressure_kind == "gauge", "asked": asked_for}
     train = read_train(options.train).train if options.train else CRH3
     given |= {name: getattr(train, name) for name in OF_TRAIN if given[name] is None}
     given["delimiter"] = options.delimiter and options.delimiter.replace("\\t", "\t")

@@ -21,6 +21,7 @@ from ...command.checks import refuse
 from .cells import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, PRESSURES, Format
+from .idle import require_meaning
 from .marks import marks
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
 from .units import known
@@ -68,6 +69,7 @@ def open_log(path: Path, form: Format) -> Source:
     timed = _timed(form, first.cells[columns.names["time"]])
     if timed.time_format is not None:
         told.pop("time", None)  # [UTC] or [hh:mm:ss]: dates are in no unit
+    require_meaning(timed, columns)
     columns = columns._replace(doubts=tuple(in_doubt(told, form)))
     notes = [] if form.time_format else list(_read_otherwise(first.cells[columns.names["time"]], timed))
     return Source(timed, columns, _again(first, rows), notes)
