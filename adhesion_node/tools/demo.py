@@ -26,7 +26,6 @@ from typing import Any
 
 import numpy as np
 from rclpy.executors import SingleThreadedExecutor
-from scipy.ndimage import uniform_filter1d
 
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
 from sim_node.real.sensors.fitted import FITTED
@@ -43,6 +42,7 @@ from ..live.__main__ import address_of, address_options
 from ..live.node import Live
 from ..report.drawn.picture import draw
 from ..report.drawn.table import table
+from ..report.found.braking_row import true_used
 from ..report.found.regimes import IN_WORDS, Band
 from ..report.read.gathered import read_status
 from ..report.read.recorded import read_run
@@ -50,7 +50,6 @@ from ..report.read.run import Run
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.results.score import Truth
-from ..wire.messages.parts import NS
 from ..wire.settings.setup import setup_of
 from ..wire.topics import ATP_STATUS
 from .line import UNASKED, Pace, Task, executor_of_line, parameters, play
@@ -190,8 +189,7 @@ def _found(truth: Sequence[Band], run: Run) -> dict[str, float]:
     said_s = said_s[said_s >= bands[0].start_s] if bands else said_s[:0]
     if not said_s.size:
         return {}
-    steps = round(NS / float(np.median(np.diff(run.true_mu.t_ns))))
-    used = run.true_mu.map(lambda mu: uniform_filter1d(mu, steps)).at(run.mu.t_ns)
+    used = true_used(run).at(run.mu.t_ns)
     at_s = run.seconds(run.mu.t_ns)
     counts = (at_s >= said_s[0]) & np.any([(at_s > band.start_s) & (at_s < band.end_s) for band in bands], axis=0)
     error = float(np.mean(np.abs(run.mu.values[counts] / used[counts] - 1.0)))

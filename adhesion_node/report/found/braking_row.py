@@ -8,6 +8,7 @@
 
 """What one braking of a run shows: its row, as a report lists it."""
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -16,18 +17,25 @@ from numpy.typing import NDArray
 from ...core import Regime
 from ...core.physics.train import KMH
 from ...run.results.score import CONVERGED_AFTER_MPS
+from ...run.results.used import averaged
 from ..read.run import Run
 from ..read.series import Series
 from .brakings import Braking, rises
 from .distances import Distances
 
 
+@lru_cache
+def true_used(run: Run) -> Series:
+    """The true adhesion over a second, as estimates are held against it."""
+    return run.true_mu._replace(values=averaged(*run.true_mu))
+
+
 def bound_kept(run: Run, first: int, last: int) -> NDArray[np.bool_]:
-    """Whether the bound was no higher than the true adhesion, at those of these estimates that have both."""
+    """Whether the bound was no higher than the true adhesion over a second, where these estimates have both."""
     times = run.speed.t_ns[first : last + 1]
     if not run.true_mu.t_ns.size:
         return np.array([], dtype=bool)
-    lower, true = run.mu_lower.exactly(times), run.true_mu.at(times)
+    lower, true = run.mu_lower.exactly(times), true_used(run).at(times)
     known = np.isfinite(lower) & np.isfinite(true)
     return np.asarray(lower[known] <= true[known] + 1e-9)
 

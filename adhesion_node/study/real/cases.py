@@ -29,11 +29,11 @@ from sim_node.real.sensors.sensor import Ride
 from ...core import Config
 from ...core.physics.track import Grade, Track
 from ...core.setting import Value, settings_of
+from ...run.results.used import USED_S
 from ...wire.line import NOMINAL, Line
 from ...wire.settings.given import parse_setting
 from ...wire.track_line import TrackLine, line_of
 from . import point_mass
-from .truth import USED_S
 
 AIDED = ("gnss_doppler", "gnss_smoothed", "gnss_imu", "radar", "doppler_only", "full")
 """Sets with a speed of their own or an accelerometer."""

@@ -12,13 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim_node.real.plant.journey import PERIOD_S, Journey
+from sim_node.real.plant.journey import Journey
 from sim_node.real.plant.validation import slid
 
 from ...core.physics.train import Array
-
-USED_S = 1.0
-"""Time, centred, over which the used adhesion is averaged: slide protection swings it by its cycle."""
+from ...run.results.used import averaged
 
 BORDER_RATIO = 0.75
 """A rail has a border where its adhesion falls below this share of what it was, or rises above its inverse, ..."""
@@ -43,7 +41,7 @@ class Truth(NamedTuple):
 
     true_speed_mps: Array
     used: Array
-    """Adhesion that the train's force used, averaged over `USED_S`."""
+    """Adhesion that the train's force used, averaged over a second."""
     available: Array
     slid: Array
     """Share of the axle groups that slid lately: slide protection lets them roll in between."""
@@ -54,17 +52,9 @@ class Truth(NamedTuple):
 def truth_at(journey: Journey, t_s: Array) -> Truth:
     """Look the truth up at N times, s."""
     remaining = np.where(journey.time_s >= journey.full_from_s, journey.position_m[-1] - journey.position_m, np.nan)
-    columns = (journey.speed_mps, averaged(journey.used), journey.available, slid(journey).mean(axis=1), remaining)
+    used = averaged(np.round(1e9 * journey.time_s).astype(np.int64), journey.used)
+    columns = (journey.speed_mps, used, journey.available, slid(journey).mean(axis=1), remaining)
     return Truth(*(np.interp(t_s, journey.time_s, column) for column in columns))
-
-
-def averaged(values: Array) -> Array:
-    """Mean over `USED_S` centred at every time, over what there is of it at the ends; shape (T,)."""
-    half = round(USED_S / 2 / PERIOD_S)
-    total = np.concatenate(([0.0], np.cumsum(values)))
-    index = np.arange(values.size)
-    first, last = np.maximum(index - half, 0), np.minimum(index + half + 1, values.size)
-    return np.asarray((total[last] - total[first]) / (last - first))
 
 
 def borders(journey: Journey) -> list[Border]:

@@ -144,6 +144,15 @@ def test_findings_are_of_all_brakings(run: Run) -> None:
     assert findings(run._replace(true_mu=NONE), Config(train=FREE), 60.0)["bound_kept_percent"] is None
 
 
+def test_the_bound_is_held_against_the_mean_of_a_second(run: Run) -> None:
+    """As `study real` does: by its cycle slide protection swings what is used about what it stops the train by."""
+    times = np.arange(run.speed.t_ns[0], run.speed.t_ns[-1] + 1, S // 10)
+    swings = run._replace(true_mu=Series(times, 0.09 + 0.03 * np.sin(np.arange(times.size) * np.pi / 2.0 + 0.5)))
+    assert findings(swings, Config(train=FREE), 60.0)["bound_kept_percent"] == 100.0
+    lower = swings._replace(true_mu=swings.true_mu.map(lambda mu: mu - 0.04))
+    assert findings(lower, Config(train=FREE), 60.0)["bound_kept_percent"] < 50.0
+
+
 def test_events_in_their_order(run: Run) -> None:
     told = [(round((t_ns - run.origin_ns) / S), kind, said) for t_ns, kind, said in events(run)]
     assert told[:4] == [

@@ -17,8 +17,9 @@ from driven import FROM_MPS, FROM_S, drive, journey
 from adhesion_node.core import Config, Estimate, Prediction, Regime
 from adhesion_node.core.physics import braking
 from adhesion_node.core.physics.train import GRAVITY
+from adhesion_node.run.results.used import averaged
 from adhesion_node.study.real.trials import arrays, naive, rows_of
-from adhesion_node.study.real.truth import averaged, borders, truth_at
+from adhesion_node.study.real.truth import borders, truth_at
 from adhesion_node.study.trial.estimators import LaneResult, Output
 from sim_node.real.drive import START_S
 
@@ -27,7 +28,7 @@ MADE = journey()
 
 def test_used_is_the_mean_over_the_second_around_it() -> None:
     used = np.where(MADE.time_s < 30.0, 0.02, 0.06)
-    mean = averaged(used)
+    mean = averaged(np.round(1e9 * MADE.time_s).astype(np.int64), used)
     assert np.interp([20.0, 29.4, 29.99, 30.6, 0.0, 79.9], MADE.time_s, mean) == pytest.approx(
         [0.02, 0.02, 0.04, 0.06, 0.02, 0.06], abs=5e-4
     )

@@ -26,8 +26,8 @@ from sim_node.real.sensors.timing import Timing
 
 from ....command.running import Arrays, Running, run_all
 from ....core.physics.train import Array
+from ....run.results.used import USED_S
 from ..cases import Case
-from ..truth import USED_S
 from .courses import Course, autocovariance_of, courses_of
 from .excess import excess_of
 from .knowledge import HONEST, std_of
