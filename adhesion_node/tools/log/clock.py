@@ -46,9 +46,14 @@ def over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
     return rows
 
 
+def has_dates(form: Format) -> bool:
+    """Whether the times are dates, which are in a zone; a clock's and numbers are in none."""
+    return form.time_format is not None and not is_clock(form.time_format)
+
+
 def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
     """The times of a zone as UTC; of an hour that is there twice, where the rows do not tell, that which joins them."""
-    if form.time_format is None or form.time_zone == "UTC" or is_clock(form.time_format):
+    if form.time_zone == "UTC" or not has_dates(form):
         return rows, []
     local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
     try:

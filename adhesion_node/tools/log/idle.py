@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...wire.line import ATMOSPHERE_PA
-from .cells import is_clock
+from .clock import has_dates
 from .columns import Columns
 from .format import PRESSURES, Format, option
 
@@ -43,7 +43,7 @@ def require_meaning(form: Format, columns: Columns) -> None:
     there = {*columns.names, *([AXLES] if columns.axles else [])}
     for name, value in form.asked.items():
         told = f"{name.removesuffix('_m').removesuffix('_pa').replace('_', '-')} = {value}"
-        if name == "time_zone" and (form.time_format is None or is_clock(form.time_format)):
+        if name == "time_zone" and not has_dates(form):
             raise ValueError(f"{told}: the times have no date, and no zone: leave it out")
         if name in OF and there.isdisjoint(OF[name]):
             cures = " or ".join(f"{option(column)} COL" for column in OF[name])

@@ -19,7 +19,7 @@ import pandas as pd
 
 from ...core.physics.train import Array
 from .cells import Flags
-from .clock import in_digits, in_zone, over_midnight
+from .clock import has_dates, in_digits, in_zone, over_midnight
 from .columns import Columns
 from .format import PRESSURE_UNITS, Format
 from .held import without_held
@@ -33,6 +33,9 @@ RELEASED_PA = 2e5, 1.2e6
 """What a pipe may have while the brake is released; mostly it is 5 bar."""
 
 SET_BACK = "the clock was set back; --time-zone where summer time ended, else cut the log there; or unsorted? --sort"
+BEGUN_ANEW = "the clock was set back, or a counter began anew: add to the times behind what they fell by, or cut the "
+BEGUN_ANEW += "log there; or unsorted? --sort"
+"""Of dates, and of all other times, which are in no zone."""
 
 
 class Log(NamedTuple):
@@ -61,7 +64,7 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
             tell(each)
     rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
     rows, notes = in_zone(over_midnight(rows, timed), timed)
-    rows, refused = _rising(rows.sort_values("t_ns", kind="stable") if form.sort else rows, str(path))
+    rows, refused = _rising(rows.sort_values("t_ns", kind="stable") if form.sort else rows, str(path), has_dates(timed))
     for each in refused:
         tell(each)
     rows, held = without_held(rows)
@@ -79,7 +82,7 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     return Log(form, source.columns, rows, tuple(notes))
 
 
-def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
+def _rising(rows: pd.DataFrame, source: str, dated: bool) -> tuple[pd.DataFrame, list[Refusal]]:
     """The rows whose time is later than that of all before, and why not the others."""
     ahead = _ahead(rows["t_ns"].to_numpy())
     refused = [
@@ -92,7 +95,7 @@ def _rising(rows: pd.DataFrame, source: str) -> tuple[pd.DataFrame, list[Refusal
     t_ns = rows["t_ns"].to_numpy()
     reached = np.maximum.accumulate(t_ns)
     late = np.append(False, t_ns[1:] <= reached[:-1]) if len(t_ns) else np.zeros(0, dtype=bool)
-    cure = _cure(rows, late)
+    cure = _cure(rows, late, SET_BACK if dated else BEGUN_ANEW)
     refused += [
         _out_of_time(rows, i, source, f"the last good row has {moment(reached[i - 1])}: {cure}")
         for i in np.flatnonzero(late).tolist()
@@ -110,12 +113,12 @@ def _ahead(t_ns: Array) -> Flags:
     return ahead & bool((np.diff(t_ns[~ahead]) >= 0).all())
 
 
-def _cure(rows: pd.DataFrame, late: Flags) -> str:
+def _cure(rows: pd.DataFrame, late: Flags, set_back: str) -> str:
     """What to do about rows whose time does not rise."""
     falls = int(np.count_nonzero(np.diff(rows["t_ns"]) < 0))
     if falls < 3 and late.sum() > 10 * max(falls, 1):
         if falls:
-            return SET_BACK
+            return set_back
         repeated = bool(rows.duplicated()[late].all())
         return (
             "rows are there twice: drop them"

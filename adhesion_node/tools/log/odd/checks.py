@@ -20,6 +20,7 @@ import numpy as np
 from ....core.physics.train import KMH, Array
 from ....run.results.seen import FASTEST_MPS
 from ....wire.line import ATMOSPHERE_PA
+from ..clock import has_dates
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from ..whole import Log, moment
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
@@ -182,7 +183,7 @@ def _clock(log: Log, t_s: Array) -> Iterator[str]:
         )
         slowest = min(before, after)
         if slowest > 5.0 and abs(place[i + 1] - place[i]) < 0.5 * slowest * steps[i]:
-            is_date = log.form.time_format is not None and log.form.time_zone == "UTC"
+            is_date = has_dates(log.form) and log.form.time_zone == "UTC"
             cure = "--time-zone where summer time began, else " if is_date and abs(steps[i] - 3600.0) < LEAST_S else ""
             cure += f"{HHMMSS}, else " if not is_date and round(steps[i] - np.median(steps)) in (40, 4040) else ""
             yield (
