@@ -133,7 +133,7 @@ class Format:
     pressure_is_gauge: bool = True
     ambient_pressure_pa: float = ATMOSPHERE_PA
     pipe_released: float | None = None
-    """Pressure of the brake pipe, in the unit of pressures, where the brake is released; None: its 9th decile."""
+    """Of the brake pipe, in the unit of pressures, where the brake is released; None: 9th decile as the train runs."""
     full_pressure_pa: float = CRH3.full_pressure_pa
     """What a full brake demands of the cylinders, gauge."""
     speed_unit: str | None = None

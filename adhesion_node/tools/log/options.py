@@ -87,7 +87,7 @@ def _unit_options(add: Callable[..., Any]) -> None:
     add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="of all pressures")
     air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
     add("--ambient-pressure", dest=AMBIENT.name, type=float, default=AMBIENT.default, metavar="PA", help=air)
-    released = "of the brake pipe while the brake is released, in the unit of pressures (default: its 9th decile)"
+    released = "of the brake pipe while released, in the unit of pressures (default: its 9th decile as the train runs)"
     add("--pipe-released", type=float, metavar="P", help=released)
     full = f"of the cylinders that a full brake by the pipe demands, gauge (default: {CRH3.full_pressure_pa:g})"
     add("--full-pressure", dest="full_pressure_pa", type=float, metavar="PA", help=full)

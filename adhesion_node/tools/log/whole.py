@@ -32,6 +32,9 @@ FULL_DROP_PA = 1.5e5
 RELEASED_PA = 2e5, 1.2e6
 """What a pipe may have while the brake is released; mostly it is 5 bar."""
 
+MOVES_MPS, OVER_S = 2.0, 5.0
+"""A train that is faster moves; slower positions, over so long, are noise."""
+
 SET_BACK = "the clock was set back; --time-zone where summer time ended, else cut the log there; or unsorted? --sort"
 BEGUN_ANEW = "the clock was set back, or a counter began anew: add to the times behind what they fell by, or cut the "
 BEGUN_ANEW += "log there; or unsorted? --sort"
@@ -138,7 +141,7 @@ def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, s
     """The rows with the demand that the pressure of the brake pipe is, and from where on it is released."""
     pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.unit("brake_pipe")
     scale = PRESSURE_UNITS[unit]
-    released = pipe.quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
+    released = pipe[_moves(rows)].quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
     if form.pipe_released is not None and not RELEASED_PA[0] <= released <= RELEASED_PA[1]:
         least, most = (pa / scale for pa in RELEASED_PA)
         range_ = f"give what the pipe has while the brake is released, {least:g} to {most:g} {unit}"
@@ -150,6 +153,18 @@ def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, s
         f"{unit} below; as the demand of {form.full_pressure_pa:g} Pa in the cylinders, --full-pressure"
     )
     return rows, replace(form, pipe_released=float(released / scale)), note
+
+
+def _moves(rows: pd.DataFrame) -> Flags:
+    """Rows of a train that moves, as parked its pipe may be empty for longer than it runs; all, where it never does."""
+    t_s, moves = rows["t_ns"].to_numpy() / 1e9, np.zeros(len(rows), dtype=np.bool_)
+    if "speed" in rows:
+        moves = (rows["speed"].abs().ffill() > MOVES_MPS).to_numpy()
+    elif "position" in rows and rows["position"].notna().any():
+        known = rows["position"].notna().to_numpy()
+        before, behind = (np.interp(t_s + by, t_s[known], rows["position"][known]) for by in (-OVER_S / 2, OVER_S / 2))
+        moves = np.abs(behind - before) / OVER_S > MOVES_MPS
+    return moves | (not moves.any())
 
 
 def moment(t_ns: int) -> str:

@@ -22,11 +22,11 @@ from ....run.results.seen import FASTEST_MPS
 from ....wire.line import ATMOSPHERE_PA
 from ..clock import has_dates
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
-from ..whole import Log, moment
+from ..whole import MOVES_MPS, Log, moment
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
-from .ways import MOVES_MPS, resets, slow_or_falling, speed_against_positions
+from .ways import resets, slow_or_falling, speed_against_positions
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""

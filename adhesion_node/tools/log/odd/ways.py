@@ -17,11 +17,11 @@ import numpy as np
 from ....core.physics.train import Array
 from ....run.results.seen import FASTEST_MPS
 from ..format import POSITION_UNITS, SPEED_UNITS, Format
-from ..whole import Log, moment
+from ..whole import MOVES_MPS, Log, moment
 from .motion import LEAST_M, LEAST_S, SAME, Motion
 
-MOVES_MPS, ONE_WAY = 2.0, 0.9
-"""Where a train moves its positions rise, or fall, for so much of its way; slower ones are noise."""
+ONE_WAY = 0.9
+"""Where a train moves its positions rise, or fall, for so much of its way."""
 
 
 def resets(log: Log, t_s: Array) -> Iterator[str]:
