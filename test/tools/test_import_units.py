@@ -29,6 +29,8 @@ TOLD: list[tuple[str, str]] = [
     ("brackets", "time [ms],position [ft],speed [km/h],brake_pressure [bar]\n"),
     ("parentheses", "Time (ms),Position (feet),Speed (kph),Brake Pressure (barg)\n"),
     ("suffixes", "time_ms,position_ft,speed_kmh,brake_pressure_Bar\n"),
+    ("strokes", "time/ms,position / ft,speed/(km/h),brake_pressure/bar\n"),
+    ("words", "time in ms,position in ft,speed in km/h,brake_pressure in bar\n"),
     ("a line below", OURS + "ms,ft,km/h,bar\n"),
     ("brackets below a preamble", "Recorder X,,,\n" + OURS + "[ms],[ft],[km h⁻¹],[bar]\n"),
 ]

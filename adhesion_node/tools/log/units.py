@@ -39,7 +39,10 @@ _SPELT = {
 }
 """How units are written; in `min^-1` and `m s⁻²` what raises and what divides is left out."""
 
-_BRACKETS = re.compile(r"(.*?)[\s_]*[\[(<{]\s*(.*?)\s*[\])>}]+")
+_BRACKETS = re.compile(r"(.*?)(?:\s*/|\s+in)?[\s_]*[\[(<{]\s*(.*?)\s*[\])>}]+")
+
+_MARKS = re.compile(r"(.+)_(.+)$"), re.compile(r"(.+?)\s*/\s*(.+)$"), re.compile(r"(.+)\s+in\s+(.+)$")
+"""What stands between a name and its unit without brackets, `p_bar`, `v/km/h`, `v in km/h`; so DIN 1313 has it."""
 
 
 def known(text: str, column: str) -> str | None:
@@ -61,11 +64,13 @@ def parted(name: str, column: str) -> tuple[str, str]:
 
     >>> parted("v [km/h]", "speed"), parted("speed_kmh", "speed"), parted("speed_std", "speed")
     (('v', 'km/h'), ('speed', 'kmh'), ('speed_std', ''))
+    >>> parted("v in km/h", "speed"), parted("v / (km/h)", "speed"), parted("s/m", "position"), parted("in/x", "speed")
+    (('v', 'km/h'), ('v', 'km/h'), ('s', 'm'), ('in/x', ''))
     """
     if match := _BRACKETS.fullmatch(name):
         return match[1], match[2]
-    stem, _, unit = name.rpartition("_")
-    return (stem, unit) if stem and known(unit, column) else (name, "")
+    parts = (mark.match(name) for mark in _MARKS)
+    return next(((part[1], part[2]) for part in parts if part and known(part[2], column)), (name, ""))
 
 
 def meant(name: str, column: str, header: Sequence[str]) -> list[str]:
