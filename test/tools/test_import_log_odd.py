@@ -137,6 +137,19 @@ def test_what_is_odd_is_said_with_the_option_that_cures_it(
     assert importing(log, *cure) == 0, importing.errors
 
 
+@pytest.mark.parametrize(("unit", "factor"), [("mps", 1.0), ("kmh", 3.6)])
+def test_a_speed_that_falls_at_once_is_not_cured_by_the_unit_that_it_is_read_in(
+    importing: Import, unit: str, factor: float
+) -> None:
+    """-1 for no value, in a log of km/h that is read as one."""
+    rows = ride().drop(columns="position")
+    gaps = (rows.time > 30.0) & (rows.time < 33.0)
+    importing(text(rows.assign(speed=(factor * rows.speed).mask(gaps, -1.0))), "--speed-unit", unit)
+    (odd,) = importing.summary["odd"]
+    assert ("--speed-unit kmh" in odd) == (unit == "mps")
+    assert "is it of a wheel that locked, or do numbers stand for no value? Leave those cells empty" in odd
+
+
 def test_small_wheels_are_not_odd(importing: Import) -> None:
     assert importing(text(ride().assign(wheel_speed_1=ride().speed / 0.31))) == 0, importing.errors
 

@@ -57,7 +57,7 @@ def odd(log: Log) -> list[str]:
     of_way = [*resets(log, t_s)]
     alone = () if motion.by_fixes else slow_or_falling(motion)
     of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else alone)]
-    of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion)]
+    of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion, log.form)]
     return [
         *log.columns.doubts,
         *texts,
@@ -130,25 +130,21 @@ def _empty(log: Log) -> Iterator[str]:
             yield f"no row has a {name}: name another column with {option(name)} COL"
 
 
-def _hard(motion: Motion) -> Iterator[str]:
+def _hard(motion: Motion, form: Format) -> Iterator[str]:
     """Without positions only the braking tells of a wrong unit of the speed."""
     steps = (motion.speed_mps[HARD_S:] - motion.speed_mps[:-HARD_S]) / HARD_S
     if np.nanmin(steps, initial=0.0) < -HARDEST_MPS2:
-        yield (
-            f"the speed falls by {-np.nanmin(steps):.1f} m/s^2, harder than any train brakes: km/h read as m/s, "
-            "--speed-unit kmh? Or is it of a wheel that locked?"
-        )
+        unit = "km/h read as m/s, --speed-unit kmh? Or " if form.unit("speed") == "mps" else ""
+        other = "is it of a wheel that locked, or do numbers stand for no value? Leave those cells empty"
+        yield f"the speed falls by {-np.nanmin(steps):.1f} m/s^2, harder than any train brakes: {unit}{other}"
 
 
 def _too_fast(motion: Motion, form: Format) -> Iterator[str]:
     speeds = np.sort(motion.fastest_mps[np.isfinite(motion.fastest_mps)])
     if len(speeds) > 2 and (fast := float(speeds[-3])) > FASTEST_MPS:  # two seconds may be outliers
         measured = bool(np.isfinite(motion.speed_mps).any())
-        cure = (
-            "km/h? --speed-unit kmh"
-            if measured and form.unit("speed") == "mps"
-            else "another --position-unit, --time-unit?"
-        )
+        unit = "km/h? --speed-unit kmh" if form.unit("speed") == "mps" else "another --speed-unit?"
+        cure = unit if measured else "another --position-unit, --time-unit?"
         yield f"the train runs {fast:.0f} m/s, {fast / KMH:.0f} km/h: {cure}"
 
 
