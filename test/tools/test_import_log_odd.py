@@ -246,6 +246,22 @@ def test_an_odometer_that_begins_anew_is_no_way_back(
     assert f"{times}: an odometer that begins anew: cut the log there, or add to what is behind what it fell by" in odd
 
 
+def test_a_column_of_several_quantities_is_no_way(importing: Import) -> None:
+    """A signal to a row, as buses are logged: `value` is the speed in every second one."""
+    rows = ride().melt("time", ["position", "speed"]).sort_values("time", kind="stable")
+    rows["time"] += (rows.variable == "speed") * 0.03
+    assert importing(text(rows), "--position", "value") == 1
+    (odd,) = importing.summary["odd"]
+    assert odd.endswith("row by row: are several quantities in one column? Give each its own")
+
+
+def test_a_last_row_of_totals_is_told(importing: Import) -> None:
+    rows = ride()
+    importing(text(pd.concat([rows, rows.sum().to_frame().T.assign(speed=40.0, brake_pressure=2e5)])))
+    (odd,) = importing.summary["odd"]
+    assert odd.startswith("the last row is 1.791e+04 s later than the one before: are its numbers totals? Leave it out")
+
+
 def test_a_place_that_jumps_there_and_back_is_no_reset(importing: Import) -> None:
     rows = ride()
     importing(text(rows.assign(position=rows.position.where(rows.index % 50 != 7, 0.0))))

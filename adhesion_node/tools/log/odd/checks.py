@@ -26,7 +26,7 @@ from ..whole import MOVES_MPS, Log, moment
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
-from .ways import resets, slow_or_falling, speed_against_positions
+from .ways import leaps, slow_or_falling, speed_against_positions
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
@@ -54,7 +54,7 @@ def odd(log: Log) -> list[str]:
     if of_time or stand_ins or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *(of_time or _too_far(log, t_s)), *texts]
     motion = motion_of(log, t_s)
-    of_way = [*resets(log, t_s)]
+    of_way = [*leaps(log, t_s)]
     alone = () if motion.by_fixes else slow_or_falling(motion)
     of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else alone)]
     of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion, log.form)]
@@ -66,6 +66,7 @@ def odd(log: Log) -> list[str]:
         *felt(motion, log.form),
         *rolling(motion, log.form),
         *_clock(log, t_s),
+        *_last(t_s),
     ]
 
 
@@ -163,6 +164,12 @@ def _pipe(motion: Motion) -> Iterator[str]:
                 f"brake_pressure is {runs_pa / 1e5:.1f} bar while the train runs, {brakes_pa / 1e5:.1f} bar while it "
                 "brakes: is it the brake pipe's? --pipe COL"
             )
+
+
+def _last(t_s: Array) -> Iterator[str]:
+    """One row that is later than all others by more than the whole log."""
+    if len(t_s) > LEAST_S and (late_s := float(t_s[-1] - t_s[-2])) > t_s[-2]:
+        yield f"the last row is {late_s:.4g} s later than the one before: are its numbers totals? Leave it out"
 
 
 def _clock(log: Log, t_s: Array) -> Iterator[str]:

@@ -24,14 +24,16 @@ ONE_WAY = 0.9
 """Where a train moves its positions rise, or fall, for so much of its way."""
 
 
-def resets(log: Log, t_s: Array) -> Iterator[str]:
-    """Single falls of the positions, faster than any train and not made good again: those of an odometer."""
+def leaps(log: Log, t_s: Array) -> Iterator[str]:
+    """Positions that leap faster than any train: single falls that are not made good again are those of an odometer."""
     known = log.rows["position"].notna().to_numpy() if "position" in log.rows else np.zeros(len(t_s), dtype=bool)
     place, t_ns, steps_s = log.rows.get("position", t_s)[known], log.rows["t_ns"][known], np.diff(t_s[known])
     steps = np.diff(place)
-    leaps = (np.abs(steps) > LEAST_M) & (np.abs(steps) > FASTEST_MPS * steps_s)
-    fallen = np.flatnonzero(leaps & (steps < 0.0))
-    if 2 * len(fallen) > leaps.sum() and 10 * len(fallen) < len(steps) and steps[~leaps].sum() > 0.0:
+    leapt = (np.abs(steps) > LEAST_M) & (np.abs(steps) > FASTEST_MPS * steps_s)
+    fallen = np.flatnonzero(leapt & (steps < 0.0))
+    if 4 * min(len(fallen), leapt.sum() - len(fallen)) > len(steps) > LEAST_S:
+        yield "the positions leap there and back row by row: are several quantities in one column? Give each its own"
+    elif 2 * len(fallen) > leapt.sum() and 10 * len(fallen) < len(steps) and steps[~leapt].sum() > 0.0:
         i, times = int(fallen[0]), f", {len(fallen)} times so" if len(fallen) > 1 else ""
         before, behind, when = place.iloc[i], place.iloc[i + 1], moment(t_ns.iloc[i + 1])
         yield (
