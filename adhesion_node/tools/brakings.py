@@ -82,12 +82,13 @@ class Recording(NamedTuple):
     def compute(self) -> Arrays:
         """Replay it; what is wrong with it is a result, too."""
         try:
-            rows, cells = self._replay()
+            rows, cells, placed = self._replay()
         except (OSError, ValueError) as error:
             return {"failed": np.array(str(error))}
-        return {"rows": rows, "cells": cells, "failed": np.array("")}
+        return {"rows": rows, "cells": cells, "placed": np.array(placed), "failed": np.array("")}
 
-    def _replay(self) -> tuple[NDArray[np.void], NDArray[np.void]]:
+    def _replay(self) -> tuple[NDArray[np.void], NDArray[np.void], bool]:
+        """Its brakings, the pieces of track of those, and whether these are known: by a speed alone they are not."""
         setup = setup_of(dict(self.settings))
         with BagReader(Path(self.path)) as reader:
             recorded = offline.messages(reader, select_from(reader, self.remaps), setup.line)
@@ -97,7 +98,8 @@ class Recording(NamedTuple):
         if pipeline.last is None:
             raise ValueError(f"nothing to estimate from; dropped: {pipeline.dropped or 'nothing'}")
         rows = np.concatenate([np.empty(0, BRAKING), *(one.row for one in found)])
-        return rows, np.concatenate([np.empty(0, CELL), *(one.cells for one in found)])
+        cells = [one.cells for one in found if pipeline.accepted]
+        return rows, np.concatenate([np.empty(0, CELL), *cells]), pipeline.accepted > 0
 
 
 def main(args: Sequence[str] | None = None) -> int:
@@ -134,6 +136,9 @@ def _work(options: argparse.Namespace) -> int:
             continue
         rows.append(pd.DataFrame(found["rows"]).assign(train=printable(task.train), recording=printable(task.path)))
         cells.append(pd.DataFrame(found["cells"]))
+        if options.map and not found["placed"]:
+            where = "has no positions, its places count from its beginning: left out of the map"
+            print(f"brakings: {task.path}: {where}: record positions, or set track_line for its fixes", file=sys.stderr)
     result: dict[str, Any] = {"train": setup.train, "recordings": len(rows), "failed": failed, "brakings": 0}
     if rows:
         table = table_of(_without_copies(pd.concat(rows)))

@@ -18,10 +18,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import test_offline
+from test_import_log import ride, text
 from test_offline import NO_TRUTH, samples, write_run
 
 from adhesion_node.run.results.rail_map import map_of
-from adhesion_node.tools import brakings
+from adhesion_node.tools import brakings, import_csv
+from adhesion_node.tools.log.format import Format
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +113,26 @@ def test_stamps_without_a_date_are_said_of_a_map(
     assert line.endswith(": stamp them in UTC, or import logs with dates")
     assert brakings.main([str(tmp_path / "undated"), *options]) == 0
     assert told(capfd) == [], "a table tells no age"
+
+
+def test_a_recording_without_positions_is_in_the_table_alone(
+    bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """By its speed alone a place is the way from where the recording begins: no place of the line."""
+    log, speeds, rail = tmp_path / "log.csv", tmp_path / "speeds", tmp_path / "rail.csv"
+    rows = ride(80).assign(time=ride(80).time + 1.7e9)
+    log.write_text(text(rows.drop(columns="position")))
+    import_csv.convert(log, speeds, Format(named={}))
+    options = ["--output", str(tmp_path / "brakings.csv"), "--map", str(rail), "--cache", str(tmp_path / "cache")]
+    assert brakings.main([str(bags / "monday"), *options]) == 0
+    placed = pd.read_csv(rail)
+    for more in ([str(bags / "monday")], []):
+        assert told(capfd) == []
+        assert brakings.main([str(speeds), *more, *options]) == 0
+        (line,) = told(capfd)
+        assert line.startswith(f"brakings: {speeds}: has no positions, its places count from its beginning: left out")
+        assert str(speeds) in set(pd.read_csv(tmp_path / "brakings.csv")["recording"])
+        pd.testing.assert_frame_equal(pd.read_csv(rail), placed if more else placed[:0], check_dtype=False)
 
 
 @pytest.mark.parametrize("other", ["--map", "--json"])
