@@ -40,6 +40,22 @@ def test_thousands_are_read_where_the_decimal_sign_is_sure_and_that_is_said(
     assert f"brake_pressure: '300{separator}000' is read as 300000" in read_as(importing, capsys)
 
 
+@pytest.mark.parametrize("separator", ["'", "\u2019", "\u00a0", "\u2009", "\u202f"])
+@pytest.mark.parametrize("decimal", [".", ","])
+def test_thousands_apart_by_no_decimal_sign_are_read(importing: Import, separator: str, decimal: str) -> None:
+    """As Switzerland and France write them."""
+    rows = ride()
+    assert importing(text(in_groups(rows, separator, decimal), ";")) == 0, importing.errors
+    assert [sample.position_m for sample in importing.positions()] == rows.position.round(2).tolist()
+    pressures = [BRAKE_PRESSURE.read(message).pressure_pa for message in importing.messages("brake_pressure")]
+    assert pressures == pytest.approx(rows.brake_pressure.tolist())
+
+
+def test_a_minus_as_it_is_printed_is_one(importing: Import) -> None:
+    assert importing("time,speed\n1,\u22120.5\n2,-0.5\n") == 0, importing.errors
+    assert [SPEED.read(message).speed_mps for message in importing.messages("speed")] == [-0.5, -0.5]
+
+
 def test_thousands_are_named_where_the_decimal_sign_is_not_sure(importing: Import) -> None:
     """Whole numbers first, then what may be either."""
     log = "time;speed;brake_pressure\n" + "".join(f"{i};20;0\n" for i in range(300)) + "300;20;20,000\n"

@@ -150,3 +150,11 @@ def test_the_hour_that_is_there_twice_joins_the_rows(importing: Import, begins: 
     stamps = [each.t_ns for each in importing.positions()]
     assert np.ptp(np.diff(stamps)) == 0
     assert str(pd.Timestamp(stamps[0]).time()) == utc
+
+
+def test_a_date_that_looks_like_no_date_is_cured_by_its_format(importing: Import) -> None:
+    log = "time,speed\n20241121T081503.5Z,1\n20241121T081504.5Z,2\n"
+    assert importing(log) == 2
+    assert importing.errors[0].endswith("a date is told by --time-format")
+    assert importing(log, "--time-format", "%Y%m%dT%H%M%S.%fZ") == 0
+    assert SPEED.read(importing.messages("speed")[0]).t_ns == 1_732_176_903_500_000_000

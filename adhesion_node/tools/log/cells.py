@@ -44,6 +44,9 @@ _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 
 _EPOCH, _END = (pd.Timestamp(seconds, unit="s", tz="UTC") for seconds in (0, 2**31))
 
+_NO_DECIMAL = re.compile("(?<=[0-9])['\u2019\u00a0\u2009\u202f](?=[0-9]{3}(?![0-9]))")
+"""What stands between groups of thousands and is no decimal sign: apostrophes and narrow spaces."""
+
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 
@@ -51,16 +54,19 @@ def numbers(cells: "pd.Series[Any]", decimal: str, thousands: bool = False) -> A
     """Return the numbers of cells, shape (n,), exactly as Python reads them; NaN for what is no finite number.
 
     Separators of thousands are understood where the decimal sign stands behind them, 12.345,6; with `thousands` in
-    whole numbers, too.
+    whole numbers, too; and wherever they are no decimal sign, 12'345.
 
     >>> cells = pd.Series(["12,5", "1.234,5", "1.234", "nan", "1_0"])
     >>> numbers(cells, ",").tolist(), numbers(cells, ",", thousands=True).tolist()
     ([12.5, 1234.5, nan, nan, nan], [12.5, 1234.5, 1234.0, nan, nan])
+    >>> numbers(pd.Series(["12'345.6", "12\u202f345", "\u22120.5", "1'2"]), ".").tolist()
+    [12345.6, 12345.0, -0.5, nan]
     """
     if pd.api.types.is_numeric_dtype(cells):
         read = cells.to_numpy(dtype=np.float64, na_value=np.nan)
     else:
-        text, separator = cells.astype(str), "." if decimal == "," else ","
+        text, separator = cells.astype(str).str.replace("\u2212", "-", regex=False), "." if decimal == "," else ","
+        text = text.str.replace(_NO_DECIMAL, "", regex=True)
         in_groups = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{separator}][0-9]{{3}})+[{decimal}][0-9]+")
         in_groups |= grouped(text, decimal) & thousands
         text = text.mask(in_groups, text.str.replace(separator, "", regex=False))

@@ -162,7 +162,7 @@ def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any
     outside = bad & np.isfinite(numbers(cells, form.decimal or "."))
     range_ = "a stamp lies between 1970 (or 0) and 2038: is the --time-unit another?"
     refuse(outside, "out_of_range", "time", lambda _: range_)
-    refuse(bad, "not_a_number", "time", lambda _: NO_NUMBER)
+    refuse(bad, "not_a_number", "time", lambda _: f"{NO_NUMBER}; a date is told by --time-format")
 
 
 def _out_of_range(read: Any, least: float, most: float, remedy: str) -> Callable[[int], str]:
