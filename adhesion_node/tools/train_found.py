@@ -129,7 +129,8 @@ def read(recorded: Iterable[Recorded], line: Line) -> Log:
 def find(config: Config, log: Log) -> Found:
     """Compare how the train slows down with what is believed of it. Raises ValueError without pressures."""
     if not log.pressures.size:
-        raise ValueError("the recording holds no brake_pressure, without which brake and coasting look alike")
+        why = "without which brake and coasting look alike; a demand does not tell what the cylinders get"
+        raise ValueError(f"the recording holds no brake_pressure, {why}: record it, or import_csv --pressure COL")
     coasting = list(_coasting(config, log))
     coasts = [one for one in coasting if COASTS[0] < one[0] < COASTS[1]]
     resistance = _mean(coasts, len(coasting) - len(coasts))

@@ -205,3 +205,4 @@ def test_a_recording_without_pressures_is_refused(tmp_path: Path, capfd: pytest.
     code, _, err = told(capfd, "--estimate", str(tmp_path / "run"))
     assert code == 2
     assert "holds no brake_pressure" in err
+    assert err.rstrip().endswith(": record it, or import_csv --pressure COL")

@@ -116,7 +116,8 @@ def _open(path: Path, metadata: Metadata) -> Recording:
         return McapRecording([path])
     if path.suffix == ".db3":
         return ForeignRecording([path])
-    hint = "convert it with rosbags-convert" if path.suffix == ".bag" else "name a rosbag2 directory or an .mcap file"
+    hints = {".bag": "convert it with rosbags-convert", ".csv": "make one of a log by import_csv"}
+    hint = hints.get(path.suffix.lower(), "name a rosbag2 directory or an .mcap file")
     raise ValueError(f"bag = {path}: is no recording of ROS 2: {hint}")
 
 

@@ -21,6 +21,8 @@ from ...run.results.rail_map import map_of
 
 RAIL = ("place_m", "length_m", "date", "seen", "limited", "mu", "mu_lowest", "used", "mu_lower")
 
+WRITTEN_BY = "give what `brakings` writes; `import_csv` makes a recording of a log"
+
 
 class Fleet(NamedTuple):
     """Brakings in the order of time, and the rail by piece of track and date."""
@@ -57,10 +59,7 @@ def read_fleet(paths: Sequence[Path]) -> Fleet:
         is_map = "length_m" in frame
         wanted = RAIL if is_map else ("train", "recording", *(BRAKING.names or ()))
         if lacking := [name for name in wanted if name not in frame]:
-            raise ValueError(
-                f"table = {path}: lacks the columns {', '.join(lacking)}: give what `brakings` writes; "
-                "`import_csv` makes a recording of a log"
-            )
+            raise ValueError(f"table = {path}: lacks the columns {', '.join(lacking)}: {WRITTEN_BY}")
         (maps if is_map else tables).append(frame)
     if not tables or len(maps) > 1:
         raise ValueError(f"tables = {len(tables)} of brakings, {len(maps)} maps: give one or more, and one map at most")
@@ -125,4 +124,4 @@ def _read(path: Path) -> pd.DataFrame:
     except ImportError as error:
         raise ValueError(f"table = {path}: needs pyarrow, pip install '.[parquet]', or give a .csv") from error
     except (OSError, ValueError) as error:
-        raise ValueError(f"table = {path}: not readable ({error}): `brakings` writes one") from error
+        raise ValueError(f"table = {path}: not readable ({error}): {WRITTEN_BY}") from error

@@ -228,6 +228,7 @@ def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
         ("x.mcap", b"\x89MCAP0\r\n" + b"\xff" * 300, r"x\.mcap: holds no readable message"),
         ("x.db3", b"garbage " * 100, r"x\.db3: unreadable \(.*\): name another recording"),
         ("x.bag", b"#ROSBAG V2.0", r"x\.bag: is no recording of ROS 2: convert it with rosbags-convert"),
+        ("x.CSV", b"time,speed", r"x\.CSV: is no recording of ROS 2: make one of a log by import_csv"),
         ("x.txt", b"text", r"x\.txt: is no recording of ROS 2: name a rosbag2 directory or an \.mcap file"),
     ],
 )

@@ -124,6 +124,7 @@ def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture
         (["rail.csv"], "tables = 0 of brakings, 1 maps"),
         (["none.csv"], "none.csv: is not there"),
         (["broken.parquet"], "broken.parquet: not readable"),
+        (["broken.parquet"], "`import_csv` makes a recording of a log"),
         (["nothing.csv"], "hold no braking"),
         (["brakings.csv", "--low", "0"], "low = 0.0: give"),
         (["brakings.csv", "--set", "train.mass_kg=400000"], "--set train.mass_kg=400000: tables are shown as written"),
