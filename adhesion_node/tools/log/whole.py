@@ -32,6 +32,9 @@ FULL_DROP_PA = 1.5e5
 RELEASED_PA = 2e5, 1.2e6
 """What a pipe may have while the brake is released; mostly it is 5 bar."""
 
+DEGREE_M = 111.2e3
+"""Of latitude."""
+
 MOVES_MPS, OVER_S = 2.0, 5.0
 """A train that is faster moves; slower positions, over so long, are noise."""
 
@@ -157,14 +160,21 @@ def _demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, s
 
 def _moves(rows: pd.DataFrame) -> Flags:
     """Rows of a train that moves, as parked its pipe may be empty for longer than it runs; all, where it never does."""
-    t_s, moves = rows["t_ns"].to_numpy() / 1e9, np.zeros(len(rows), dtype=np.bool_)
-    if "speed" in rows:
-        moves = (rows["speed"].abs().ffill() > MOVES_MPS).to_numpy()
-    elif "position" in rows and rows["position"].notna().any():
-        known = rows["position"].notna().to_numpy()
-        before, behind = (np.interp(t_s + by, t_s[known], rows["position"][known]) for by in (-OVER_S / 2, OVER_S / 2))
-        moves = np.abs(behind - before) / OVER_S > MOVES_MPS
+    speed = rows["speed"].abs().ffill().to_numpy() if "speed" in rows else _way_m(rows) / OVER_S
+    moves: Flags = speed > MOVES_MPS
     return moves | (not moves.any())
+
+
+def _way_m(rows: pd.DataFrame) -> Array:
+    """Way over the `OVER_S` about every row, by positions or else by fixes; shape (n,)."""
+    t_s, squares = rows["t_ns"].to_numpy() / 1e9, np.zeros(len(rows))
+    by_fix = {"lat": DEGREE_M, "lon": DEGREE_M * np.cos(np.radians(rows["lat"].median()))} if "lat" in rows else {}
+    for name, metres in ({"position": 1.0} if "position" in rows else by_fix).items():
+        known = rows[name].notna().to_numpy()
+        if known.any():
+            at = [np.interp(t_s + by, t_s[known], rows[name][known]) for by in (-OVER_S / 2, OVER_S / 2)]
+            squares += np.square(metres * (at[1] - at[0]))
+    return np.sqrt(squares)
 
 
 def moment(t_ns: int) -> str:
