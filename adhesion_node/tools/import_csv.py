@@ -25,7 +25,6 @@ from .log.odd.checks import odd
 from .log.options import add_options, format_of
 from .log.text import BLOCK
 from .log.told import Refused, ranges, read_as, units_read
-from .log.unused import refuse_unused
 from .log.whole import Log, read_log
 
 EXAMPLES = (
@@ -66,7 +65,7 @@ def main(args: Sequence[str] | None = None) -> int:
 def read(source: Path, form: Format) -> tuple[Log, Counter[str]]:
     """Read a log; what is refused and what is odd is said on stderr.
 
-    Raises ValueError when a column is missing, no row is good or a part of the format means nothing.
+    Raises ValueError when a column is missing or no row is good, or an option means nothing.
     """
     if not source.is_file():
         raise ValueError(f"file = {source}: is no file: name a CSV log; what comes by a pipe, save in one first")
@@ -75,7 +74,6 @@ def read(source: Path, form: Format) -> tuple[Log, Counter[str]]:
     refused.end()
     if log.rows.empty:
         raise ValueError(f"{source}: no good row in {refused.counts.total()}: nothing was written; {read_as(log.form)}")
-    refuse_unused(form, log)
     return log, refused.counts
 
 

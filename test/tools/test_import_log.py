@@ -227,24 +227,41 @@ def test_options_that_cannot_be_are_refused(importing: Import, options: list[str
 
 
 @pytest.mark.parametrize(
-    ("options", "message"),
+    ("name", "value", "cure"),
     [
-        (["--pipe-released", "5"], "pipe-released = 5.0: the log has no column of which it tells: name one"),
-        (["--full-pressure", "3e5"], "full-pressure = 300000.0: the log has no column of which it tells: name one"),
-        (["--pressure-kind", "absolute"], "pressure-kind = absolute: the log has no column of which it tells: name"),
-        (["--acceleration-unit", "g"], "acceleration-unit = g: the log has no column of which it tells: name one"),
-        (["--wheel-radius", "0.4"], "wheel-radius = 0.4: the log has no column of which it tells: name one"),
-        (["--position-std", "2"], "position-std = 2.0: the log has no column of which it tells: name one with --posit"),
-        (["--direction", "down"], "direction = down: the log has no column of which it tells: name one with --positio"),
-        (["--time-zone", "Europe/Berlin"], "time-zone = Europe/Berlin: the times have no date, and no zone: leave it"),
+        ("--pipe-released", "5.0", "--pipe COL, or"),
+        ("--full-pressure", "300000.0", "--pipe COL, or"),
+        ("--pressure-kind", "absolute", "--pressure COL or"),
+        ("--pressure-unit", "bar", "--pressure COL or"),
+        ("--acceleration-unit", "g", "--acceleration COL, or"),
+        ("--wheel-radius", "0.4", "--wheel-speeds COL, or"),
+        ("--position-std", "2.0", "--position COL or --lat COL, or"),
+        ("--direction", "down", "--position COL, or"),
     ],
 )
-def test_an_option_that_means_nothing_for_a_log_is_refused(importing: Import, options: list[str], message: str) -> None:
+def test_an_option_of_a_column_that_a_log_has_not_is_refused(
+    importing: Import, name: str, value: str, cure: str
+) -> None:
     """Its column is there under a name that is not read, and all would be taken without it."""
-    assert importing("time,speed,HL\n1,2,5\n", *options) == 2
-    assert importing.errors[0].startswith(f"import_csv: {message}")
-    assert "leave it out" in importing.errors[0]
+    assert importing("time,speed,HL\n1,2,5\n", name, value) == 2
+    why = "the log has no column of which it tells: name one with"
+    assert importing.errors[0].startswith(f"import_csv: {name} {value}: {why} {cure}")
     assert not importing.output.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            ["--time-zone", "Europe/Berlin"],
+            "--time-zone Europe/Berlin: the times have no date, and no zone: leave it out",
+        ),
+        (["--time-unit", "s", "--time-format", "%S"], "--time-unit s: dates by --time-format have no unit: leave the"),
+    ],
+)
+def test_an_option_of_other_times_is_refused(importing: Import, options: list[str], message: str) -> None:
+    assert importing("time,speed\n1,2\n", *options) == 2
+    assert importing.errors[0].startswith(f"import_csv: {message}")
 
 
 def test_what_is_usual_and_what_the_train_tells_is_refused_for_no_log(importing: Import) -> None:

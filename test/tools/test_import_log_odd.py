@@ -301,7 +301,9 @@ def test_a_number_that_no_train_has_and_that_stands_for_no_value_is_named(
     rows = ride().assign(wheel_speed_1=ride().speed / 0.46, acceleration=0.0, brake_pressure=3.0)[:190]
     gaps = rows.index % 10 == 3
     importing(text(rows.assign(**{column: rows[column].mask(gaps, mark)})), *options)
-    assert importing.errors[0].startswith(f"FILE:5: {column} = '{float(mark)}': it stands for no value: leave")
+    assert importing.errors[0].startswith(
+        f"import_csv: FILE:5: {column} = '{float(mark)}': it stands for no value: leave"
+    )
     assert importing.summary["refused"] == {"no_value": gaps.sum()}
     importing.output = importing.output.with_name("cured")
     importing(text(rows.assign(**{column: rows[column].mask(gaps)})), *options)

@@ -58,27 +58,6 @@ def test_a_row_that_is_no_date_is_not_said_to_be_another(importing: Import, caps
     assert "may be" not in str(read_as(importing, capsys))
 
 
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        (["--position-unit", "km"], "--position-unit km: the log has no position: leave it out, or name the column"),
-        (["--pressure-unit", "bar"], "--pressure-unit bar: the log has no pressure: leave it out, or name the column"),
-        (["--acceleration-unit", "g"], "--acceleration-unit g: the log has no acceleration: leave it out, or name"),
-        (["--wheel-unit", "rpm"], "--wheel-unit rpm: the log has no wheel: leave it out, or name the column"),
-        (["--pipe-released", "5"], "--pipe-released 5.0: the log has no brake_pipe: leave it out, or name the column"),
-        (["--time-zone", "Europe/Berlin"], "--time-zone Europe/Berlin: the times are numbers, in s, of UTC: leave it"),
-        (
-            ["--time-unit", "s", "--time-format", "%S"],
-            "--time-unit s: dates by --time-format have no unit: leave the one or the other out",
-        ),
-    ],
-)
-def test_an_option_that_means_nothing_for_a_log_is_refused(importing: Import, options: list[str], said: str) -> None:
-    assert importing("time,speed\n1,20\n2,20\n", *options) == 2
-    assert importing.errors[-1].startswith(f"import_csv: {said}")
-    assert not importing.output.exists()
-
-
 @pytest.mark.parametrize(("lat", "lon", "name"), [("4700.53969", "8.0", "lat"), ("47.0", "00800.539", "lon")])
 def test_degrees_and_minutes_of_nmea_are_named(importing: Import, lat: str, lon: str, name: str) -> None:
     assert importing(f"time,lat,lon\n1,{lat},{lon}\n") == 2

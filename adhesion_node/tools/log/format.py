@@ -8,6 +8,7 @@
 
 """How a log is written: its text, the units of its columns, and what they may hold."""
 
+import argparse
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -104,7 +105,7 @@ class Format:
 
     named: Mapping[str, str]
     axles: Sequence[str] = ()
-    asked: Mapping[str, Any] = field(default_factory=dict)
+    asked: argparse.Namespace | None = None
     """What options ask for that may mean nothing for a log (idle.py)."""
     encoding: str | None = None
     delimiter: str | None = None

@@ -8,9 +8,11 @@
 
 """Options that mean nothing for a log that has no such column: it is likely to have it under another name."""
 
+import argparse
 from collections.abc import Mapping
 from typing import Any
 
+from ...command.checks import refuse
 from ...wire.line import ATMOSPHERE_PA
 from .clock import has_dates
 from .columns import Columns
@@ -33,18 +35,29 @@ USUAL = {"direction": "up", "pressure_kind": "gauge", "ambient_pressure_pa": ATM
 """What other options are where nothing is asked for; the rest are None."""
 
 
-def asked(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what options ask for that may mean nothing."""
-    return {name: options[name] for name in (*OF, "time_zone") if options[name] not in (None, USUAL.get(name))}
+def asked(options: Mapping[str, Any]) -> argparse.Namespace:
+    """Return what options ask for that may mean nothing, by their names; None where they ask for nothing."""
+    names = (*OF, "time_zone", "time_unit", "time_format")
+    return argparse.Namespace(
+        **{_told(name): value if (value := options[name]) != USUAL.get(name) else None for name in names}
+    )
 
 
 def require_meaning(form: Format, columns: Columns) -> None:
     """Raise ValueError for the first option that means nothing for a log of these columns and times."""
+    if form.asked is None:
+        return
     there = {*columns.names, *([AXLES] if columns.axles else [])}
-    for name, value in form.asked.items():
-        told = f"{name.removesuffix('_m').removesuffix('_pa').replace('_', '-')} = {value}"
-        if name == "time_zone" and not has_dates(form):
-            raise ValueError(f"{told}: the times have no date, and no zone: leave it out")
-        if name in OF and there.isdisjoint(OF[name]):
-            cures = " or ".join(f"{option(column)} COL" for column in OF[name])
-            raise ValueError(f"{told}: the log has no column of which it tells: name one with {cures}, or leave it out")
+    for name, of in OF.items():
+        if there.isdisjoint(of):
+            cures = " or ".join(f"{option(column)} COL" for column in of)
+            why = f"the log has no column of which it tells: name one with {cures}, or leave it out"
+            refuse(form.asked, [_told(name)], why)
+    if not has_dates(form):
+        refuse(form.asked, ["time_zone"], "the times have no date, and no zone: leave it out")
+    if form.asked.time_format is not None:
+        refuse(form.asked, ["time_unit"], "dates by --time-format have no unit: leave the one or the other out")
+
+
+def _told(name: str) -> str:
+    return name.removesuffix("_m").removesuffix("_pa")
