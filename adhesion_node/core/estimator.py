@@ -55,7 +55,7 @@ def gate_of(config: Config) -> Gate:
             Source(DemandSample, wait, age),
             Source(PressureSample, wait, wait, each=True),
             Source(SpeedSample, wait, wait, each=True, leads=True),
-            Source(WheelSample, wait, wait, each=True, carries=True),
+            Source(WheelSample, wait, wait, each=True, leads=True),
             Source(ImuSample, wait, wait, each=True),
         ),
         max_lag_ns=round(config.max_lag_s * 1e9),

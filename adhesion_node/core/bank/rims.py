@@ -74,37 +74,46 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return _beside_fastest(config, memory, wheels.fastest(known), newest.t_ns) if known else memory
-    return _unbraked(config, memory, rims, newest.t_ns, pressed)
+    memory, middle = _unbraked(config, memory, rims, newest.t_ns), median(rims) if rims else math.nan
+    if middle > LEARNING_MPS:
+        return _rolling(memory, middle, pressed)
+    dark = memory.asks and not measurement.has_position and rims
+    return _slow(memory, max(rims) if pressed else middle) if dark else memory
 
 
-def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, pressed: bool) -> Memory:
-    """Take in how fast the middle rim is, as some may spin; where it may slide, the train is not slower than that."""
-    trusted_ns = memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
-    bank, middle = as_rolled(memory.bank, memory.wheels.wander.rolled), median(rims) if rims else 0.0
-    learnt = memory.wheels.is_learnt
-    wheels = memory.wheels.beside(middle, t_ns) if rims and learnt else memory.wheels
-    memory = memory._replace(
-        bank=bank,
+def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
+    """No braking is open: the fastest rim will not be believed before all might have slid, radii are what they were."""
+    learnt, trusted_ns = memory.wheels.is_learnt, memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
+    wheels = memory.wheels.beside(median(rims), t_ns) if rims and learnt else memory.wheels
+    return memory._replace(
+        bank=as_rolled(memory.bank, memory.wheels.wander.rolled),
         wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander()),
     )
-    if middle <= LEARNING_MPS:
-        return _slow(memory, max(rims) if pressed else middle) if rims else memory
-    if not learnt:  # the middle may lie between those that turn and those that are dead
+
+
+def _rolling(memory: Memory, rim_mps: float, pressed: bool) -> Memory:
+    """Take in how fast the middle rim is, as some may spin; where it may slide, the train is not slower than that.
+
+    While nothing is learnt of them it may lie between such as turn and such as are dead.
+    """
+    if not memory.wheels.is_learnt:
         return memory
-    bank = not_slower(bank, middle, FASTEST_SHARE * middle) if pressed else rolling(bank, middle)
-    return memory._replace(bank=bank.normalised())
+    bank = not_slower(memory.bank, rim_mps, FASTEST_SHARE * rim_mps) if pressed else rolling(memory.bank, rim_mps)
+    return memory._replace(bank=bank.normalised(), fixes=memory.fixes + 1)
 
 
 def _slow(memory: Memory, rim_mps: float) -> Memory:
-    """Take in now and then, as its error lasts, how slow a rim is: as the train, or it is locked, or dead.
+    """Take in how slow a rim is: as the train, or it is locked, or dead.
 
-    Of radii that tells nothing.
+    Of radii that tells nothing (they are considered, not estimated: Schmidt 1966).
     """
-    if not memory.asks:
-        return memory
-    mean, covariance = memory.bank.moments()
-    bank = as_fast(not_slower(memory.bank, rim_mps, SLOW_MPS), rim_mps, SLOW_MPS).normalised()
-    return memory._replace(bank=as_rolled(bank, (float(mean[RADIUS]), float(covariance[RADIUS, RADIUS]))))
+    before = memory.bank
+    bank = as_fast(not_slower(before, rim_mps, SLOW_MPS), rim_mps, SLOW_MPS).normalised()
+    bank.mean[:, RADIUS], bank.covariance[:, RADIUS, RADIUS] = (
+        before.mean[:, RADIUS],
+        before.covariance[:, RADIUS, RADIUS],
+    )
+    return memory._replace(bank=bank)
 
 
 def _telling(memory: Memory) -> Memory:
@@ -141,7 +150,7 @@ def rim_speed(bank: Bank) -> tuple[float, float]:
 
 
 def as_rolled(bank: Bank, rolled: tuple[float, float] | None) -> Bank:
-    """Radii are again what they were, and their variance: before all of them crept, where axles have slid."""
+    """Where axles have slid: radii are again what they were, and their variance, before all of them crept."""
     if rolled is None:
         return bank
     mean, covariance = bank.mean.copy(), bank.covariance.copy()
@@ -151,8 +160,13 @@ def as_rolled(bank: Bank, rolled: tuple[float, float] | None) -> Bank:
 
 
 def rolling(bank: Bank, rim_mps: float) -> Bank:
-    """Take in the speed of the middle rim while no brake is applied. The weights are not normalised."""
-    return corrected(bank, speed_seen(bank, rim_mps, (ROLLING_SHARE * rim_mps) ** 2, RADIUS))
+    """Take in the speed of the middle rim while no brake is applied. The weights are not normalised.
+
+    How far radii matter is told by what is measured, as the speed may be hardly known.
+    """
+    seen = speed_seen(bank, rim_mps, (ROLLING_SHARE * rim_mps) ** 2, RADIUS)
+    seen.slope[:, RADIUS] = rim_mps / (1.0 + bank.mean[:, RADIUS])
+    return corrected(bank, seen)
 
 
 def not_slower(bank: Bank, rim_mps: float, std: float) -> Bank:

@@ -45,8 +45,6 @@ class Source(NamedTuple):
     than it by more than the age; else the last value holds."""
     leads: bool = False
     """Whether it is enough by itself, without any anchor."""
-    carries: bool = False
-    """Whether it is enough once an anchor, or what leads, has been there."""
 
 
 class Gate(NamedTuple):
@@ -65,7 +63,7 @@ class Gate(NamedTuple):
     tick_ns: int = 0
     """Without an anchor for so long the other sensors are given out by themselves; 0: never."""
     tick_for_ns: int = 0
-    """How long after the last anchor or sample of a source that `leads` or `carries`."""
+    """How long after the last anchor or sample of a source that `leads`."""
 
 
 @once

@@ -139,8 +139,7 @@ def _next_tick_ns(gate: Gate, inbox: Inbox) -> int | None:
         before_ns = min((stream.samples[0].t_ns for stream in streams if stream.samples), default=None)
     if not gate.tick_ns or before_ns is None or inbox.now_ns is None or inbox.now_ns < before_ns + gate.tick_ns:
         return None
-    carrying = [inbox.stream(source.kind) for source in gate.sources if source.leads or source.carries]
-    led = (inbox.anchored_ns, *(stream.spent_ns for stream in carrying))
+    led = (inbox.anchored_ns, *(stream.spent_ns for stream in streams))
     led_ns = max((t_ns for t_ns in led if t_ns is not None), default=before_ns)
     first_ns = _earliest(gate, inbox, gate.sources, before_ns)
     if first_ns is None or first_ns <= led_ns + gate.tick_for_ns:

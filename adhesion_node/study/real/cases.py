@@ -38,7 +38,7 @@ from . import point_mass
 AIDED = ("gnss_doppler", "gnss_smoothed", "gnss_imu", "radar", "doppler_only", "full")
 """Sets with a speed of their own or an accelerometer."""
 
-UNSOUND = ("tacho", "gnss_outages", "gnss_stamps", "one_cylinder", "no_pressure")
+UNSOUND = ("tacho", "gnss_outages", "gnss_stamps", "tunnel_wheels", "one_cylinder", "no_pressure")
 """Sets whose sensors cannot be trusted, or lack what a narrow answer needs."""
 
 SLOWEST_BUILD_UP = 1.15
@@ -111,7 +111,10 @@ CASES = tuple(
     for scenario, sets in (
         (point_mass.NAME, "white"),
         ("wet", "white gnss gnss_wheels gnss_doppler gnss_smoothed gnss_imu radar doppler_only tacho axle_speed"),
-        ("wet", "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
+        (
+            "wet",
+            "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full tunnel_wheels",
+        ),
         ("wet_mass_over", "white gnss_wheels"),
         ("wet_pads_weak", "gnss_wheels"),
         ("wet_fast", "gnss_doppler"),
@@ -128,7 +131,7 @@ CASES = tuple(
         ("sequence_dry", "gnss_doppler"),
         ("leaves", "white gnss gnss_recorded gnss_wheels gnss_smoothed gnss_imu gnss_outages"),
         ("leaves", "one_cylinder one_cylinder_wheels mean_cylinder mean_cylinder_wheels mean_cylinder_demand"),
-        ("leaves", "wheel_dropouts no_pressure full"),
+        ("leaves", "wheel_dropouts tunnel_wheels no_pressure full"),
         ("leaves_severe", "gnss_doppler"),
         ("wet_rough", "gnss gnss_wheels gnss_doppler"),
         ("wet_falls", "gnss gnss_wheels gnss_doppler"),

@@ -52,9 +52,10 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
             raise ValueError(f"{source}: column {name!r} is there {header.count(name)} times: rename one")
     if len({"lat", "lon"} & set(used)) == 1:
         used = {ours: name for ours, name in used.items() if ours not in ("lat", "lon")}
-    if not any(set(group) <= set(used) for group in PLACES):
-        remedy = "name one with --position COL, or --lat COL and --lon COL, or --speed COL"
-        raise ValueError(f"{source}: columns {_listed(header)}: has neither position, lat and lon, nor speed: {remedy}")
+    if not (axles or any(set(group) <= set(used) for group in PLACES)):
+        lacks = "has neither position, lat and lon, speed nor wheels"
+        remedy = "name one with --position COL, or --lat COL and --lon COL, or --speed COL, or --wheel-speeds COL"
+        raise ValueError(f"{source}: columns {_listed(header)}: {lacks}: {remedy}")
     if {"brake_pipe", "brake_demand"} <= set(used):
         raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")
     unread = tuple(name for name in header if name and name not in (*used.values(), *axles))

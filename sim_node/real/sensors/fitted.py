@@ -46,10 +46,11 @@ class Fitted(NamedTuple):
         return {setting: by_topic[topic] for setting, topic in kinds if topic in by_topic}
 
 
-_BUS = Timing()
-_RECEIVER = Timing(latency_s=0.05, jitter_s=0.1)
 _OUTAGES = Spells(every_s=15.0)
 _MINUTES = Spells(every_s=20.0, shortest_s=60.0, longest_s=180.0)
+_BUS = Timing()
+_RECEIVER = Timing(latency_s=0.05, jitter_s=0.1)
+_TUNNELS = replace(_RECEIVER, outages=_MINUTES)
 
 
 def _gnss(sensor: Gnss | None = None, timing: Timing = _RECEIVER) -> dict[str, Mounted]:
@@ -112,6 +113,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("mean_cylinder_wheels", "the same and the wheels", _gnss(), _MEAN, _WHEELS),
             ("mean_cylinder_demand", "the same and the demand, no wheels", _gnss(), _MEAN, _HANDLE),
             ("wheel_dropouts", "one bogie's wheels after the other missing", _gnss(), _MEAN, _PATCHY_WHEELS),
+            ("tunnel_wheels", "1 to 3 minutes without a fix, and the wheels", _gnss(timing=_TUNNELS), _DEMANDED, _WHEELS),
             ("no_pressure", "satellites alone", _gnss()),
             ("full", "satellites with speed, accelerometer, wheels", _gnss(), _DOPPLER, _IMU, _WHEELS, _MEAN),
         )

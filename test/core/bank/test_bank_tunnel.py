@@ -30,7 +30,7 @@ ROUND = np.repeat([0.0, -1.0, 0.0, 0.8, 0.0, -1.0, 0.0], [500, 200, 900, 180, 60
 """Accelerations, m/s^2, of each tenth of a second: the train stops, stands for 90 s, and goes to the next station."""
 
 
-def told(accelerations: Array, lost_s: float = np.inf) -> Array:
+def told(accelerations: Array, tunnel_s: float = TUNNEL_S, lost_s: float = np.inf) -> Array:
     """What is told in the tunnel of a train of 15 m/s at first: stamps, speeds, their errors and standard deviations.
 
     The brake is applied where it slows down or stands. Eight wheels are worn by 2 %; from `lost_s` on they tell 0.
@@ -44,20 +44,23 @@ def told(accelerations: Array, lost_s: float = np.inf) -> Array:
         turning = speed / (0.46 * 0.98) * (speed > DEAD_MPS and t_s < lost_s)
         samples: list[Sample] = [WheelSample(t_ns, tuple((turning * (1.0 + 0.002 * rng.standard_normal(8))).tolist()))]
         samples.append(PressureSample(t_ns, 0.8 * FULL_PA * (acceleration < 0.0 or speed == 0.0)))
-        if t_s < TUNNEL_S:
+        if t_s < tunnel_s:
             samples.append(PositionSample(t_ns, place + 0.1 * rng.standard_normal(), 1.0))
         for sample in samples:
             rows += [
                 (each.t_ns / S - 1.0, each.speed_mps, each.speed_std_mps)
                 for each in map(attrgetter("estimate"), pipeline.push(sample))
             ]
-    t_s, speed_mps, std_mps = np.array([row for row in rows if row[0] > TUNNEL_S]).T
+    t_s, speed_mps, std_mps = np.array([row for row in rows if row[0] > tunnel_s]).T
     held = np.interp(t_s, 0.1 * np.arange(len(true)), true)
     return np.array((t_s, held, speed_mps - held, std_mps))
 
 
-def test_a_train_is_followed_through_the_stations_of_a_tunnel_by_its_wheels() -> None:
-    t_s, speed, error, std = told(ROUND)
+@pytest.mark.parametrize("tunnel_s", [TUNNEL_S, 0.0])
+def test_a_train_is_followed_through_the_stations_of_a_tunnel_by_its_wheels(tunnel_s: float) -> None:
+    """Also where it is switched on in there; radii are known to 3 % then, and so is the speed."""
+    t_s, speed, error, std = told(ROUND, tunnel_s)
+    assert t_s[0] < tunnel_s + 3.0
     assert np.max(np.diff(t_s)) < 1.0
     assert t_s[-1] > 0.1 * ROUND.size - 1.0
     assert np.mean(np.abs(error) < 3.0 * std) > 0.98
@@ -69,7 +72,7 @@ def test_a_train_is_followed_through_the_stations_of_a_tunnel_by_its_wheels() ->
 @pytest.mark.parametrize("lost_s", [40.0, 52.0])
 def test_wheels_whose_sensors_are_dead_stop_no_train(lost_s: float) -> None:
     """They are lost while it runs, or in the first seconds of the brake."""
-    t_s, speed, error, std = told(ROUND[:600], lost_s)
+    t_s, speed, error, std = told(ROUND[:600], lost_s=lost_s)
     late = t_s > lost_s
     assert np.all(np.abs(error[late]) < 3.0 * std[late])
     assert np.min(speed[late]) > 4.0
