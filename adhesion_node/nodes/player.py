@@ -17,7 +17,6 @@ from typing import Any
 
 from rclpy.clock import Clock as NodeClock
 from rclpy.clock import ClockType
-from rclpy.duration import Duration
 from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
 
@@ -26,6 +25,7 @@ from ..core.atp.supervision import Severity
 from ..wire import topics
 from ..wire.settings.telling import TELLING
 from ..wire.topic import Topic
+from .acknowledged import Acknowledged
 from .offers import as_recorded, expires
 from .ros.diagnostics import Diagnostics, Finding, Told
 from .ros.discovery import Subscribers
@@ -44,9 +44,6 @@ BURST = 20
 
 SUBSCRIBERS_S = 10.0
 """Longest wait for subscribers."""
-
-ACKNOWLEDGED_S = 10.0
-"""Longest wait for reliable subscribers to take what was published."""
 
 
 class Replay(SettingsNode):
@@ -76,7 +73,9 @@ class Replay(SettingsNode):
             )
             for source, target in selection.items()
         }
-        self._expiring = [end for source, end in self._outputs.items() if expires(reader.infos[source].offered)]
+        # Not for what expires: DDS would wait in vain for a subscriber that came too late for it.
+        awaited = [end for source, end in self._outputs.items() if not expires(reader.infos[source].offered)]
+        self._acknowledged = Acknowledged(awaited, self.get_logger().warning)
         self._steps = groupby(reader.messages(selection), key=lambda record: record.log_ns)
         self._next: tuple[int, Iterator[Record]] | None = None
         self._origin: tuple[float, int] | None = None
@@ -106,6 +105,8 @@ class Replay(SettingsNode):
         elif self._origin is None:
             waits = f"waiting for {self._wanted} subscriber(s) to {self._position().topic_name}"
             finding = Finding(Severity.OK, waits)
+        elif hung := self._acknowledged.hung:
+            finding = Finding(Severity.WARN, f"{hung}: a subscriber hangs and is not waited for any more")
         published = sum(self.published.values())
         next_ns = "none" if self._next is None else str(self._next[0])
         return [finding], {"next_ns": next_ns, "published": str(published), "left": str(self._left - published)}
@@ -144,8 +145,7 @@ class Replay(SettingsNode):
     def _publish_due(self) -> None:
         for _ in range(BURST if self._rate else 1):
             if self._next is None:
-                if not all(self._await_acknowledgement(output) for output in self._outputs.values()):
-                    self.failure = "the last messages were not acknowledged: did a subscriber hang?"
+                self.failure = self._acknowledged.finish()
                 self.finished = True
                 return
             log_ns, records = self._next
@@ -157,14 +157,7 @@ class Replay(SettingsNode):
             self._next = next(self._steps, None)
 
     def _publish(self, record: Record) -> None:
-        """Publish one record; a full queue first waits until the reliable subscribers have taken all of it.
-
-        Only then: DDS asks for acknowledgements when the queue is full, and else just every three seconds.
-        """
-        output = self._outputs[record.topic]
-        if self.published[record.topic] % output.qos_profile.depth == 0:
-            self._await_acknowledgement(output)
-        output.publish(record.cdr)
+        self._acknowledged.publish(self._outputs[record.topic], record.cdr)
         self.published[record.topic] += 1
 
     def _due_ns(self) -> float:
@@ -172,16 +165,3 @@ class Replay(SettingsNode):
         assert self._origin is not None
         started, first_ns = self._origin
         return first_ns + (time.monotonic() - started) * self._rate * 1e9 if self._rate else math.inf
-
-    def _await_acknowledgement(self, output: Publisher) -> bool:
-        """Wait until reliable subscribers have taken everything; what they have not would be overwritten.
-
-        Not for what expires: DDS would wait in vain for a subscriber that came too late for it.
-        """
-        if output in self._expiring or output.wait_for_all_acked(Duration(seconds=ACKNOWLEDGED_S)):
-            return True
-        self.get_logger().warning(
-            f"{output.topic_name}: a subscriber did not take its messages within {ACKNOWLEDGED_S:g} s",
-            throttle_duration_sec=60.0,
-        )
-        return False

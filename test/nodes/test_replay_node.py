@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import time
@@ -34,7 +35,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from adhesion_node.bag import BagReader, BagWriter, Record, select, serialize, typestore
 from adhesion_node.command.options import DONE
-from adhesion_node.nodes import player, replay
+from adhesion_node.nodes import acknowledged, player, replay
 from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.ros import discovery, runtime
 from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, subscribe
@@ -251,6 +252,36 @@ def test_at_full_speed_a_slow_subscriber_in_another_process_slows_it_down(
     assert process.returncode == 0, err
     assert json.loads(out) == {"messages": {"/position": steps}, "complete": True}
     assert listener.of(POSITION) == of(written, "/position")
+
+
+def test_a_subscriber_that_hangs_is_waited_for_once(
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    """DDS takes 5000 messages of each topic for it. What the others get is complete; the end says what it may lack."""
+    monkeypatch.setattr(acknowledged, "ACKNOWLEDGED_S", 1.0)
+    monkeypatch.setattr(acknowledged, "KEPT_S", 0.02)
+    steps, listener = 7000, Listener(context, POSITION, BRAKE_PRESSURE, profile=UNLIMITED)
+    written = write_steps(tmp_path / "bag", steps)
+    hung = Listener(context, POSITION, BRAKE_PRESSURE, profile=UNLIMITED)  # nobody spins it
+    executor.add_node(listener)
+    with BagReader(tmp_path / "bag") as reader:
+        node = Replay(reader, select(reader.topics), 0.0, subscribers=2, context=context)
+        executor.add_node(node)
+        spin_until(executor, lambda: node.finished, 60.0)
+        spin_until(executor, lambda: len(listener.heard) == len(written))
+    executor.add_node(hung)  # which is destroyed with it
+    assert listener.of(POSITION) == of(written, "/position")
+    assert listener.of(BRAKE_PRESSURE) == of(written, "/brake_pressure")
+    (told,) = [line for line in capfd.readouterr().err.splitlines() if "subscriber took nothing" in line]
+    assert told.endswith("/position, /brake_pressure: a subscriber took nothing for 1 s and is not waited for any more")
+    lost = re.fullmatch(r"a subscriber hung, messages may be lost to it: (.*)", str(node.failure))
+    assert lost
+    assert sorted(lost[1].split("; ")) == [f"/{name}, up to 2000 of 7000" for name in ("brake_pressure", "position")]
 
 
 def test_a_best_effort_subscriber_at_full_speed_is_named(
