@@ -33,7 +33,7 @@ from ..wire.settings.telling import TELLING
 from ..wire.topic import Topic
 from .offers import offered
 from .ros import runtime
-from .ros.diagnostics import Diagnostics, Finding, Told
+from .ros.diagnostics import JUMP_NS, Diagnostics, Finding, Told, doubled
 from .ros.params import SettingsNode, declare
 from .ros.qos import PROFILES, subscribe
 from .waiting import Message, Waiting
@@ -50,6 +50,8 @@ stands still or is slow. A busy machine misses rounds, so it does not change wha
 """
 
 NO_CLOCK = "no /clock yet, what comes waits for it: is the simulator running? Else leave use_sim_time out"
+
+WENT_BACK = f"time went back by more than {JUMP_NS * 1e-9:g} s: does a recording loop, is there a second /clock?"
 
 MIN_FREE_MB = 100.0
 
@@ -97,6 +99,7 @@ class Recorder(SettingsNode):
         self._rounds = deque([0] * ROUNDS, maxlen=ROUNDS)
         """Arrivals at the latest rounds."""
         self._oldest_unsaved = 0
+        self._latest_ns, self._went_back = 0, False
         self._waiting = Waiting()
         self._lost: Counter[Topic] = Counter()
         if self._simulated:
@@ -139,9 +142,11 @@ class Recorder(SettingsNode):
         self.get_logger().info(f"recorded {sum(self.counts.values())} messages to {self._writer.path}")
 
     def _told(self) -> Told:
-        found = [Finding(Severity.OK, f"recording to {self._writer.path}")]
+        found = [Finding(Severity.OK, f"recording to {self._writer.path}"), *doubled(self, ())]
         if self._simulated and not self._waiting.begun:
             found.append(Finding(Severity.WARN, NO_CLOCK))
+        if self._went_back:
+            found.append(Finding(Severity.WARN, WENT_BACK))
         if given_up := self._waiting.given_up:
             found.append(Finding(Severity.WARN, f"{given_up} messages given up: they waited for /clock"))
         if self._lost:
@@ -212,6 +217,10 @@ class Recorder(SettingsNode):
         except OSError:
             self._waiting.clear()  # the recording ends here, not with a gap
             raise
+        if log_ns < self._latest_ns - JUMP_NS:
+            self._went_back = True
+            self.get_logger().warning(WENT_BACK, once=True)
+        self._latest_ns = max(self._latest_ns, log_ns)
         first = self._writer.unsaved == 1
         self._oldest_unsaved = message.arrival if first else min(self._oldest_unsaved, message.arrival)
 

@@ -17,6 +17,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from rclpy.publisher import Publisher
 from rosbags.rosbag2 import Reader
 from rosgraph_msgs.msg import Clock
 
-from adhesion_node.bag import BagReader
+from adhesion_node.bag import BagReader, Limits
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
 from adhesion_node.nodes.ros.qos import LATCHED, RESULT, SENSOR_PUBLISHER, advertise, subscribe
@@ -89,11 +90,13 @@ def start(
     spin_until: SpinUntil,
     topics: list[Topic],
     sim: bool,
+    limits: Limits = recorder.LIMITS,
 ) -> tuple[Recorder, dict[Topic, Publisher]]:
     """Return a recorder and publishers of `topics` and /clock that have found each other."""
     talker = Node("talker", context=context, namespace="/train1")
     ends = publishers(talker, *topics, CLOCK)
-    recording = Recorder(path, context=context, namespace="/train1", parameter_overrides=simulated() if sim else SILENT)
+    given = simulated() if sim else SILENT
+    recording = Recorder(path, limits, context=context, namespace="/train1", parameter_overrides=given)
     executor.add_node(talker)
     executor.add_node(recording)
     heard = [end for topic, end in ends.items() if sim or topic is not CLOCK]
@@ -164,6 +167,34 @@ def test_a_message_keeps_its_clock_when_later_clocks_overtake_it(
     with BagReader(tmp_path / "bag") as reader:
         times = [(record.log_ns, record.message.header.stamp.nanosec) for record in reader.messages()]
     assert times == [(number // 3 * S, number) for number in range(90)]
+
+
+def has_heard(recording: Recorder, count: int) -> bool:
+    return recording.heard[CLOCK] == recording.heard[POSITION] == count
+
+
+def test_two_clocks_are_told_and_begin_no_file_with_every_message(
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    apart_s = 1800
+    limits = recorder.LIMITS._replace(max_duration_ns=apart_s * S)
+    recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], True, limits)
+    other = publishers(Node("other", context=context), CLOCK)[CLOCK]
+    spin_until(executor, other.get_subscription_count)
+    for second in range(30):
+        for end, t_ns in ((ends[CLOCK], second * S), (other, (second + apart_s) * S)):
+            end.publish(clock(t_ns))
+            ends[POSITION].publish(stamped(POSITION, t_ns))
+        spin_until(executor, partial(has_heard, recording, 2 * (second + 1)))
+    recording.close()
+    with BagReader(tmp_path / "bag") as reader:
+        assert reader.counts == {"/train1/position": 60}
+    assert len(list((tmp_path / "bag").glob("*.mcap"))) <= 2
+    assert capfd.readouterr().err.count(recorder.WENT_BACK) == 1
 
 
 def test_without_a_clock_the_stamp_takes_its_place(

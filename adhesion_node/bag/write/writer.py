@@ -25,6 +25,9 @@ from .part import Part, message_bound
 
 MB = 1_000_000
 
+FALLEN = 50_000
+"""Messages that a file holds at least before one ends it whose log time has fallen: time may go to and fro for ever."""
+
 
 class Limits(NamedTuple):
     """What bounds a recording: its files, what an interruption costs, and the disk."""
@@ -32,7 +35,7 @@ class Limits(NamedTuple):
     max_bytes: float = math.inf
     """Size of a file; the recording goes on in the next one. A single greater message is a file of its own."""
     max_duration_ns: float = math.inf
-    """Log time from the first message of a file to the first of the next."""
+    """Log time from the first message of a file to the first of the next; before it, see `FALLEN`."""
     span_ns: float = math.inf
     """Log time after which messages are handed to the operating system. That comes with the next message or
     `BagWriter.advance`, and nothing but log time decides: equal messages still give equal files."""
@@ -55,6 +58,7 @@ class BagWriter:
         self._topics: dict[str, tuple[Topic, Definition]] = {}
         self._counts: Counter[str] = Counter()
         self._files: list[File] = []
+        self._begun_ns = 0
         self._closed = False
         if self.path.exists():
             raise ValueError(f"output = {str(self.path)!r}: it exists already, give the name of a new directory")
@@ -91,6 +95,8 @@ class BagWriter:
             self._files.append(self._part.finish())
             self._part = following
         self._part.declare(topic, defined)
+        if not self._part.count:
+            self._begun_ns = log_ns
         self._part.write(topic_name, cdr, log_ns)
         self._counts[topic_name] += 1
 
@@ -159,7 +165,8 @@ class BagWriter:
         """Tell whether a message belongs into the next file."""
         if not self._part.count:
             return False
-        late = abs(log_ns - self._part.first_ns) >= self._limits.max_duration_ns
+        passed_ns = log_ns - self._begun_ns
+        late = (passed_ns if self._part.count < FALLEN else abs(passed_ns)) >= self._limits.max_duration_ns
         return late or self._part.bound() + message_bound(cdr) > self._limits.max_bytes
 
 

@@ -28,6 +28,7 @@ from test_recorder import clock, publishers, simulated, stamped
 from test_recording_survives import assert_complete, indexed, metadata
 
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record
+from adhesion_node.bag.write import writer
 from adhesion_node.bag.write.writer import file_name
 from adhesion_node.nodes import recorder
 from adhesion_node.nodes.recorder import Recorder
@@ -48,9 +49,9 @@ def noise(steps: int, longest: int) -> list[Record]:
 
 
 def write(path: Path, records: list[Record], limits: Limits) -> None:
-    with BagWriter(path, limits) as writer:
+    with BagWriter(path, limits) as recording:
         for record in records:
-            writer.write(*record)
+            recording.write(*record)
 
 
 @pytest.mark.parametrize("longest", [100, 5000])
@@ -97,12 +98,32 @@ def test_files_by_duration_are_listed_with_their_times_and_counts(tmp_path: Path
     assert_complete(tmp_path / "bag", len(records))
 
 
+@pytest.mark.parametrize("steps", [(0, 1800), (0, 1000, 2000, 1000), (5000, 0, 3000, 9000)])
+def test_time_that_goes_to_and_fro_begins_few_files(tmp_path: Path, steps: tuple[int, ...]) -> None:
+    """It began one with every message or two, as with two publishers of /clock."""
+    records = [Record("/t", TEXT, b"x", steps[k % len(steps)] * S + k) for k in range(400)]
+    write(tmp_path / "bag", records, Limits(max_duration_ns=1800 * S, span_ns=S))
+    assert len(metadata(tmp_path / "bag")["relative_file_paths"]) <= len(steps)
+    assert_complete(tmp_path / "bag", len(records))
+    with BagReader(tmp_path / "bag") as reader:
+        assert sorted(reader.messages()) == sorted(records)
+
+
+def test_a_long_file_ends_where_time_begins_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in a recording of days of something that loops: memory stays that of one file."""
+    monkeypatch.setattr(writer, "FALLEN", 100)
+    records = [Record("/t", TEXT, b"x", (3000 + k % 110) * S) for k in range(330)]
+    write(tmp_path / "bag", records, Limits(max_duration_ns=105 * S))
+    counts = [file["message_count"] for file in metadata(tmp_path / "bag")["files"]]
+    assert counts == [105, 5 + 110, 105, 5]
+
+
 def test_an_interrupted_recording_of_several_files_is_recovered(tmp_path: Path) -> None:
     records = noise(1000, 500)
-    writer = BagWriter(tmp_path / "bag", Limits(max_duration_ns=30 * S, span_ns=S))
+    dying = BagWriter(tmp_path / "bag", Limits(max_duration_ns=30 * S, span_ns=S))
     for record in records:
-        writer.write(*record)
-    lost = writer.unsaved  # nothing more is done with the writer: its process died
+        dying.write(*record)
+    lost = dying.unsaved  # nothing more is done with the writer: its process died
     assert 0 < lost <= 10
     summary = recover.recover(tmp_path / "bag", tmp_path / "whole")
     assert not summary["complete"]
@@ -174,10 +195,10 @@ def test_memory_is_that_of_one_file_however_many_there_are(tmp_path: Path) -> No
     limits, held = Limits(span_ns=S // 5, max_duration_ns=20 * S), []
     tracemalloc.start()
     try:
-        with BagWriter(tmp_path / "bag", limits) as writer:
+        with BagWriter(tmp_path / "bag", limits) as recording:
             for step in range(5 * 20 * 6):
                 for number in range(10):
-                    writer.write(f"/topic{number}", POSITION.type, bytes(300), step * S // 5)
+                    recording.write(f"/topic{number}", POSITION.type, bytes(300), step * S // 5)
                 if step % 100 == 99:
                     held.append(tracemalloc.get_traced_memory()[0])
     finally:
