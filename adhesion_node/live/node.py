@@ -106,8 +106,11 @@ class Live(SettingsNode):
         return receive
 
     def _on_diagnostics(self, read: Statuses) -> None:
-        for status in read.entries:
-            if "regime" in status.values:  # /diagnostics is shared with everybody
+        own = self.get_namespace().strip("/")
+        for status in read.entries:  # /diagnostics is shared with everybody
+            if status.namespace != own:
+                continue
+            if "regime" in status.values:
                 self.view.estimated(status.values, status.message, status.level > 0)
             elif "lambda_m" in status.values:
                 self.view.creep(status.values, status.message, time.monotonic())

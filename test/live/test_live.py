@@ -94,6 +94,40 @@ def test_what_the_nodes_say_reaches_the_browser(
     assert (seen["curves"]["safe"]["x"][0], seen["curves"]["safe"]["y"][0]) == (1200.0, 180.0)
 
 
+def told(name: str, message: str, **values: str) -> DiagnosticArray:
+    keys = [KeyValue(key=key, value=value) for key, value in values.items()]
+    return DiagnosticArray(status=[DiagnosticStatus(name=name, message=message, values=keys)])
+
+
+@pytest.mark.parametrize("own", ["", "train_a", "line1/train_a"])
+def test_a_page_shows_what_the_nodes_of_its_own_train_tell(
+    executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil, own: str
+) -> None:
+    """/diagnostics is shared: the regimes and creep curves of all trains followed each other there."""
+    node, page = Node("trains", context=context), Live("127.0.0.1", 0, context=context, namespace=f"/{own}")
+    executor.add_node(node)
+    executor.add_node(page)
+    publisher = qos.advertise(node, topics.DIAGNOSTICS)
+    spin_until(executor, publisher.get_subscription_count)
+    curve_told = {"p1": "80", "p2": "100", "mu_max": "0.2", "lambda_m": "0.1", "withheld": "false"}
+    for namespace in (own, "train_b", "line1", own):
+        entry = namespace and f"{namespace}/"
+        regime, peak = ("COASTING", "0.2") if namespace == own else ("BRAKE_LIMITED", "0.3")
+        publisher.publish(told(f"{entry}estimator/adhesion", "of " + namespace, regime=regime))
+        publisher.publish(told(f"{entry}creep_estimator/peak", "", **(curve_told | {"mu_max": peak})))
+    publisher.publish(told(f"{own}/estimator/adhesion".lstrip("/"), "the end", regime="COASTING"))
+    seen: list[dict[str, Any]] = []
+
+    def at_the_end() -> bool:
+        seen.append(page.view.parts(0.0))
+        return bool(seen[-1]["estimator"] and seen[-1]["estimator"]["message"] == "the end")
+
+    spin_until(executor, at_the_end)
+    page.close()
+    assert {parts["estimator"]["regime"] for parts in seen if parts["estimator"]} == {"coasting"}
+    assert {parts["creep"]["peak"][1] for parts in seen if parts["creep"]} == {0.2}
+
+
 def test_a_message_that_cannot_be_shown_is_said_and_shown_nowhere(
     live: Live, executor: SingleThreadedExecutor, context: Context, spin_until: SpinUntil
 ) -> None:

@@ -8,6 +8,7 @@
 
 """The creep curve as the diagnostics of a recorded creep estimator told it."""
 
+from collections import defaultdict
 from operator import itemgetter
 from typing import Any
 
@@ -20,18 +21,17 @@ CreepCurves = tuple[tuple[int, dict[str, Any]], ...]
 
 
 class CreepTaken:
-    """The curves while the diagnostics are read; none where no creep estimator was recorded."""
+    """The curves of every train while the diagnostics are read; none where no creep estimator was recorded."""
 
     def __init__(self) -> None:
-        self._told: list[tuple[int, dict[str, Any]]] = []
+        self._told = defaultdict[str, list[tuple[int, dict[str, Any]]]](list)
         self.take = with_key("lambda_m", self._note)
 
     def _note(self, t_ns: int, status: Status) -> None:
         part = creep_part(status.values, status.message)
         if part is not None:
-            self._told.append((t_ns, part))
+            self._told[status.namespace].append((t_ns, part))
 
-    @property
-    def curves(self) -> CreepCurves:
-        """All of them by their times."""
-        return tuple(sorted(self._told, key=itemgetter(0)))
+    def curves(self, namespace: str = "") -> CreepCurves:
+        """Those of the train of that namespace, or else of the one without, by their times."""
+        return tuple(sorted(self._told.get(namespace, self._told[""]), key=itemgetter(0)))

@@ -58,7 +58,9 @@ def estimate_run(
         dropped = listed(pipeline.dropped) or "nothing"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")
     read_topics(reader, [(DIAGNOSTICS, inputs.creep.take)])
+    namespaces = (theirs.strip("/").removesuffix(ours).strip("/") for theirs, ours in selection.items())
     run = estimates.put_into(inputs.run)._replace(
+        creep=inputs.creep.curves(next(namespaces)),
         safe=safe,
         nominal=nominal,
         counts={  # under the keys that they have in the diagnostics

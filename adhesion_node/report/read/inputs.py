@@ -43,7 +43,7 @@ class Inputs:
         """What was read."""
         pressure = self.pressure.series
         return Run(
-            creep=self.creep.curves,
+            creep=self.creep.curves(),
             true_mu=self._mu.series,
             true_position=self._position.series,
             true_speed=self._speed.series,

@@ -53,9 +53,9 @@ def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = (), 
             (topics.STATE, speed.take),
             *((topics.STATE, each.take) for each in (position_std, speed_std) if keys),
             (topics.DECELERATION, stamped.take),
-            (topics.DIAGNOSTICS, told.take),
-            (topics.DIAGNOSTICS, with_key("regime", told.note)),
-            (topics.DIAGNOSTICS, with_key("regime", values.note)),
+            (topics.DIAGNOSTICS, _of_this_train(told.take)),
+            (topics.DIAGNOSTICS, _of_this_train(with_key("regime", told.note))),
+            (topics.DIAGNOSTICS, _of_this_train(with_key("regime", values.note))),
             (topics.ATP_STATUS, with_key("level", said.note)),
             (topics.ATP_STATUS, with_key("level", lambda t_ns, status: levels.add(t_ns, status.values["level"]))),
         ],
@@ -100,6 +100,16 @@ class _Told:
         self.remarks.add(t_ns, status.message if status.level else "")
         if "changes" in status.values:
             self.changes.add(t_ns, status.values["changes"])
+
+
+def _of_this_train(take: Take) -> Take:
+    """Leave out what the nodes of others tell: its own have no namespace, as the topics that are read."""
+
+    def taken(sample: Sample) -> None:
+        own = tuple(entry for entry in sample.read.entries if not entry.namespace)
+        take(sample._replace(read=sample.read._replace(entries=own)))
+
+    return taken
 
 
 def _curve_taker(curves: Curves) -> Take:

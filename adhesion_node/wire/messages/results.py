@@ -54,6 +54,15 @@ class Status(NamedTuple):
     hardware_id: str = ""
     """The train."""
 
+    @property
+    def namespace(self) -> str:
+        """Of the node that tells it, without slashes around; the name is node and part behind it.
+
+        >>> [Status(name, 0, "", {}).namespace for name in ("line1/train1/estimator/adhesion", "estimator/adhesion")]
+        ['line1/train1', '']
+        """
+        return "/".join(self.name.split("/")[:-2])
+
 
 class Statuses(NamedTuple):
     """A diagnostics message."""

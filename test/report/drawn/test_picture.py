@@ -104,6 +104,26 @@ def pixels_of(path: Path, color: str) -> int:
     return int(np.all(np.abs(imread(path)[..., :3] - wanted) < 0.02, axis=-1).sum())
 
 
+def test_what_the_estimators_of_other_trains_tell_is_left_out(tmp_path: Path) -> None:
+    """/diagnostics is shared; a regime of theirs at the same stamp took the place of ours."""
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            for topic, cdr in rows(second):
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
+            writer.write(
+                "/diagnostics", DIAGNOSTICS.type, told("train_b/estimator/adhesion", second), START_NS + second * S
+            )
+    run = read(tmp_path / "bag")
+    assert set(run.regime.values) == {"COASTING", "ADHESION_LIMITED"}
+    assert run.counts == {"regime": "ADHESION_LIMITED"}
+
+
+def told(name: str, second: int) -> bytes:
+    values = [KeyValue(key="regime", value="BRAKE_LIMITED"), KeyValue(key="resets", value="1")]
+    status = [DiagnosticStatus(name=name, values=values)]
+    return bytes(serialize_message(DiagnosticArray(header=messages.header(START_NS + second * S), status=status)))
+
+
 @pytest.fixture
 def recorded(tmp_path: Path) -> Run:
     return read(record(tmp_path / "bag"))

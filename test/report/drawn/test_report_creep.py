@@ -16,19 +16,25 @@ import messages
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
+from test_offline import samples, write_run
 from test_picture import START_NS, S, read, record, rows
 
-from adhesion_node.bag import BagWriter
+from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.report.__main__ import main
 from adhesion_node.report.drawn.creep import MOST_CURVES, creep_data, creep_in_words
-from adhesion_node.wire.topics import DIAGNOSTICS
+from adhesion_node.report.read.creep import CreepTaken
+from adhesion_node.report.read.estimated import estimate_run
+from adhesion_node.report.read.messages import Sample
+from adhesion_node.wire.messages.results import Status, Statuses
+from adhesion_node.wire.settings.setup import setup_of
+from adhesion_node.wire.topics import BRAKE_PRESSURE, DIAGNOSTICS, POSITION
 
 KNOWN = {"p1": "80", "p2": "100", "mu_max": "0.2", "lambda_m": "0.1", "mu_max_lower": "0.18", "mu_max_upper": "0.22"}
 
 
-def told(t_ns: int, message: str, withheld: bool) -> bytes:
+def told(t_ns: int, message: str, withheld: bool, name: str = "creep_estimator/peak") -> bytes:
     values = [KeyValue(key=key, value=text) for key, text in (KNOWN | {"withheld": str(withheld).lower()}).items()]
-    status = [DiagnosticStatus(name="creep_estimator", message=message, values=values)]
+    status = [DiagnosticStatus(name=name, message=message, values=values)]
     return bytes(serialize_message(DiagnosticArray(header=messages.header(t_ns), status=status)))
 
 
@@ -59,6 +65,28 @@ def test_the_curves_are_those_of_the_recording(tmp_path: Path) -> None:
     )
     assert run.regime.values.tolist() == ["COASTING"] * 5 + ["ADHESION_LIMITED"] * 15, "the other estimator's as before"
     assert len(creep_data(run.creep * 100, run.origin_ns)) == MOST_CURVES
+
+
+def test_of_several_trains_the_curves_are_those_of_the_train_shown() -> None:
+    """/diagnostics is shared: those of all trains were one train's."""
+    taken = CreepTaken()
+    for peak, name in (("0.2", "train_a/creep_estimator/peak"), ("0.3", "creep_estimator/peak")):
+        taken.take(Sample(S, S, Statuses(S, (Status(name, 0, "", KNOWN | {"mu_max": peak, "withheld": "false"}),))))
+    shown = {namespace: [part["peak"][1] for _, part in taken.curves(namespace)] for namespace in ("train_a", "", "b")}
+    assert shown == {"train_a": [0.2], "": [0.3], "b": [0.3]}
+
+
+def test_of_a_train_that_is_remapped_the_curves_are_its_own(tmp_path: Path) -> None:
+    write_run(tmp_path / "sensors", samples()[:400])
+    with BagReader(tmp_path / "sensors") as reader, BagWriter(tmp_path / "bag") as writer:
+        for record in reader.messages():
+            writer.write(f"/train_a{record.topic}", *record[1:])
+        for name in ("train_b/creep_estimator/peak", "train_a/creep_estimator/peak"):
+            writer.write("/diagnostics", DIAGNOSTICS.type, told(START_NS, name[:7], False, name), START_NS)
+    with BagReader(tmp_path / "bag") as reader:
+        own = [f"/train_a/{topic.name}:={topic.name}" for topic in (POSITION, BRAKE_PRESSURE)]
+        run, _ = estimate_run(reader, select_from(reader, own), setup_of({"seed": 1}), lambda _: None)
+    assert [part["why"] for _, part in run.creep] == ["train_a"]
 
 
 def test_without_a_creep_estimator_nothing_is_told(tmp_path: Path) -> None:
