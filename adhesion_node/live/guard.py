@@ -18,6 +18,7 @@ from math import inf
 from typing import Any, cast
 
 from aiohttp import web
+from aiohttp.http_exceptions import HttpProcessingError
 
 MOST_CONNECTIONS = 64
 """Open at one time; the next are closed at once, so that no file descriptor is missing elsewhere."""
@@ -25,9 +26,13 @@ MOST_CONNECTIONS = 64
 REQUEST_S = 5.0
 """Longest time from the connection to the whole request, and of a connection that asks for nothing more."""
 
-
 TELL_S = 60.0
 """Time between two lines about missing file descriptors."""
+
+LOG = logging.getLogger(__name__)
+"""Of faults on this side: what a client sends that is no HTTP, it is told itself (400), and nobody else."""
+
+LOG.addFilter(lambda record: not (record.exc_info and isinstance(record.exc_info[1], HttpProcessingError)))
 
 
 class Guard:
@@ -58,7 +63,7 @@ class Guard:
             loop.default_exception_handler(context)
         elif loop.time() - self._told_s > TELL_S:
             self._told_s = loop.time()
-            logging.getLogger(__name__).warning("no connection is taken: %s; see ulimit -n", error.strerror)
+            LOG.warning("no connection is taken: %s; see ulimit -n", error.strerror)
 
     def _close_idle(self, protocol: web.RequestHandler) -> None:
         if protocol in self._silent:

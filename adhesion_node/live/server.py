@@ -22,7 +22,7 @@ from aiohttp import WSCloseCode, web
 
 from ..web import POLICY, page
 from .feed import Feed, Parts
-from .guard import REQUEST_S, Guard, allowed
+from .guard import LOG, REQUEST_S, Guard, allowed
 
 CLOSING_S = 1.0
 """Longest wait for open sockets at the end."""
@@ -74,7 +74,9 @@ class Server:
     async def _serve(self, host: str, port: int, started: Future[tuple[asyncio.AbstractEventLoop, str]]) -> None:
         application = web.Application(middlewares=[self._checked])
         application.add_routes([web.get("/", _page), web.get("/events", self._events)])
-        runner = web.AppRunner(application, access_log=None, shutdown_timeout=CLOSING_S, keepalive_timeout=REQUEST_S)
+        runner = web.AppRunner(
+            application, access_log=None, logger=LOG, shutdown_timeout=CLOSING_S, keepalive_timeout=REQUEST_S
+        )
         await runner.setup()
         assert runner.server is not None
         loop, self._guard = asyncio.get_running_loop(), Guard(runner.server)

@@ -264,6 +264,37 @@ def test_a_request_that_never_ends_is_closed(live: Live, monkeypatch: pytest.Mon
             assert slow.recv(1) == b""
 
 
+@pytest.mark.parametrize(
+    "request_",
+    [
+        b"GET / HTTP/9.x\r\nHost: localhost\r\n\r\n",
+        b"GET / HTTP/1.1\r\nHost localhost\r\n\r\n",
+        b"GET / HTTP/1.1\r\n\r\n",
+        b"GET http://[::1 HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"GET /" + b"a" * 10_000 + b" HTTP/1.1\r\nHost: localhost\r\n\r\n",
+        b"POST / HTTP/1.1\r\nHost: localhost\r\nTransfer-Encoding: chunked\r\n\r\nzz\r\n",
+        b"POST / HTTP/1.1\r\nHost: localhost\r\nContent-Encoding: deflate\r\nContent-Length: 3\r\n\r\nabc",
+    ],
+)
+def test_what_is_no_request_is_told_its_sender_alone(
+    live: Live, caplog: pytest.LogCaptureFixture, request_: bytes
+) -> None:
+    """Each left aiohttp's traceback on stderr."""
+    with socket.create_connection(("127.0.0.1", port_of(live)), TIMEOUT_S) as client:
+        client.sendall(request_)
+        assert client.recv(12).startswith((b"HTTP/1.0 400", b"HTTP/1.1 400", b"HTTP/1.1 405"))
+    assert status_of(live.server.url) == 200
+    assert caplog.text == ""
+
+
+def test_a_fault_of_the_page_itself_is_told(
+    live: Live, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server, "page", lambda name: 1 / 0)
+    assert status_of(live.server.url) == 500
+    assert "ZeroDivisionError" in caplog.text
+
+
 def test_too_many_connections_are_closed_and_viewers_stay(live: Live, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(guard, "MOST_CONNECTIONS", 3)
     with viewer.watching(live.server.url) as watcher, ExitStack() as stack:
