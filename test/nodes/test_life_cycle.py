@@ -207,6 +207,20 @@ def test_a_target_may_be_set_before_the_monitor_is_configured(make_managed: Call
     assert managed.node._config.target_position_m == 900.0
 
 
+def test_a_clock_that_is_switched_on_on_the_way_is_followed_after_a_cleanup(
+    make_managed: Callable[..., Managed],
+) -> None:
+    """The cleanup took the subscription of /clock with it: time stood still for the monitor."""
+    managed = make_managed(AtpMonitor)
+    assert managed.node.set_parameters_atomically([Parameter("use_sim_time", value=True)]).successful
+    for transition in ("deactivate", "cleanup", "configure", "activate"):
+        assert managed.change(transition)
+    clock = qos.advertise(managed.manager, topics.CLOCK)
+    managed.wait(clock.get_subscription_count)
+    clock.publish(messages.clock(7 * S))
+    managed.wait(lambda: managed.node.get_clock().now().nanoseconds == 7 * S)
+
+
 def test_what_stands_against_a_configuration_is_told_and_the_node_stays_as_it_was(
     make_managed: Callable[..., Managed], capfd: pytest.CaptureFixture[str]
 ) -> None:

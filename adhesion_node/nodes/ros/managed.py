@@ -42,14 +42,13 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
         LifecycleNodeMixin.__init__(self)
         self.configured = self.active = False
         self._failure: Exception | None = None
-        self._kept: set[Any] = set()
-        """What is there in every state."""
+        self._made: set[Any] = set()
+        """By `open`; all else is there in every state, a /clock that is switched on on the way as well."""
         service = self._service_change_state
         service.callback = partial(self._if_possible, service.callback)
 
     def bring_up(self, values: Mapping[str, Any]) -> None:
         """Configure and activate, unless a manager does; raises what `open` does. Call at the end of `__init__`."""
-        self._kept = self._entities()
         if values[AUTOSTART.name]:
             self.trigger_configure()
             if self._failure is not None:
@@ -79,12 +78,14 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
         """Open; where something stands against that the node stays as it was and says what."""
         del state
-        self._failure = None
+        self._failure, before = None, self._entities()
         try:
             self.open()
         except Exception as error:  # rclpy would swallow it
             self._failure = error
             self.get_logger().error(f"not configured: {error}")
+        self._made = self._entities() - before
+        if self._failure is not None:
             self._destroy()
             return TransitionCallbackReturn.FAILURE
         self.configured = True
@@ -128,12 +129,11 @@ class ManagedNode(LifecycleNodeMixin, SettingsNode, ABC):
         return set(chain(self.publishers, self.subscriptions, self.services, self.timers))
 
     def _destroy(self) -> None:
-        made = self._entities() - self._kept
         for present, destroy in (
             (list(self.timers), self.destroy_timer),
             (list(self.subscriptions), self.destroy_subscription),
             (list(self.services), self.destroy_service),
             (list(self.publishers), self.destroy_publisher),
         ):
-            for one in made.intersection(present):
+            for one in self._made.intersection(present):
                 destroy(one)
