@@ -14,9 +14,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
 import pytest
-from rcl_interfaces.msg import SetParametersResult
+from conftest import SpinUntil
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterValue, SetParametersResult
+from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.clock import ROSClock
 from rclpy.context import Context
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -195,6 +199,25 @@ def test_a_parameter_cannot_be_removed(make: Make) -> None:
     result = node.set_parameters_atomically([Parameter("start_mu", Parameter.Type.NOT_SET)])
     assert "fixed at start" in result.reason
     assert node.get_parameter("start_mu").value == 0.09
+
+
+@pytest.mark.parametrize("kind", [SetParameters, SetParametersAtomically])
+def test_a_type_that_is_none_is_refused_and_the_node_lives(
+    make: Make, executor: SingleThreadedExecutor, spin_until: SpinUntil, kind: Any
+) -> None:
+    node = make()
+    declare(node, SPECS, change=lambda _: lambda: None)
+    executor.add_node(node)
+    name = {SetParameters: "set_parameters", SetParametersAtomically: "set_parameters_atomically"}[kind]
+    client = node.create_client(kind, f"probe/{name}")
+    spin_until(executor, client.service_is_ready)
+    for number, said in ((42, "law: type = 42: no parameter has it"), (4, "")):
+        value = ParameterValue(type=number, string_value="wet")
+        future = client.call_async(kind.Request(parameters=[ParameterMessage(name="law", value=value)]))
+        spin_until(executor, future.done)
+        response = future.result()
+        results = response.results if kind is SetParameters else [response.result]
+        assert [(one.successful, one.reason) for one in results] == [(not said, said)]
 
 
 def test_tools_see_unit_range_and_choices(make: Make) -> None:
