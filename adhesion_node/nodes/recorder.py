@@ -11,6 +11,7 @@
 import argparse
 import math
 import sys
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
@@ -73,9 +74,9 @@ LATCHED_SUBSCRIPTION = QoSProfile(
 class Recorder(SettingsNode):
     """Records `topics.RECORDED` under their resolved names into the new directory `output`.
 
-    The log time is the node's time: the system clock at arrival, or with `use_sim_time` the /clock in force when the
-    message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder does
-    not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks.
+    The log time is that of the system clock at arrival, or with `use_sim_time` at the start the /clock in force when
+    the message was published. The latter is found by the time stamps that DDS gives every sample, so a busy recorder
+    does not shift a message without a header; it takes publishers on one host, or hosts with synchronised clocks.
 
     What comes before the first /clock waits for it, the newest `waiting.HELD` messages: it is of its header's stamp
     where that is of the same time, else of the first /clock. So a recording begins when its time begins. Where /clock
@@ -180,7 +181,7 @@ class Recorder(SettingsNode):
             self.heard[topic] += 1
             message = Message(info["source_timestamp"], self._arrivals, name, topic.type, exact, stamp_ns)
             if not self._simulated:
-                self._write(message, self.get_clock().now().nanoseconds)
+                self._write(message, time.time_ns())
             elif not self._waiting.takes(message):
                 self.get_logger().warning(
                     f"no /clock: of {len(self._waiting)} messages that wait for it the oldest is given up", once=True

@@ -210,6 +210,21 @@ def test_without_a_clock_the_stamp_takes_its_place(
         assert [record.log_ns for record in reader.messages()] == [3 * S, 3 * S]
 
 
+def test_a_clock_that_is_switched_on_on_the_way_moves_no_log_time(
+    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """Until the first /clock all was logged at 0."""
+    recording, ends = start(tmp_path / "bag", context, executor, spin_until, [POSITION], sim=False)
+    before_ns = time.time_ns()
+    assert recording.set_parameters([Parameter("use_sim_time", value=True)])[0].successful
+    ends[POSITION].publish(stamped(POSITION, 3 * S))
+    spin_until(executor, lambda: recording.heard[POSITION])
+    recording.close()
+    with BagReader(tmp_path / "bag") as reader:
+        (record,) = reader.messages()
+    assert before_ns <= record.log_ns <= time.time_ns()
+
+
 def test_a_stamp_before_1970_does_not_end_the_recording(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
