@@ -39,12 +39,13 @@ from adhesion_node.wire.settings.shared import ATP_SETTINGS, Watchdogs
 from adhesion_node.wire.topic import Topic
 
 from .ros import qos, runtime
-from .ros.diagnostics import Diagnostics, Finding, Told, doubled
+from .ros.diagnostics import Diagnostics, Finding, Told, doubled, unlike
 from .ros.managed import ManagedNode
 from .ros.params import current, declare
 from .ros.types import new
 
 PARAMETERS = ATP_SETTINGS
+INPUTS = (topics.STATE, topics.BRAKING_CURVE)
 TARGET = ("target_position_m", "target_speed_kmh")
 
 EXAMPLES = (
@@ -189,8 +190,8 @@ class AtpMonitor(ManagedNode):
         if self._decision is None:
             return [Finding(Severity.ERROR, "nothing judged yet: does the clock run?")], {}
         finding = Finding(self._decision.severity, self._decision.message)
-        findings = [finding, *doubled(self, (topics.STATE, topics.BRAKING_CURVE))]
-        return findings, self._decision.numbers(self._config)
+        unheard = [topic for topic in (*INPUTS, topics.ATP_TARGET) if not self.heard[topic]]
+        return [finding, *unlike(self, unheard), *doubled(self, INPUTS)], self._decision.numbers(self._config)
 
 
 def _log(node: Node, decision: Decision, awaited: bool) -> None:

@@ -34,7 +34,7 @@ from ..wire.settings.telling import TELLING
 from ..wire.topic import Topic
 from .offers import offered
 from .ros import runtime
-from .ros.diagnostics import JUMP_NS, Diagnostics, Finding, Told, doubled
+from .ros.diagnostics import JUMP_NS, Diagnostics, Finding, Told, doubled, unlike
 from .ros.params import SettingsNode, declare
 from .ros.qos import PROFILES, subscribe
 from .waiting import Message, Waiting
@@ -143,7 +143,8 @@ class Recorder(SettingsNode):
         self.get_logger().info(f"recorded {sum(self.counts.values())} messages to {self._writer.path}")
 
     def _told(self) -> Told:
-        found = [Finding(Severity.OK, f"recording to {self._writer.path}"), *doubled(self, ())]
+        unheard = [topic for topic in topics.RECORDED if not self.heard[topic]]
+        found = [Finding(Severity.OK, f"recording to {self._writer.path}"), *unlike(self, unheard), *doubled(self, ())]
         if self._simulated and not self._waiting.begun:
             found.append(Finding(Severity.WARN, NO_CLOCK))
         if self._went_back:

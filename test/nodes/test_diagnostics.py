@@ -18,12 +18,15 @@ from typing import Any
 
 import messages
 import pytest
+import rclpy
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from recorded import write_steps
+from std_msgs.msg import String
 
 from adhesion_node.bag import BagReader, select
 from adhesion_node.live.node import Live
@@ -170,6 +173,28 @@ def test_two_publishers_of_a_sensor_are_told(make_line: Callable[..., Line]) -> 
     _outputs = [line.outlet(topics.POSITION) for _ in range(2)]
     line.wait_until_said("2 publishers of /train1/position: stop all but one")
     assert line.last.level != DiagnosticStatus.OK
+
+
+@pytest.mark.parametrize(
+    ("make", "topic"),
+    [
+        (Estimator, topics.BRAKE_PRESSURE),
+        (CreepEstimator, topics.SPEED),
+        (AtpMonitor, topics.STATE),
+        (Recorder, topics.MU),
+    ],
+)
+def test_a_topic_of_another_type_is_told(
+    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]], make: Callable[..., Node], topic: Topic
+) -> None:
+    """A publisher of another process; nothing of it arrives, and DDS says nothing."""
+    line, context = make_line(beside.get(make, make), diagnostics_period_s=0.1), Context()
+    rclpy.init(context=context)
+    stranger = Node("stranger", context=context)
+    stranger.create_publisher(String, topic.name, 1)
+    line.wait_until_said(f"/{topic.name} is published as std_msgs/msg/String: give it as {topic.type}")
+    stranger.destroy_node()
+    context.try_shutdown()
 
 
 def test_two_estimators_of_a_monitor_are_told(make_line: Callable[..., Line]) -> None:

@@ -55,6 +55,16 @@ def doubled(node: Node, inputs: Iterable[Topic]) -> list[Finding]:
     ]
 
 
+def unlike(node: Node, unheard: Iterable[Topic]) -> list[Finding]:
+    """Name what is published as another type than it is read: nothing of that arrives, and DDS does not tell."""
+    ends = ((topic, end.topic_type) for topic in unheard for end in node.get_publishers_info_by_topic(topic.name))
+    kinds = {topic: kind for topic, kind in ends if kind != topic.type}
+    return [
+        Finding(Severity.WARN, f"{node.resolve_topic_name(topic.name)} is published as {kind}: give it as {topic.type}")
+        for topic, kind in kinds.items()
+    ]
+
+
 class Diagnostics:
     """Speaks in /diagnostics of `part` of a node: by `tell`, and by a steady timer, so that no entry grows stale.
 

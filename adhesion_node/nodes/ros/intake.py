@@ -23,7 +23,7 @@ from adhesion_node.wire.messages.refused import Reason, Rejected
 from adhesion_node.wire.topic import Topic
 
 from . import qos
-from .diagnostics import Finding, doubled
+from .diagnostics import Finding, doubled, unlike
 from .silence import Silence
 
 BY_SPEED = "no position: the train is followed by its speed alone, wherever it is on the track"
@@ -109,7 +109,8 @@ class Intake:
             found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
-        return found + doubled(self._node, self._reader.inputs)
+        unheard = [topic for topic in self._reader.inputs if not self.heard[topic]]
+        return [*found, *unlike(self._node, unheard), *doubled(self._node, self._reader.inputs)]
 
     @property
     def _watched(self) -> list[str]:
