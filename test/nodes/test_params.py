@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, Protocol
 
 import pytest
+from builtin_interfaces.msg import Time
 from conftest import SpinUntil
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterValue, SetParametersResult
@@ -23,9 +24,12 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rosgraph_msgs.msg import Clock
 
 from adhesion_node.core.setting import Setting
+from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.params import SettingsNode, declare, misplaced, unknown
+from adhesion_node.wire.topics import CLOCK
 
 SPECS = (
     Setting("start_mu", 0.09, "first guess of the adhesion coefficient", low=0.0, high=0.5),
@@ -241,6 +245,26 @@ def test_sim_time_still_works(make: Make) -> None:
     node = make({"use_sim_time": True})
     declare(node, SPECS)
     assert follows_clock(node)
+
+
+@pytest.mark.parametrize("from_the_start", [True, False])
+def test_a_clock_below_zero_is_not_used_and_the_node_lives(
+    make: Make,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    from_the_start: bool,
+    capfd: pytest.CaptureFixture[str],
+) -> None:
+    node = make({"use_sim_time": from_the_start})
+    declare(node, SPECS)
+    assert node.set_parameters_atomically([Parameter("use_sim_time", value=True)]).successful
+    clock = qos.advertise(node, CLOCK)
+    executor.add_node(node)
+    spin_until(executor, clock.get_subscription_count)
+    clock.publish(Clock(clock=Time(sec=-3)))
+    spin_until(executor, lambda: "/clock = -3 s: not used; a time is 0 or more" in capfd.readouterr().err)
+    clock.publish(Clock(clock=Time(sec=7)))
+    spin_until(executor, lambda: node.get_clock().now().nanoseconds == 7 * 10**9)
 
 
 def test_sim_time_of_a_wrong_type_is_refused(make: Make) -> None:

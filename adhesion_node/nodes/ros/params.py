@@ -16,16 +16,16 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
-from functools import partial
 from typing import Any
 
 from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor, SetParametersResult
-from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from adhesion_node.core.setting import Setting
 from adhesion_node.wire.topics import TOPICS
+
+from .guarded import GuardedNode
 
 _INT64_MAX = 2**63 - 1
 
@@ -44,14 +44,8 @@ Change = Callable[[Mapping[str, Any]], Callable[[], None]]
 """Takes all values, the new ones among them; ValueError where they do not fit. Returns what puts them in force."""
 
 
-class SettingsNode(Node):
+class SettingsNode(GuardedNode):
     """A node whose parameters are settings: those that it has already it accepts, whether or not they may change."""
-
-    def __init__(self, name: str, **kwargs: Any) -> None:
-        super().__init__(name, **kwargs)
-        for service in self.services:
-            if service.srv_type in (SetParameters, SetParametersAtomically):
-                service.callback = partial(_of_known_types, service.callback)
 
     def set_parameters_atomically(self, parameter_list: list[Parameter]) -> SetParametersResult:
         """Set parameters together, an integer or a text such as 1e-06 for a float included, or none of them."""
@@ -86,21 +80,6 @@ class SettingsNode(Node):
             return False
         present = self.get_parameter(change.name)
         return bool((present.type_, present.value) == (change.type_, change.value))
-
-
-def _of_known_types(answer: Callable[[Any, Any], Any], request: Any, response: Any) -> Any:
-    """Refuse a request with a value of a type that is none: rclpy would let the node die of it."""
-    types = {kind.value for kind in Parameter.Type}
-    strange = [(one.name, one.value.type) for one in request.parameters if one.value.type not in types]
-    if not strange:
-        return answer(request, response)
-    reason = "; ".join(f"{name}: type = {number}: no parameter has it" for name, number in strange)
-    result = SetParametersResult(successful=False, reason=reason)
-    if isinstance(response, SetParametersAtomically.Response):
-        response.result = result
-    else:
-        response.results = [result] * len(request.parameters)
-    return response
 
 
 def descriptor(setting: Setting) -> ParameterDescriptor:
