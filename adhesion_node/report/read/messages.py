@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...bag import BagReader, Record
+from ...bag.metadata import LATEST_NS
 from ...bag.read.together import MOST_TOGETHER, together
 from ...wire.line import NOMINAL, Line
 from ...wire.messages.parts import stamp_ns, stamps_ns
@@ -96,8 +97,9 @@ def with_key(key: str, take: Callable[[int, Status], None]) -> Take:
 
     def taken(sample: Sample) -> None:
         for status in sample.read.entries:
-            stamp = status.values.get("stamp_ns", sample.t_ns)
-            if key in status.values and stamp != "none":  # of no estimate
+            stamp = str(status.values.get("stamp_ns", sample.t_ns))
+            is_one = stamp.removeprefix("-").isdecimal() and abs(int(stamp)) <= LATEST_NS  # "none": of no estimate
+            if key in status.values and is_one:
                 take(int(stamp), status)
 
     return taken

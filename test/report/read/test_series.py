@@ -108,12 +108,15 @@ def test_a_status_is_read_by_its_key(tmp_path: Path) -> None:
         tmp_path / "bag",
         (DIAGNOSTICS, array(S, ("mu", "0.08"), ("regime", "COASTING")), 2 * S),
         (DIAGNOSTICS, array(3 * S, ("mu", "0.09")), 4 * S),
-        (DIAGNOSTICS, array(1000 * S, ("regime", "COASTING"), ("stamp_ns", "none")), 5 * S),
+        *(
+            (DIAGNOSTICS, array(1000 * S, ("regime", "COASTING"), ("stamp_ns", odd)), 5 * S)
+            for odd in ("none", "", "soon", "1e9", str(2**63))
+        ),
         (DIAGNOSTICS, array(1000 * S, ("regime", "BRAKE_LIMITED"), ("stamp_ns", str(5 * S))), 6 * S),
         (ATP_STATUS, array(7 * S, ("regime", "of another topic")), 7 * S),
     )
     with BagReader(path) as reader:
         regimes = read_status(reader, DIAGNOSTICS, "regime")
-        assert read_status(reader, DIAGNOSTICS, "rate").values.tolist() == ["10", "10", "10", "10"]
+        assert read_status(reader, DIAGNOSTICS, "rate").values.tolist() == ["10"] * 8
     assert regimes.values.tolist() == ["COASTING", "BRAKE_LIMITED"]
     assert regimes.t_ns.tolist() == [S, 5 * S], "whatever the clock of the node that tells"
