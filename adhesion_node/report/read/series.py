@@ -41,6 +41,12 @@ class Series(NamedTuple):
         found = np.searchsorted(self.t_ns, t_ns, side="right") - 1
         return np.where((found >= 0) & (self.t_ns[found] == t_ns), self.values[found], absent)
 
+    @property
+    def known(self) -> Series:
+        """Those that are numbers."""
+        there = ~np.isnan(self.values)
+        return Series(self.t_ns[there], self.values[there])
+
     def map(self, change: Callable[[Array], Any]) -> Series:
         """What `change` makes of the values, at the same times."""
         return self._replace(values=np.asarray(change(self.values)))

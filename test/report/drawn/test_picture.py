@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 import struct
 from pathlib import Path
 from typing import Any
@@ -102,6 +103,20 @@ def pixels_of(path: Path, color: str) -> int:
     """Count the pixels of a colour "#rrggbb"."""
     wanted = [int(color[at : at + 2], 16) / 255 for at in (1, 3, 5)]
     return int(np.all(np.abs(imread(path)[..., :3] - wanted) < 0.02, axis=-1).sum())
+
+
+def test_a_state_that_is_refused_is_no_estimate(tmp_path: Path) -> None:
+    """One that is not finite ended the report: "braking curve speed_mps = nan"."""
+    refused = serialize_message(messages.state_message(START_NS + 7 * S, math.nan, 1.0, 50.0, 1.0))
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            for topic, cdr in rows(second):
+                odd = topic is STATE and second == 7
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, refused if odd else cdr, START_NS + second * S)
+    run = read(tmp_path / "bag")
+    assert run.speed.t_ns.tolist() == [START_NS + second * S for second in range(20) if second != 7]
+    assert run.position.t_ns.tolist() == run.speed.t_ns.tolist()
+    assert np.isfinite(distances(run, 0.0, FREE).identified).all()
 
 
 def test_what_the_estimators_of_other_trains_tell_is_left_out(tmp_path: Path) -> None:
