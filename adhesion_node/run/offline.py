@@ -29,7 +29,7 @@ from ..wire.settings.given import given
 from ..wire.settings.nodes import SEED, SETTINGS
 from ..wire.settings.setup import setup_of
 from ..wire.topic import Topic
-from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_MU, TRUTH_STATE
+from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_MU, TRUTH_STATE, WHEEL_SPEED
 from .engine import EstimatorPipeline
 from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
@@ -47,7 +47,7 @@ Output = TypeVar("Output")
 def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, str]) -> int:
     """Replay the topics of `selection` (recorded name to ours) and report; the exit code of `replay --offline`."""
     setup = setup_of(parameters_of(options))
-    anchors = [topic.name for topic in (*Reader(ADHESION_INPUTS, setup.line).anchors, SPEED)]
+    anchors = [topic.name for topic in (*Reader(ADHESION_INPUTS, setup.line).anchors, SPEED, WHEEL_SPEED)]
     if not set(anchors) & set(selection.values()):
         fix = f"; a {FIX.name} needs track_line" if FIX.name in selection.values() else ""
         raise ValueError(

@@ -28,7 +28,7 @@ from rclpy.parameter import Parameter
 from windowed import Failing
 
 from adhesion_node.core import Config, predict
-from adhesion_node.core.intake.samples import PositionSample, PressureSample, SpeedSample
+from adhesion_node.core.intake.samples import PositionSample, PressureSample, SpeedSample, WheelSample
 from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.nodes import estimator
 from adhesion_node.nodes.estimator import PARAMETERS, Estimator
@@ -322,16 +322,21 @@ def test_silence_ends_the_wait_for_a_pressure(line: Line) -> None:
     line.spin_until(line.executor, lambda: line.estimator.pipeline.accepted == len(readings))
 
 
-def test_by_its_speed_alone_and_beyond_the_node_runs_as_offline(line: Line) -> None:
-    """5 s of speed alone, 2 s with positions of 2 Hz, 3 s without them again: nothing is stale on speed alone."""
+@pytest.mark.parametrize("by", ["speed", "wheels"])
+def test_by_speed_or_wheels_alone_and_beyond_the_node_runs_as_offline(line: Line, by: str) -> None:
+    """5 s of them alone, 2 s with positions of 2 Hz, 3 s without them again: nothing is stale on them alone."""
     pipeline = Pipeline(setup_of(FAST).config, 1)
     levels = line.heard[topics.DIAGNOSTICS]
     for k in range(100):
         t_ns = S + k * S // 10
         line.send(topics.BRAKE_PRESSURE, messages.brake_pressure(t_ns, ATMOSPHERE_PA, 0.0))
-        line.send(topics.SPEED, messages.speed(t_ns, 30.0, 0.1))
         pipeline.push(PressureSample(t_ns, 0.0))
-        pipeline.push(SpeedSample(t_ns, 30.0, 0.1**2))
+        if by == "speed":
+            line.send(topics.SPEED, messages.speed(t_ns, 30.0, 0.1))
+            pipeline.push(SpeedSample(t_ns, 30.0, 0.1**2))
+        else:
+            line.send(topics.WHEEL_SPEED, messages.wheel_speed(t_ns, [65.0, 66.0]))
+            pipeline.push(WheelSample(t_ns, (65.0, 66.0)))
         if 50 <= k < 70 and k % 5 == 0:
             line.send(topics.POSITION, messages.position(t_ns, 3.0 * k, 0.5))
             pipeline.push(PositionSample(t_ns, 3.0 * k, 0.25))

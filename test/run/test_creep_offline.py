@@ -139,8 +139,8 @@ def test_with_positions_the_estimator_is_chosen_by_name(tmp_path: Path) -> None:
         ),
         (["--set", "eta_min=2"], "eta_min = 2.0: give a value from 0.5 to 1"),
         (
-            ["--estimator", "adhesion", "--topics", "wheel_speed"],
-            "holds no position or odometry or speed, without which nothing is identified",
+            ["--estimator", "adhesion", "--topics", "traction_force"],
+            "holds no position or odometry or speed or wheel_speed, without which nothing is identified",
         ),
     ],
 )

@@ -202,9 +202,8 @@ def test_the_offline_replay_reads_fixes(
     assert Counter(result["dropped"]) == Counter()
     assert result["digest"] == run(messages(way, FIX), track_line=track_line).digest
     assert replay.main([str(tmp_path / "bag"), "--offline"]) == 2
-    assert "holds no position or odometry or speed, without which nothing is identified; a fix needs track_line" in (
-        capfd.readouterr().err
-    )
+    needed = "position or odometry or speed or wheel_speed, without which nothing is identified"
+    assert f"holds no {needed}; a fix needs track_line" in capfd.readouterr().err
 
 
 def test_a_bag_of_another_way_says_what_is_wrong(

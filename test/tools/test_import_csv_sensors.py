@@ -125,7 +125,7 @@ def test_bad_cells_are_named(importing: Import, row: str, message: str) -> None:
         (
             "time,acceleration",
             [],
-            "FILE: columns ['time', 'acceleration']: has neither position, lat and lon, nor speed",
+            "FILE: columns ['time', 'acceleration']: has neither position, lat and lon, speed nor wheels",
         ),
         ("time,lat", [], "FILE: columns ['time', 'lat']: has neither"),
         ("time,speed", ["--wheel-speeds", "a"], "FILE: column 'a' is missing: it has .*--wheel-speeds COL"),

@@ -26,8 +26,7 @@ from . import qos
 from .diagnostics import Finding, doubled, unlike
 from .silence import Silence
 
-BY_SPEED = "no position: the train is followed by its speed alone, wherever it is on the track"
-
+BY_SPEED = "no position: the train is followed by its speed or its wheels alone, wherever it is on the track"
 
 AS_WANTED = (Reason.OTHER_SOURCE.name, Reason.SWITCHED_OFF.name)
 UNUSED = (*AS_WANTED, Reason.DISABLED.name)
@@ -102,9 +101,8 @@ class Intake:
         # What happened to the watched topic stands until that is heard again: it may be why it is silent.
         self._events = {name: text for name, text in self._events.items() if name in self._watched}
         if self._silence.for_s is not None:
-            by_speed = (
-                self._reader.source is None and self.heard[topics.SPEED] > 0 and topics.POSITION in self._reader.anchors
-            )
+            moves = self.heard[topics.SPEED] + self.heard[topics.WHEEL_SPEED] > 0
+            by_speed = moves and self._reader.source is None and topics.POSITION in self._reader.anchors
             text = BY_SPEED if by_speed else self._silent(self._silence.for_s)
             found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
         if not self.enabled:

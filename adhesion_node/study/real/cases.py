@@ -111,10 +111,8 @@ CASES = tuple(
     for scenario, sets in (
         (point_mass.NAME, "white"),
         ("wet", "white gnss gnss_wheels gnss_doppler gnss_smoothed gnss_imu radar doppler_only tacho axle_speed"),
-        (
-            "wet",
-            "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full tunnel_wheels",
-        ),
+        ("wet", "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
+        ("wet", "tunnel_wheels"),
         ("wet_mass_over", "white gnss_wheels"),
         ("wet_pads_weak", "gnss_wheels"),
         ("wet_fast", "gnss_doppler"),

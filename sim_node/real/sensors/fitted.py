@@ -113,7 +113,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("mean_cylinder_wheels", "the same and the wheels", _gnss(), _MEAN, _WHEELS),
             ("mean_cylinder_demand", "the same and the demand, no wheels", _gnss(), _MEAN, _HANDLE),
             ("wheel_dropouts", "one bogie's wheels after the other missing", _gnss(), _MEAN, _PATCHY_WHEELS),
-            ("tunnel_wheels", "1 to 3 minutes without a fix, and the wheels", _gnss(timing=_TUNNELS), _DEMANDED, _WHEELS),
+            ("tunnel_wheels", "minutes without a fix, and the wheels", _gnss(timing=_TUNNELS), _DEMANDED, _WHEELS),
             ("no_pressure", "satellites alone", _gnss()),
             ("full", "satellites with speed, accelerometer, wheels", _gnss(), _DOPPLER, _IMU, _WHEELS, _MEAN),
         )
