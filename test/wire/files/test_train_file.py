@@ -75,7 +75,7 @@ def test_what_is_given_beside_the_file_counts_first(tmp_path: Path) -> None:
     file = written(tmp_path)
     params = tmp_path / "params.yaml"
     params.write_text("/**: {ros__parameters: {mass_std: 0.2, train.length_m: 70.0}}", encoding="utf-8")
-    options = Namespace(train=file, params=str(params), set=["train.mass_kg=536000.0"])
+    options = Namespace(train=file, params=str(params), node=None, set=["train.mass_kg=536000.0"])
     config = setup_of(given(options, "estimator", SETTINGS)).config
     assert (config.train.mass_kg, config.train.length_m, config.mass_std) == (536e3, 70.0, 0.2)
     assert config.train.wheel_radius_m == 0.42
