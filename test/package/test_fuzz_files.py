@@ -34,7 +34,7 @@ from adhesion_node.bag.write.writer import file_name
 from adhesion_node.core.intake.samples import MAX_POSITION_M
 from adhesion_node.tools import import_csv, recover
 from adhesion_node.tools.log import format as log_format
-from adhesion_node.tools.log.cells import END_OF_STAMPS_NS
+from adhesion_node.tools.log.cell.numbers import END_OF_STAMPS_NS
 from adhesion_node.tools.log.format import OPTIONAL, Format
 from adhesion_node.tools.log.odd.checks import odd
 from adhesion_node.tools.log.text import Refusal

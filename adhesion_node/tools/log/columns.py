@@ -12,8 +12,8 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from .cell.units import known, meant, parted
 from .format import FAMILIES, OPTIONAL, PLACES, UNITS, Format, option
-from .units import known, meant, parted
 
 AXLE = re.compile(r"wheel_speed_\d+", re.IGNORECASE)
 """What the columns of the axles are called where none is named."""

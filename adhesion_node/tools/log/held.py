@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import Array
-from .cells import Flags
+from .cell.numbers import Flags
 
 LEAST_CHANGES = 10
 """Of fewer nothing is said."""

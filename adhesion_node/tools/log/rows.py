@@ -18,13 +18,13 @@ import numpy as np
 import pandas as pd
 
 from ...command.checks import refuse
-from .cells import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
+from .cell.marks import marks
+from .cell.numbers import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
+from .cell.units import known
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, PRESSURES, Format
 from .idle import require_meaning
-from .marks import marks
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
-from .units import known
 
 ZONED = re.compile(r"(Z|[T ]\d\d.*[+-]\d\d(:?\d\d)?)$")
 """How a date ends that names its zone, behind the time of the day."""

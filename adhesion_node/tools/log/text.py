@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from .decimals import decimal_sign
+from .cell.decimals import decimal_sign
+from .cell.units import meant
 from .format import PLACES, Format
-from .units import meant
 
 DELIMITERS = (",", ";", "\t", "|")
 

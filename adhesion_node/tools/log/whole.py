@@ -18,8 +18,8 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import Array
-from .cells import Flags
-from .clock import has_dates, in_digits, in_zone, over_midnight
+from .cell.clock import has_dates, in_digits, in_zone, over_midnight
+from .cell.numbers import Flags
 from .columns import Columns
 from .format import PRESSURE_UNITS, Format
 from .held import without_held

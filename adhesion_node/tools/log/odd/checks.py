@@ -20,7 +20,7 @@ import numpy as np
 from ....core.physics.train import KMH, Array
 from ....run.results.seen import FASTEST_MPS
 from ....wire.line import ATMOSPHERE_PA
-from ..clock import has_dates
+from ..cell.clock import has_dates
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from ..whole import MOVES_MPS, Log, moment
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of

@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 
 from ....core.physics.train import Array
-from ..cells import Flags
+from ..cell.numbers import Flags
 from ..whole import Log
 
 LEAST_S, LEAST_M = 10.0, 100.0

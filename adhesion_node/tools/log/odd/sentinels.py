@@ -13,8 +13,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....core.physics.train import Array
+from ..cell.marks import marks
 from ..format import PRESSURES
-from ..marks import marks
 from ..whole import Log
 
 LEAST_ROWS = 3

@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
-from .cells import is_clock
-from .format import Format
+from ..format import Format
+from .numbers import is_clock
 
 DAY_NS, S = 86_400 * 10**9, 10**9
 

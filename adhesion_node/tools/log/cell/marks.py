@@ -10,8 +10,8 @@
 
 import numpy as np
 
-from ...core.physics.train import Array
-from .cells import Flags
+from ....core.physics.train import Array
+from .numbers import Flags
 
 _NINES = [*(-(10.0**digits - 1.0) for digits in range(3, 8)), *(10.0**digits - 1.0 for digits in range(4, 8))]
 

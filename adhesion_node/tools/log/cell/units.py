@@ -12,7 +12,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-from .format import FAMILIES, UNITS
+from ..format import FAMILIES, UNITS
 
 _SPELT = {
     "s": ("sec", "second", "seconds", "sekunden"),

@@ -17,8 +17,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from ...core.physics.train import Array
-from .format import EXCEL_1970, TIME_UNITS, Format
+from ....core.physics.train import Array
+from ..format import EXCEL_1970, TIME_UNITS, Format
 
 Flags = NDArray[np.bool_]
 
