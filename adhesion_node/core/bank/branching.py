@@ -58,9 +58,9 @@ PASSING_S, PASSED_S = 300.0, 3.0
 CHANGE_S, BEND_S = 600.0, 60.0
 """Axles roll again, whatever the adhesion was, once in that time, and how it depends on speed changes."""
 
-RISING_S, STEADY_S, FELL_S, REACHED_S = 5.0, 60.0, 0.5, 2.0
-"""In such times axles begin to slide while the brake is applied harder, while it is not, and while all of them are seen
-to fall; and adhesion that the brake no longer reaches lets them roll."""
+RISING_S, RISES, STEADY_S, FELL_S, REACHED_S = 5.0, 2.0, 60.0, 0.5, 2.0
+"""In such times axles begin to slide while the brake is applied harder, in so many build-ups of a slow brake, while it
+is not, and while all of them are seen to fall; and adhesion that the brake no longer reaches lets them roll."""
 
 ALIKE, ALIKE_STD = 0.3, 1.4
 """Hypotheses of one label say the same where speed and adhesion differ by less than this part of their standard
@@ -106,14 +106,14 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
     than the brake needs, a little less while the brake rises, else any less. Where the wheels tell which it is, the
     other does not spring.
     """
-    fell = braking.told >= FALLS
+    fell, rising_s = braking.told >= FALLS, max(RISING_S, RISES * config.brake_build_up_s)
     rule = Rule(
         now_s=now_s,
         elapsed_s=elapsed_s,
         strong=STRONG,
         change_s=CHANGE_S,
         bend_s=BEND_S,
-        begin_s=FELL_S if fell else RISING_S if braking.rising else STEADY_S,
+        begin_s=FELL_S if fell else rising_s if braking.rising else STEADY_S,
         reached_s=REACHED_S,
         passing=PASSING,
         passing_s=PASSING_S,

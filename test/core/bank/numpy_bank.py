@@ -329,8 +329,10 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     since = sliding & np.isneginf(bank.born_s) & (not partial) & (braking.told == 0.0)
     odds = np.where(since, ahead.UNTOLD, 1.0) * bank.weight
     weight = odds / odds.sum()
-    low = np.exp(quantiles(weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), (missed,))[:, 0])
-    return speeds, low
+    wanted = missed, ahead.LIKELIER
+    low, likelier = np.exp(quantiles(weight, np.log(middle) - 0.5 * variance, np.sqrt(variance), wanted)).T
+    lowest = ahead.LOWEST_PART * config.lowest_mu  # of any rail, unless it is likelier to be less
+    return speeds, np.maximum(low, np.minimum(lowest, likelier))
 
 
 def _mean_ahead(way_m: Array, length_m: float) -> tuple[Array, Array]:

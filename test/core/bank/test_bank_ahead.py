@@ -183,6 +183,15 @@ def test_a_worse_rail_counts_once_it_has_lasted_or_is_probable(
     assert counts or aheads[1].mu == pytest.approx(aheads[0].mu)
 
 
+@pytest.mark.parametrize(("probability", "counts"), [(0.02, False), (0.08, True)])
+def test_less_than_hardly_any_rail_gives_counts_once_it_is_likely(probability: float, counts: bool) -> None:
+    """Half of `lowest_mu`, 0.02, until one in twenty says less."""
+    usual, none = ahead_bank(0.05, 50.0, [SMOOTH]), ahead_bank(0.003, 50.0, [SMOOTH])
+    both = joined([usual, none])._replace(log_weight=np.log([1.0 - probability, probability]))
+    mu = counted_on(CONFIG, both, 0.01, Braking(FULL), NOTHING).mu[-1]
+    assert mu < 0.005 if counts else mu == pytest.approx(0.01)
+
+
 def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:
     ahead = Ahead((0.0, 10.0, 20.0), (0.06, 0.05, 0.03))
     assert ahead(np.array([0.0, 5.0, 15.0, 20.0, 90.0])) == pytest.approx([0.06, 0.055, 0.04, 0.03, 0.03])

@@ -121,6 +121,17 @@ def test_axles_that_are_known_to_roll_do_not_begin_to_slide() -> None:
         assert bool(SLIDES[branched(CONFIG, held, Braking(FULL, told=told), 12.0, 0.5).kind].any()) == expected
 
 
+@pytest.mark.parametrize("build_up_s", [2.5, 5.0, 20.0])
+def test_a_slow_brake_makes_axles_slide_no_likelier(build_up_s: float) -> None:
+    """It passes the same adhesion on its way up: two fifths of what rolled have begun to slide behind it, not all."""
+    config, braking = replace(CONFIG, brake_build_up_s=build_up_s), Braking(FULL, rising=True)
+    held, rolls = bank_of([HELD], spread=0.0), 1.0
+    for _ in range(round(build_up_s / 0.5)):
+        after = branched(config, held, braking, 12.0, 0.5)
+        rolls *= float(after.weight @ (after.kind == HELD))
+    assert rolls == pytest.approx(0.6, abs=0.05)
+
+
 def test_the_longer_asked_the_likelier_a_change() -> None:
     bank = bank_of([2], seed=4, spread=0.0)
     weights = [

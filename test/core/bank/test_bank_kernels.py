@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import replace
 from importlib import import_module
 from itertools import product
@@ -165,10 +166,10 @@ def test_what_is_counted_on_ahead(config: Config, braking: Braking, fails: bool)
     weight = np.where(GROWTH[BANK.kind] < 0.0, 5.0 if fails else 0.0, 0.0)
     bank = BANK._replace(log_weight=BANK.log_weight + weight).normalised()
     assert (float(bank.weight @ (GROWTH[bank.kind] < 0.0)) > FAILS) == fails
-    for known in (0.0, 0.06):
+    for known, missed in itertools.product((0.0, 0.06), (0.02, 1e-5)):
         rail = Rail(0.07, 0.02, known)
-        ours = counted_on(config, bank, 0.02, braking, rail)
-        speeds, mu = by_numpy.counted_on(config, bank, 0.02, braking, rail)
+        ours = counted_on(config, bank, missed, braking, rail)
+        speeds, mu = by_numpy.counted_on(config, bank, missed, braking, rail)
         np.testing.assert_allclose(ours.speed_mps, speeds, rtol=1e-12)
         np.testing.assert_allclose(ours.mu, mu, rtol=1e-7 if fails else 1e-9)
 

@@ -38,6 +38,10 @@ DRIFT_AHEAD = 0.02
 LEAST_AHEAD = 0.002
 """Adhesion less grade ahead counts as no less."""
 
+LOWEST_PART, LIKELIER = 0.5, 0.05
+"""Part of `lowest_mu` that hardly any rail is below, as that holds with 95 % of any: less counts ahead once it is so
+probable, as the tails of what has only just come to mind reach down to nothing."""
+
 AHEAD_M, NEAR = 2000.0, 0.375
 """Over which way the adhesion, or the brake's force, comes to differ by `ahead_std`, and what share of that the mean of
 the shortest way may differ by."""
@@ -105,7 +109,7 @@ def counted_on(
         weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
         weight /= weight.sum()
     borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, surely(config, bank))) if partial else (1.0, 0.0)
-    asked = mixture.Asked(float(missed), borne, float(least))
+    asked = mixture.Asked(float(missed), borne, float(least), LOWEST_PART * config.lowest_mu, LIKELIER)
     rule = _ahead_of(config)
     if float(bank.weight @ (kinds.GROWTH[bank.kind] < 0.0)) < FAILS:
         rule = rule._replace(growth=np.zeros_like(rule.growth))

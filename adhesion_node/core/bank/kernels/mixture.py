@@ -65,6 +65,10 @@ class Asked(NamedTuple):
     missed: float
     borne: float
     known: float
+    lowest: float
+    """What hardly any rail is below: there a quantile counts that is likelier to be missed, ..."""
+    likelier: float
+    """... so likely."""
 
 
 @kernel
@@ -208,4 +212,7 @@ def counted_on(
     result = np.empty(speeds.size)
     for row in range(speeds.size):
         result[row] = math.exp(_quantile(weight, middle[row], std[row], asked.missed))
+        if result[row] < asked.lowest:
+            likelier = math.exp(_quantile(weight, middle[row], std[row], asked.likelier))
+            result[row] = max(result[row], min(asked.lowest, likelier))
     return result
