@@ -39,8 +39,9 @@ LAGS, HELD = 0.01, 0.12
 """By how much the fastest rim may creep when axles begin to slide, at least and at most, relative: slide protection may
 hold all of them at some creep, and none shows it. One that is farther behind slides, and comes back."""
 
-SLIDES = 0.2
-"""Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new."""
+SLIDES, HIDDEN = 0.2, 1e-6
+"""Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new. And
+while every axle is seen to roll: all of them hardly slide alike, but a brake may change that no gauge shows."""
 
 MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
@@ -136,7 +137,8 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
         wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
-        bank = as_fast(bank, rim_mps, errors.quick * rim_mps)
+        slides = HIDDEN if memory.braking.told < 0.0 else SLIDES
+        bank = as_fast(bank, rim_mps, errors.quick * rim_mps, slides)
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
@@ -193,7 +195,7 @@ def _creeping(bank: Bank, wander: Wander, rim_mps: float) -> tuple[Bank, Wander,
     return bank._replace(covariance=covariance), wander, errors
 
 
-def as_fast(bank: Bank, rim_mps: float, error: float) -> Bank:
+def as_fast(bank: Bank, rim_mps: float, error: float, slides: float = SLIDES) -> Bank:
     """Take in that a rim is as fast as the train but for an error, m/s, or slides.
 
     Each Gaussian becomes the one with the moments of both (probabilistic data association, Bar-Shalom and Tse 1975).
@@ -204,7 +206,7 @@ def as_fast(bank: Bank, rim_mps: float, error: float) -> Bank:
     std = np.sqrt(np.einsum("hi,hi->h", gain, seen.slope) + error**2)
     off, gain = seen.innovation / std, gain / std[:, None]
     rolled = np.exp(-0.5 * off**2) / (math.sqrt(2.0 * math.pi) * std)
-    total = rolled + SLIDES / error
+    total = rolled + slides / error
     part = rolled / total
     narrower = part * (1.0 - (1.0 - part) * off**2)
     return bank._replace(

@@ -76,3 +76,12 @@ def test_wheels_whose_sensors_are_dead_stop_no_train(lost_s: float) -> None:
     late = t_s > lost_s
     assert np.all(np.abs(error[late]) < 3.0 * std[late])
     assert np.min(speed[late]) > 4.0
+
+
+@pytest.mark.parametrize("back_mps2", [-0.55, -0.75])
+def test_wheels_that_all_roll_are_believed_of_a_brake_that_eases_unseen_and_comes_back(back_mps2: float) -> None:
+    """The gauge shows the same throughout, as that of the demand does while valves let go of cylinders."""
+    course = np.repeat([0.0, -0.55, -0.3, back_mps2], [400, 50, 50, 100])
+    t_s, _, error, _ = told(course)
+    assert t_s[-1] > 59.0
+    assert np.max(np.abs(error[t_s > 42.0])) < 0.3
