@@ -88,6 +88,20 @@ def test_a_dump_that_wheels_see_later_than_the_pressure_is_one(config: Config) -
     assert brake.demanded_pa > 0.9 * FULL_PA
 
 
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_what_cylinders_lack_of_the_demand_an_electric_brake_gives(config: Config, share: float) -> None:
+    """It builds up and lets go with the demand, as the cylinders would."""
+    brake, pressed = BrakeSeen(), []
+    for sample in sampled(lambda time: share * applying(time), 12.0):
+        brake = brake.after(config, [sample], FULL_PA if sample.t_ns - S < 6 * S else 0.0)
+        pressed.append(brake.applied_pa / FULL_PA)
+        assert not brake.has_slid(sample.t_ns)
+    assert pressed[5:55:10] == pytest.approx([0.25, 0.75, 1.0, 1.0, 1.0], abs=0.3)
+    assert pressed[58] == pytest.approx(1.0)
+    assert pressed[-1] == pytest.approx(share, abs=0.01)
+
+
 @pytest.mark.parametrize("every_ms", [50, 100, 200])
 @pytest.mark.parametrize("least_pa", [0.0, 40e3, 150e3])
 @pytest.mark.parametrize("period_s", [1.0, 2.0])
@@ -243,7 +257,7 @@ def test_the_handle_beside_a_cylinder_tells_what_is_demanded() -> None:
         if brake.dumped_ns is not None:
             assert brake.applied_pa == FULL_PA
         else:
-            assert brake.applied_pa == sample.pressure_pa
+            assert brake.applied_pa == pytest.approx(sample.pressure_pa)
     released = seen(CYLINDER, samples, 0.0)
     assert all(brake.demanded_pa == 0.0 for brake in released)
 

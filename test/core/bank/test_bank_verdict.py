@@ -113,6 +113,7 @@ def test_a_brake_is_said_to_limit_only_where_it_gives_what_is_demanded() -> None
     assert limits(HELD, 1.0) is Regime.BRAKE_LIMITED
     assert limits(HELD, 1.0, config=replace(CONFIG, pressure_kind="mean")) is Regime.BRAKE_LIMITED
     assert limits(HELD, 0.5) is Regime.COASTING
+    assert limits(HELD, 1.5) is Regime.COASTING, "another brake that no gauge shows"
 
 
 def test_whether_a_brake_weaker_than_a_film_limits_wheels_alone_can_tell() -> None:

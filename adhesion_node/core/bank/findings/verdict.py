@@ -107,6 +107,7 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
         return Regime.ADHESION_LIMITED
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake
     weak = config.train.full_brake <= SLIPPERY  # a film may give what such a brake asks for, to within its error
-    if share is None and slides < 1.0 - CLAIMED and part > 1.0 - error and not (dumps or weak):
+    near = 1.0 - error < part < 1.0 + 2.0 * error  # more than the brake can give is another one's
+    if share is None and slides < 1.0 - CLAIMED and near and not (dumps or weak):
         return Regime.BRAKE_LIMITED
     return Regime.COASTING

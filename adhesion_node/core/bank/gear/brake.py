@@ -77,10 +77,7 @@ class BrakeSeen(NamedTuple):
         empty = pressure < max(config.brake_threshold_pa, 1.0)
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
-            before_s = (t_ns - self.recent[-1].t_ns) / S if self.recent else 0.0
-            most = before_s * config.train.full_pressure_pa / config.brake_build_up_s
-            applied = self.applied_pa + min(max(pressure - self.applied_pa, -most), most) if self.recent else pressure
-            return BrakeSeen(recent, pressure, applied, None, full_ns)
+            return BrakeSeen(recent, pressure, self._following(config, sample, pressure), None, full_ns)
         lately = recent[bisect_left(recent, (t_ns - DUMP_NS,)) :]
         peak = max([each.pressure_pa for each in lately])
         dumped_ns = None if rolls else self.dumped_ns
@@ -100,7 +97,16 @@ class BrakeSeen(NamedTuple):
             applied = demanded  # the axles that roll are pressed as is asked of them
         elif config.pressure_kind == "mean" and pressure <= recent[0].pressure_pa * (1.0 + RISING_SHARE):
             applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
+        if demand_pa is not None:  # what cylinders lack of it an electric brake gives
+            applied = max(applied, self._following(config, sample, demand_pa))
         return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns)
+
+    def _following(self, config: Config, sample: PressureSample, demanded_pa: float) -> float:
+        """What presses by now of what is demanded, as the brake builds up and is released."""
+        if not self.recent:
+            return sample.pressure_pa
+        most = (sample.t_ns - self.recent[-1].t_ns) / S * config.train.full_pressure_pa / config.brake_build_up_s
+        return self.applied_pa + min(max(demanded_pa - self.applied_pa, -most), most)
 
     def has_slid(self, now_ns: int) -> bool:
         """Whether the slide protection has been at work of late."""
