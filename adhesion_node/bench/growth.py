@@ -21,9 +21,10 @@ from typing import Any
 import numpy as np
 
 from ..command.options import progress
+from ..core.bank.kernels import weighing
 from ..core.bank.layout import Bank
-from ..core.bank.motion import Braking, moved
-from ..core.bank.seeing import corrected, position_seen
+from ..core.bank.motion import Braking, moved, white_variances
+from ..core.bank.seeing import CLIPPED
 from ..core.config import Config
 from ..run.pipeline import Pipeline
 from .scene import SIGMA_M, journey
@@ -102,5 +103,5 @@ def _step_ms(count: int, seed: int) -> float:
     started = time.process_time()
     for _ in range(STEPS):
         ahead = moved(config, bank, 0.1, braking, SIGMA_M)
-        corrected(ahead, position_seen(ahead, position_m, SIGMA_M)).normalised()
+        weighing.placed(*ahead[:4], white_variances(SIGMA_M), position_m, CLIPPED)
     return 1e3 * (time.process_time() - started) / STEPS

@@ -19,8 +19,8 @@ from scipy.special import ndtr
 from ..physics.train import GRAVITY, Array
 from .kernels import weighing
 from .labels.kinds import SLIDES
-from .layout import BIAS, BRAKE, MU, OFFSET, PITCH, POSITION, ROUGH, SCALE, SPEED, Bank
-from .motion import BUILDING_UP, Braking, resistance, rolling_use, use, white_variance
+from .layout import BIAS, BRAKE, MU, PITCH, ROUGH, SCALE, SPEED, Bank
+from .motion import BUILDING_UP, Braking, resistance, rolling_use, use
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -30,7 +30,6 @@ CLIPPED = 3.5
 
 STEADY_ERROR, SWINGING = 0.002, 1.9
 """What an accelerometer feels beside what is used in the mean: over g, and over the swing of that."""
-
 
 ROLLED, SLID = (0.85, 1.15), (1.0, 0.9)
 """Parts of what the brake needs, and of what sliding axles use, between which adhesion lies where wheels roll or slide:
@@ -54,14 +53,6 @@ class Observation(NamedTuple):
         """Of each hypothesis."""
         same = isinstance(self.variance, float)
         return np.full(self.innovation.size, self.variance) if same else np.asarray(self.variance)
-
-
-def position_seen(bank: Bank, position_m: float, declared_m: float) -> Observation:
-    """A position, whose declared standard deviation is only a hint."""
-    slope = np.zeros(bank.mean.shape)
-    slope[:, POSITION] = slope[:, OFFSET] = 1.0
-    foreseen = bank.mean[:, POSITION] + bank.mean[:, OFFSET]
-    return Observation(position_m - foreseen, slope, white_variance(bank, declared_m))
 
 
 def speed_seen(bank: Bank, speed_mps: float, variance: float, scale: int = SCALE) -> Observation:

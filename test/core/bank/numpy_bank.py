@@ -38,7 +38,7 @@ from adhesion_node.core.bank.layout import (
     Mask,
     joined,
 )
-from adhesion_node.core.bank.motion import Braking, open_variance, resistance, slow_variance
+from adhesion_node.core.bank.motion import Braking, open_variance, resistance, slow_variance, white_variance
 from adhesion_node.core.bank.seeing import CLIPPED, ROLLED, Observation
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
@@ -130,6 +130,14 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     noise[:, BIAS] = motion.BIAS_DRIFT**2 * dt_s
     noise[:, RADIUS] = motion.RADIUS_DRIFT**2 * dt_s
     return lasting, noise
+
+
+def position_seen(bank: Bank, position_m: float, declared_m: float) -> Observation:
+    """A position, whose declared standard deviation is only a hint."""
+    slope = np.zeros(bank.mean.shape)
+    slope[:, POSITION] = slope[:, OFFSET] = 1.0
+    foreseen = bank.mean[:, POSITION] + bank.mean[:, OFFSET]
+    return Observation(position_m - foreseen, slope, white_variance(bank, declared_m))
 
 
 def corrected(bank: Bank, seen: Observation) -> Bank:

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from banks import CONFIG, FULL, FULL_PA, S, bank_of, braked_run, measurements
+from numpy_bank import position_seen
 from oracles import specific_resistance
 
 from adhesion_node.core.bank.findings.verdict import found
@@ -26,7 +27,7 @@ from adhesion_node.core.bank.labels.noises import LASTS
 from adhesion_node.core.bank.layout import BRAKE, MU, POSITION, SIZE, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking, moved
-from adhesion_node.core.bank.seeing import corrected, position_seen
+from adhesion_node.core.bank.seeing import corrected
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.train import Array

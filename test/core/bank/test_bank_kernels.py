@@ -79,7 +79,7 @@ def test_a_speed_below_0_and_a_standstill() -> None:
 
 @pytest.mark.parametrize("position_m", [500.0, 503.0, 540.0], ids=["near", "off", "clipped"])
 def test_a_correction(position_m: float) -> None:
-    seen = seeing.position_seen(BANK, position_m, 1.3)
+    seen = by_numpy.position_seen(BANK, position_m, 1.3)
     check(seeing.corrected(BANK, seen), by_numpy.corrected(BANK, seen))
     one = seen._replace(variance=0.4)
     check(seeing.corrected(BANK, one), by_numpy.corrected(BANK, one))
@@ -97,7 +97,7 @@ def test_how_far_a_position_is_off(position_m: float) -> None:
     assert ours.bank is not None
     for one, other in zip(ours.bank, bank, strict=True):
         np.testing.assert_array_equal(one, other)
-    seen = seeing.position_seen(bank, position_m, 1.3)
+    seen = by_numpy.position_seen(bank, position_m, 1.3)
     variance = np.einsum("hi,hij,hj->h", seen.slope, bank.covariance, seen.slope) + seen.variance
     mean = float(bank.weight @ seen.innovation)
     spread = float(bank.weight @ (variance + np.square(seen.innovation - mean)))

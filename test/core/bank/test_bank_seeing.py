@@ -16,6 +16,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from banks import FULL, bank_of
+from numpy_bank import position_seen
 from oracles import specific_resistance
 from scipy.stats import norm
 
@@ -30,7 +31,6 @@ from adhesion_node.core.bank.seeing import (
     acceleration_seen,
     corrected,
     fall_seen,
-    position_seen,
     speed_seen,
     wheels_seen,
 )
