@@ -18,11 +18,16 @@ from typing import Any
 
 import cdrs
 import numpy as np
+from rosbags.interfaces import QosDurability
 
 from adhesion_node.bag import BagWriter, Record
+from adhesion_node.bag.qos import RELIABLE
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
+
+LATCHED = RELIABLE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)
+"""Who subscribes late gets the last message."""
 
 
 def ros_class(type_name: str) -> type[Any]:

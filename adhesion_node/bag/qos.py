@@ -32,16 +32,13 @@ RELIABLE = Qos(
 )
 """Of a topic whose publishers are not known."""
 
-LATCHED = RELIABLE._replace(depth=1, durability=QosDurability.TRANSIENT_LOCAL)
-"""Who subscribes late gets the last message."""
-
 
 @lru_cache  # most channels say the same, and a file says it of each at least twice
 def parse(text: str) -> tuple[Qos, ...]:
     """Read the list that a channel of an MCAP file holds: by names since version 9, by numbers before.
 
-    >>> [qos.durability.name for qos in parse(str(profiles([LATCHED])))]
-    ['TRANSIENT_LOCAL']
+    >>> [qos.durability.name for qos in parse(str(profiles([RELIABLE])))]
+    ['VOLATILE']
     >>> parse(""), parse("- durability: 1")
     ((), ())
     """

@@ -22,12 +22,11 @@ import pytest
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 from rclpy.serialization import deserialize_message, serialize_message
-from recorded import S, filled, plain, ros_class, write_steps
+from recorded import LATCHED, S, filled, plain, ros_class, write_steps
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability
 from rosbags.rosbag2 import Reader
 
 from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize, typestore
-from adhesion_node.bag.qos import LATCHED
 from adhesion_node.bag.write.writer import file_name
 from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, RECORDED, WHEEL_SPEED
 

@@ -18,12 +18,12 @@ import cdrs
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
+from recorded import LATCHED
 from rosbags.rosbag2 import Reader
 from test_bag_damaged import index_of
 from test_recording_survives import file_size_limit
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
-from adhesion_node.bag.qos import LATCHED
 from adhesion_node.bag.types import Definition
 from adhesion_node.bag.write.writer import file_name
 from adhesion_node.tools import recover

@@ -132,8 +132,3 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
 def pruned(bank: Bank) -> Bank:
     """Without the unlikely, and with what says the same said once: it is united, the likelier one first."""
     return Bank(*uniting.pruned(bank[:], PRUNING[:]))
-
-
-def unlikely_kept(bank: Bank, least: float) -> Bank:
-    """With no hypothesis so unlikely that it could not come back."""
-    return bank.normalised(math.log(least))

@@ -18,7 +18,7 @@ import numpy as np
 
 from ..belief.rail import Rail
 from .blind import forwards, led_again, misled
-from .branching import branched, opened, pruned, unlikely_kept
+from .branching import branched, opened, pruned
 from .free import closed, mixed
 from .kernels import weighing
 from .labels.kinds import HELD, PASSING, SLIDES
@@ -78,7 +78,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
 
 def _coasted(memory: Memory) -> Memory:
     """No brake is applied: nothing is forgotten, and twice a second it is asked whether traction is steady."""
-    memory = memory._replace(bank=unlikely_kept(memory.bank, FORGOTTEN))
+    memory = memory._replace(bank=memory.bank.normalised(math.log(FORGOTTEN)))
     if not memory.asks:
         return memory
     return memory._replace(bank=mixed(memory.bank, memory.since_s), since_s=0.0)

@@ -94,11 +94,6 @@ def curve(
     return slowdown(train, speed_mps, target_mps, grade).curve(mu)
 
 
-def distance_to(braking: BrakingCurve, target_mps: float) -> float:
-    """Distance, m, along the curve to where the train reaches `target_mps` (0 when already slower)."""
-    return float(np.interp(-target_mps, -braking.speed_mps, braking.distance_m))
-
-
 def _require(**values: float) -> None:
     for name, value in values.items():
         if not math.isfinite(value) or value < 0:

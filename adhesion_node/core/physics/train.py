@@ -95,14 +95,6 @@ class Train:
         _, c1, c2 = self.resistance_si
         return c1 + 2.0 * c2 * speed_mps
 
-    def basic_resistance(self, speed_mps: Array) -> Array:
-        """Basic running resistance R1, N (6).
-
-        >>> round(float(CRH3.basic_resistance(np.array(300 * KMH))))
-        68602
-        """
-        return self.specific_resistance(speed_mps) * (self.mass_kg * GRAVITY)
-
     def specific_brake(self, pressure_pa: Real) -> Real:
         """Brake force per weight B/(M g), N/N, of a cylinder pressure in Pa, gauge.
 

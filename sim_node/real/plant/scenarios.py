@@ -130,10 +130,3 @@ SCENARIOS: Mapping[str, Scenario] = {
     )
 }
 """The scenarios by name."""
-
-
-def find(name: str) -> Scenario:
-    """Return the scenario of that name; ValueError listing the known ones when there is none."""
-    if name not in SCENARIOS:
-        raise ValueError(f"scenario = {name!r}: give one of {', '.join(SCENARIOS)}")
-    return SCENARIOS[name]

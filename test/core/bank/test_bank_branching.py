@@ -20,7 +20,7 @@ from oracles import specific_resistance
 from scipy.stats import norm
 
 from adhesion_node.core import Config, Measurement, finish, init, step
-from adhesion_node.core.bank.branching import LEAST, MOST, branched, opened, pruned, unlikely_kept
+from adhesion_node.core.bank.branching import LEAST, MOST, branched, opened, pruned
 from adhesion_node.core.bank.free import closed
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.judging import judged
@@ -197,7 +197,7 @@ def test_what_differs_is_not_united() -> None:
 
 def test_nothing_is_lost_for_good_while_coasting() -> None:
     bank = bank_of([0, 0], noises=[0, 1])._replace(log_weight=np.array([0.0, -500.0]))
-    kept = unlikely_kept(bank, 1e-5)
+    kept = bank.normalised(math.log(1e-5))
     assert is_normalised(kept)
     assert kept.weight[1] == pytest.approx(1e-5, rel=1e-4)
 

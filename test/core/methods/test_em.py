@@ -36,11 +36,11 @@ from adhesion_node.core.methods.particle_em.em import (
     Identified,
     ParticleEStep,
     Search,
-    gradient,
     identify,
     maximise,
 )
-from adhesion_node.core.methods.particle_em.kalman import filter_window
+from adhesion_node.core.methods.particle_em.kalman import filtered_by
+from adhesion_node.core.methods.particle_em.particles import given
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL, Grade, Track
 from adhesion_node.core.physics.train import CRH3
@@ -66,8 +66,13 @@ def _expected(used: ArrayLike, weight: ArrayLike, limit: ArrayLike) -> Expectati
     return Expectation(np.array((used, weight, limit)), 0.0, 0.0, 0.0)
 
 
+def gradient(expected: Expectation, mu: float) -> float:
+    """dQ/dmu (29)-(32) at `mu`: only I2 depends on mu, and only through the steps that adhesion limits."""
+    return float(np.sum(expected.weight * (expected.used - mu), where=expected.limit > mu))
+
+
 def _information(window: Window, mu: float) -> float:
-    return filter_window(SEEN.motion, PRIOR, window, mu).information
+    return filtered_by(given(SEEN.motion, PRIOR, window), mu).information
 
 
 def _best_mu(window: Window, limit: float = 0.0952) -> float:

@@ -21,8 +21,9 @@ from adhesion_node.core import Config
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.rail import ignorance
 from adhesion_node.core.belief.window import Window, WindowSample, window_of
-from adhesion_node.core.methods.particle_em.kalman import filter_window
+from adhesion_node.core.methods.particle_em.kalman import Filtered, filtered_by
 from adhesion_node.core.methods.particle_em.method import ParticleEm, ParticleWindow
+from adhesion_node.core.methods.particle_em.particles import given
 from adhesion_node.core.methods.protocol import Context
 from adhesion_node.core.physics.motion import Motion
 from adhesion_node.core.physics.track import LEVEL
@@ -30,6 +31,10 @@ from adhesion_node.core.physics.train import CRH3
 
 PRIOR = Gaussian(np.array([100.0, 80.0]), np.array([[0.09, 0.01], [0.01, 0.04]]))
 MODELS = pytest.mark.parametrize("model", [Linear(), Linear(c0=0.79, c1=0.3)], ids=["free", "affine resistance"])
+
+
+def filter_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Filtered:
+    return filtered_by(given(motion, prior, window), mu)
 
 
 def _uneven(window: Window, rng: np.random.Generator) -> Window:
@@ -48,7 +53,7 @@ def _uneven(window: Window, rng: np.random.Generator) -> Window:
 
 @MODELS
 @pytest.mark.parametrize("mu", [0.0, 0.05, 0.2])
-def test_filter_is_the_kalmanfilter_window(model: Linear, mu: float) -> None:
+def test_filter_is_the_kalman_filter(model: Linear, mu: float) -> None:
     rng = np.random.default_rng(2)
     window = _uneven(make_window(model, PRIOR, 0.07, rng), rng)
     filtered, exact = filter_window(model.motion, PRIOR, window, mu), rts(model, PRIOR, window, mu)

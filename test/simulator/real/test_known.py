@@ -11,6 +11,7 @@
 import numpy as np
 import pytest
 
+from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.wire.settings.setup import setup_of
 from sim_node.real import known
 from sim_node.real.plant.scenarios import SCENARIOS
@@ -24,7 +25,7 @@ def test_brake_mass_and_resistance_are_those_of_the_papers(name: str) -> None:
     heavier = train.mass_kg * (1.0 + train.rotating_mass_fraction)
     assert train.brake_force(nominal.full_pa) / heavier == pytest.approx(nominal.deceleration_mps2)
     c0, c1, c2 = nominal.resistance
-    assert train.basic_resistance(np.array(30.0)) == pytest.approx(c0 + 30.0 * c1 + 900.0 * c2)
+    assert train.specific_resistance(30.0) * train.mass_kg * GRAVITY == pytest.approx(c0 + 30.0 * c1 + 900.0 * c2)
 
 
 @pytest.mark.parametrize("name", ["leaves", "downhill_leaves", "tram_dry"])

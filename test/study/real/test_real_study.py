@@ -18,6 +18,7 @@ import pytest
 from tasks import computed_here
 
 from adhesion_node.command.running import Running
+from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.real import point_mass
 from adhesion_node.study.real.cases import CASES, chosen
@@ -60,9 +61,9 @@ def test_the_estimator_is_told_the_papers_and_not_the_truth() -> None:
         brake = config.train.brake_force(nominal.full_pa)
         assert brake == pytest.approx(nominal.brake_n)
         assert config.train.mass_kg == nominal.mass_kg
-        speed = np.array(20.0)
         c0, c1, c2 = nominal.resistance
-        assert config.train.basic_resistance(speed) == pytest.approx(c0 + c1 * 20.0 + c2 * 400.0)
+        resisting = config.train.specific_resistance(20.0) * nominal.mass_kg * GRAVITY
+        assert resisting == pytest.approx(c0 + c1 * 20.0 + c2 * 400.0)
         assert case.built_after_s > nominal.build_up_s
 
 

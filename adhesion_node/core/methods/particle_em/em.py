@@ -114,12 +114,6 @@ class Identified(NamedTuple):
     ess: float
 
 
-def gradient(expected: Expectation, mu: float) -> float:
-    """dQ/dmu (29)-(32) at `mu`: only I2 depends on mu, and only through the steps that adhesion limits."""
-    active = expected.limit > mu
-    return float(np.sum(expected.weight * (expected.used - mu), where=active))
-
-
 def maximise(expected: Expectation, lowest: float) -> float:
     """Adhesion of at least `lowest` that maximises Q, the goal of (33)."""
     return filtering.maximised(expected.statistics, float(lowest))[0]

@@ -13,11 +13,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ...belief.gaussian import Gaussian
-from ...belief.window import Window
-from ...physics.motion import Motion
 from ...physics.train import Array
 from ..kernels import filtering
-from .particles import given
 
 
 class Filtered(NamedTuple):
@@ -37,11 +34,6 @@ class Filtered(NamedTuple):
         return Gaussian(self.mean[index].copy(), self.covariance[index].copy())
 
 
-def filter_window(motion: Motion, prior: Gaussian, window: Window, mu: float) -> Filtered:
-    """Filter a window at an adhesion."""
-    return filtered_by(given(motion, prior, window), mu)
-
-
 def filtered_by(known: filtering.Given, mu: float) -> Filtered:
-    """The same where it is already put as the compiled loops need it."""
+    """Filter a window, put as the compiled loops need it, at an adhesion."""
     return Filtered(*filtering.tracked(known, float(mu)))
