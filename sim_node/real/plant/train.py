@@ -63,6 +63,8 @@ class Scatter:
     mass_std: float = 0.05
     resistance_std: float = 0.1
     pads_std: float = 0.05
+    rotating_std: float = 0.01
+    """Of the rotating mass over the mass."""
     mass: float | None = None
     """True mass over the nominal one, minus 1."""
     pads: float | None = None
@@ -109,7 +111,7 @@ def draw(nominal: Nominal, scatter: Scatter, rng: np.random.Generator) -> Train:
     resistance = around(scatter.resistance_std, -0.2, 0.2)
     pads = around(scatter.pads_std, -0.15, 0.15, scatter.pads)
     fade = around(scatter.pads_std, -0.15, 0.15)
-    rotating = nominal.rotating + around(0.01, -nominal.rotating, 0.08 - nominal.rotating)
+    rotating = nominal.rotating + around(scatter.rotating_std, -nominal.rotating, 0.08 - nominal.rotating)
     if scatter.rotating is not None:
         rotating = ones * scatter.rotating
     groups = nominal.groups

@@ -34,11 +34,11 @@ FAR_M, FAST_MPS = 1e3, 50.0
 """What is known beforehand of place and speed."""
 
 PITCH_STD = 0.029
-"""Of what an accelerometer feels too much as the nose dips under the brake, over what slows the train down: 0.3 to 1
-degree at 1.2 m/s^2, which no train's papers tell."""
+"""Of what an accelerometer feels too much as the nose dips under the brake, over what slows the train down: as the
+plant's trains differ, 0.3 to 1 degree at 1.2 m/s^2, which no train's papers tell."""
 
 WORN_STD = 0.0087
-"""Of the wheels' mean radius over that of new ones: up to 3 % are worn off."""
+"""Of the wheels' mean radius over that of new ones, as the plant's differ: up to 3 % are worn off."""
 
 HONEST = (Gnss, GnssFix, Speedometer, Imu, Wheels)
 """Sensors whose errors have a law. Of wheels it is told by how much each slides: what they err by else is noise."""

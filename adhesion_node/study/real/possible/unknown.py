@@ -38,9 +38,6 @@ POWER_STD = 0.06
 """What is known beforehand of the power of the speed: published laws fall with the powers 0 (a film of leaves) to 0.2
 (`wet`), what a train with slide protection uses with 0 to 0.06 in the plant."""
 
-ROTATING_STD = 0.01
-"""Of the rotating mass over the mass, in the plant."""
-
 DRAWN = 100
 """Profiles, where none is told."""
 
@@ -79,7 +76,7 @@ def unknown_of(course: Course, scenario: str) -> Unknown:
         (USUAL.pads_std, brakes, brakes),
         (USUAL.pads_std, over_speed * brakes, over_speed * brakes),
         (USUAL.resistance_std, nothing, resisting),
-        (-ROTATING_STD, nothing, turning),
+        (-USUAL.rotating_std, nothing, turning),
     ]
     own, all_in_all = (np.column_stack([std * each[index] for std, *each in of_train]) for index in (0, 1))
     grade = np.zeros((nothing.size, 0)) if told.grade is LEVEL or told.known_grade else _drawn(course, told)

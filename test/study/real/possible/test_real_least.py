@@ -31,7 +31,9 @@ from adhesion_node.study.real.possible.knowledge import (
     std_of_slowing,
 )
 from adhesion_node.study.real.possible.least import least
-from adhesion_node.study.real.possible.unknown import FACTOR_STD, POWER_STD, ROTATING_STD, STEP_S, Unknown, unknown_of
+from adhesion_node.study.real.possible.unknown import FACTOR_STD, POWER_STD, STEP_S, Unknown, unknown_of
+from sim_node.real.plant.scenarios import HIGH_SPEED
+from sim_node.real.plant.train import USUAL, draw, stack
 from sim_node.real.sensors.fitted import FITTED, Mounted
 from sim_node.real.sensors.imu import Imu
 from sim_node.real.sensors.position import Gnss
@@ -57,6 +59,12 @@ COURSE = Course(
 )
 NO_SWINGS = np.zeros(COUNT)
 TIMING = Timing(rate_hz=1.0 / STEP_S)
+
+
+def test_what_no_papers_tell_is_how_the_trains_of_the_plant_differ() -> None:
+    trains = stack([draw(HIGH_SPEED, USUAL, np.random.default_rng(seed)) for seed in range(4000)])
+    assert (GRAVITY * trains.pitch_rad_per_mps2).std() == pytest.approx(PITCH_STD, rel=0.03)
+    assert trains.radius_m.mean(axis=1).std() / HIGH_SPEED.wheel_radius_m == pytest.approx(WORN_STD, rel=0.03)
 
 
 def told(course: Course = COURSE, scenario: str = POINT_MASS) -> Course:
@@ -188,7 +196,7 @@ def test_a_perfect_speed_tells_what_slows_the_train_down_but_not_by_what() -> No
     assert std_of_slowing(train, 140, present(140), perfect, NO_SWINGS) < 1e-4 * 0.08
     resisting = (0.1**2 + 0.05**2) ** 0.5 * (3.5e3 + 110.0 * 30.0 + 9.0 * 30.0**2) / (380e3 * GRAVITY)
     left = std_of(train, 140, present(140), perfect, NO_SWINGS)
-    assert left == pytest.approx(np.hypot(ROTATING_STD * 0.08, resisting), rel=0.1)
+    assert left == pytest.approx(np.hypot(USUAL.rotating_std * 0.08, resisting), rel=0.1)
 
 
 def test_a_grade_that_is_not_told_hides_from_an_accelerometer_alone() -> None:
