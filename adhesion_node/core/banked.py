@@ -29,6 +29,9 @@ from .intake.samples import Measurement
 from .methods.protocol import Fit, Verdict
 from .state import State
 
+EARLY_S = 1e-3
+"""An estimate is told by a measurement that is so much too early, as stamps jitter; not by the next one."""
+
 LOST_S = 5.0
 """A wheel that slides loses no more than the way of so many seconds before it is told, and no receiver steps by more;
 further off is another place."""
@@ -127,7 +130,7 @@ def _accepted(
         since_estimate=state.since_estimate + 1,
     )
     since_s = math.inf if seen is None else (measurement.t_ns - seen.t_ns) * 1e-9
-    if since_s < config.estimate_s - 1e-3 or memory.fixes < 2:
+    if since_s < config.estimate_s - EARLY_S or memory.fixes < 2:
         return state, None
     return _told(config, state)
 

@@ -31,6 +31,13 @@ _unsure = partial(setting, group="what is not known well")
 _intake = partial(setting, group="intake")
 
 
+NOISE_S = 0.1
+"""Time over which the noise of the motion is told."""
+
+SWINGING_M, SHORTEST_M = 200.0, 20.0
+"""Length of the train whose `used_ripple` is told, and of one with as few axles as any."""
+
+
 @dataclass(frozen=True, slots=True)
 class Config:
     """Settings of the estimator; `Config()` is the default method at the nominal noise.
@@ -299,8 +306,8 @@ class Config:
 
     @property
     def ripple(self) -> float:
-        """`used_ripple` of this train, relative; of a shorter one than 20 m no more than of that."""
-        return self.used_ripple * math.sqrt(200.0 / max(self.train.length_m, 20.0))
+        """`used_ripple` of this train, relative; of a shorter one than `SHORTEST_M` no more than of that."""
+        return self.used_ripple * math.sqrt(SWINGING_M / max(self.train.length_m, SHORTEST_M))
 
     @property
     def grade_error(self) -> float:
@@ -315,11 +322,11 @@ class Config:
     @property
     def motion(self) -> Motion:
         """The train's state-space model with the configured noise."""
-        return Motion(self.train, self.track, self.position_noise_m**2 / 0.1, self.speed_noise_mps**2 / 0.1)
+        return Motion(self.train, self.track, self.position_noise_m**2 / NOISE_S, self.speed_noise_mps**2 / NOISE_S)
 
     def speed_noise_rate(self, braked: bool) -> float:
         """Variance rate of the tracker's speed, (m/s)^2/s."""
-        return self.braking_noise_mps**2 if braked else self.coasting_noise_mps**2 / 0.1
+        return self.braking_noise_mps**2 if braked else self.coasting_noise_mps**2 / NOISE_S
 
     def brake(self, pressure_pa: float | None) -> float:
         """Brake B/(M g) of a measured gauge pressure; 0 below the threshold, the assumed one without a measurement."""

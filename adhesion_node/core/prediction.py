@@ -20,6 +20,9 @@ from .physics.adhesion import AdhesionLaw
 from .physics.braking import BrakingCurve, Slowdown, slowdown
 from .physics.train import Train
 
+LEAST_EFFICIENCY = 1e-3
+"""A brake of which nothing may be counted on presses with so much of its force: a curve needs one."""
+
 
 class Prediction(NamedTuple):
     """An estimate and the emergency braking from there to a standstill."""
@@ -51,7 +54,7 @@ def predict(config: Config, estimate: Estimate) -> Prediction:
 def _cautious(config: Config) -> Train:
     """The train with the weakest brake that it may have."""
     weakest = max(1.0 - float(ndtri(config.confidence)) * config.brake_error, 0.0)
-    return replace(config.train, rigging_efficiency=max(config.train.rigging_efficiency * weakest, 1e-3))
+    return replace(config.train, rigging_efficiency=max(config.train.rigging_efficiency * weakest, LEAST_EFFICIENCY))
 
 
 def _expected(estimate: Estimate) -> float | AdhesionLaw:

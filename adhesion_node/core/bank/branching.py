@@ -49,14 +49,19 @@ LEAST_MU, LEAST_PART, LEAST_STD = 0.005, 0.1, 0.02
 STRONG = 0.03
 """Probability from which a hypothesis has others spring from it."""
 
-LESS, LESS_STD = (0.9, 0.6, 0.4, 0.25), 0.22
-"""Parts of what the brake needs that a rail may give on which axles begin to slide, each known so well."""
+LESS, LESS_STD, LESS_LEAST_STD = (0.9, 0.6, 0.4, 0.25), 0.22, 0.003
+"""Parts of what the brake needs that a rail may give on which axles begin to slide, each known so well: in proportion,
+and as adhesion, as a brake that hardly presses tells little of a rail."""
 
 PASSING_S, PASSED_S = 300.0, 3.0
 """A border of the rail comes once in that time, and the train takes so long to pass it."""
 
 CHANGE_S, BEND_S = 600.0, 60.0
 """Axles roll again, whatever the adhesion was, once in that time, and how it depends on speed changes."""
+
+REACHED = 0.98
+"""Part of what the brake presses with from which it no longer reaches the adhesion: the last axles slide no more, and a
+force that is 2 % less is told from the brake's own error by nothing."""
 
 RISING_S, RISES, STEADY_S, FELL_S, REACHED_S = 5.0, 2.0, 60.0, 0.5, 2.0
 """In such times axles begin to slide while the brake is applied harder, in so many build-ups of a slow brake, while it
@@ -115,11 +120,13 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         bend_s=BEND_S,
         begin_s=FELL_S if fell else rising_s if braking.rising else STEADY_S,
         reached_s=REACHED_S,
+        reached=REACHED,
         passing=PASSING,
         passing_s=PASSING_S,
         passed_s=PASSED_S,
         less=np.array(LESS[:1] if braking.rising and not fell else LESS),
         less_std=LESS_STD,
+        least_std=LESS_LEAST_STD,
         applied=float(braking.applied),
         told=float(braking.told),
         laws=law_priors(config),

@@ -20,6 +20,9 @@ from scipy.special import ndtr, ndtri
 
 from ..physics.train import Array
 
+BRAKES_SIGMA = 2.0
+"""Standard deviations above 0 from which adhesion brakes the train."""
+
 
 class Rail(NamedTuple):
     """Adhesion coefficient, its standard deviation and its one-sided lower bound."""
@@ -27,6 +30,11 @@ class Rail(NamedTuple):
     mu: float
     std: float
     lower: float
+
+    @property
+    def brakes(self) -> bool:
+        """Whether it brakes the train for certain; where no pressure is measured nothing else tells that it does."""
+        return self.mu > BRAKES_SIGMA * self.std
 
 
 def ignorance(low: float, std: float, lowest: float = math.inf) -> Rail:

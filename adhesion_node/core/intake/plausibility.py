@@ -25,8 +25,8 @@ STUCK_STEPS, LEAST_STUCK_M, MOST_STUCK_M = 2.0, 2.0, 10.0
 """A position that repeats itself to the bit comes in steps, and steps of d alone have the variance d^2/12. A train that
 must have gone so many of the greatest steps that the variance allows, within these bounds, has a stuck sensor."""
 
-STRONGEST_MPS2 = 3.0
-"""No train brakes harder."""
+STRONGEST_MPS2, SLOWER_SIGMA = 3.0, 3.0
+"""No train brakes harder, or is slower by more standard deviations than it was known to be."""
 
 KMH_PER_MPS, KMH_BAND, KMH_FROM_MPS = 3.6, 0.15, 5.0
 """A speed within this share of 3.6 times the estimate is one in km/h; told from this speed on."""
@@ -99,7 +99,7 @@ class Repeated(NamedTuple, Generic[Of]):
             return False
         before = self.before.estimate
         known_s = abs(self.since_ns - before.t_ns) * 1e-9
-        slowest = max(abs(before.speed_mps) - 3.0 * before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
+        slowest = max(abs(before.speed_mps) - SLOWER_SIGMA * before.speed_std_mps - STRONGEST_MPS2 * known_s, 0.0)
         return least_way(slowest, same_s) >= stuck_way(measurement.variance_m2)
 
 

@@ -213,7 +213,7 @@ def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) ->
         one = alike.part(np.array([np.argmax(alike.log_weight)]))
         most = float(one.mean[0, BRAKE]) * braking.applied
         spread = math.hypot(math.sqrt(one.covariance[0, MU, MU]), math.sqrt(one.covariance[0, BRAKE, BRAKE]) * most)
-        near = float(ndtr((one.mean[0, MU] - 0.98 * most) / max(spread, 1e-6)))
+        near = float(ndtr((one.mean[0, MU] - branching.REACHED * most) / max(spread, 1e-6)))
         prior = elapsed_s * (1.0 / branching.CHANGE_S + near / branching.REACHED_S)
         total = np.logaddexp.reduce(alike.log_weight) - one.log_weight
         found.append(one.with_fresh(ROUGH, 0.0, 0.0).labelled(HELD, 0, now_s, total + math.log(min(prior, 1.0))))
@@ -233,7 +233,7 @@ def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, 
             probability = np.interp(gives, (SLIPPERY, WET), priors)
             for kind in SLIDING:
                 likely = np.log(np.maximum(rate * probability * KINDS[kind].prior / share, 1e-300))
-                fresh = held.with_fresh(MU, gives, branching.LESS_STD * gives + 0.003)
+                fresh = held.with_fresh(MU, gives, branching.LESS_STD * gives + branching.LESS_LEAST_STD)
                 fresh = fresh.with_fresh(ROUGH, 0.0, _roughness(config, np.array([kind]))[0])
                 found.append(fresh.labelled(kind, law, now_s, likely).part(probability > 0.0))
     return found

@@ -35,6 +35,9 @@ EMPTY_NS = 3 * S // 2
 SLID_NS = 2 * S
 """So long behind a dump axles have slid of late."""
 
+LEFT = 0.1
+"""Part of the pressure that is left once a brake has let go: within `brake_build_up_s`, as it builds up."""
+
 SWING_SHARE = 0.03
 """Behind a dump the protection is at work as long as the pressure falls and rises, or rises and falls, by so much of
 what is demanded within a second: a driver's hand is steadier."""
@@ -130,7 +133,7 @@ def _falls(lately: Sequence[PressureSample], released_s: float = math.inf) -> bo
     now_ns, pressure_pa = lately[-1]
     return any(
         before_pa - pressure_pa
-        >= max(DUMP_PA, DUMP_SHARE * before_pa, before_pa * (1.0 - 0.1 ** ((now_ns - t_ns) / S / released_s)))
+        >= max(DUMP_PA, DUMP_SHARE * before_pa, before_pa * (1.0 - LEFT ** ((now_ns - t_ns) / S / released_s)))
         for t_ns, before_pa in lately
     )
 

@@ -35,6 +35,14 @@ LEAST_LEARNT = 20
 UNEQUAL = 0.01
 """By how much wheels of unknown wear may differ, beside creep."""
 
+UNSURE, ROLLING = 3.0, 2.0
+"""Standard deviations of the train's speed within which creep may be none; times the creep that slides below which an
+axle rolls for certain."""
+
+BY_CHANCE = 0.5
+"""The fastest of n rims is faster than their mean by chance: by sqrt(2 ln n) of their standard deviations at most, of
+two by 0.48 of that, of twelve by 0.73. Under the brake fewer than all roll."""
+
 UNLEARNT = 0.03
 """Error of all radii together of which nothing was learnt: wear."""
 
@@ -113,13 +121,13 @@ class WheelsSeen(NamedTuple):
             return wheels
         rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
         fastest = max((rim for rim in rims if not math.isnan(rim)), default=0.0)
-        unsure = 3.0 * std_mps / speed_mps
+        unsure = UNSURE * std_mps / speed_mps
         by_train, by_fastest = ([1.0 - rim / most for rim in rims] for most in (speed_mps, max(fastest, 1e-6)))
         slid, rolled = list(wheels.slid_ns), list(wheels.rolled_ns)
         for axle, (creep, behind) in enumerate(zip(by_train, by_fastest, strict=True)):  # never true of NaN
             if creep > config.sliding_creep + unsure or behind > config.sliding_creep + UNEQUAL:
                 slid[axle] = sample.t_ns
-            elif creep + unsure < 2.0 * config.sliding_creep:
+            elif creep + unsure < ROLLING * config.sliding_creep:
                 rolled[axle] = sample.t_ns
         return wheels._replace(slid_ns=tuple(slid), rolled_ns=tuple(rolled))
 
@@ -152,7 +160,7 @@ class WheelsSeen(NamedTuple):
 
     def fastest(self, rims: list[float]) -> float:
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
-        return max(rims) * (1.0 - 0.5 * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
+        return max(rims) * (1.0 - BY_CHANCE * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
 
     def beside(self, fastest_mps: float, now_ns: int) -> WheelsSeen:
         """Note how fast the fastest rim is under the brake; it may be trusted once it has risen, until it falls."""

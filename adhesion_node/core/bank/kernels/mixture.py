@@ -25,6 +25,14 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 GRAVITY = 9.8
+SLOWEST_MPS, LEAST_SLOWING = 1.0, 0.005
+"""The way to a standstill is that of a train which is so fast, and slows by so much over g, at least: it stays finite
+where a fall outweighs the brake."""
+TAIL, STEPS = 8.0, 60
+"""Standard deviations beyond which a Gaussian holds nothing, 6e-16 of it; steps to a root at most, as many as halve any
+bracket to the last bit."""
+STRAIGHT = 1e-3
+"""Relative growth below which its mean is taken as straight: exact to a part in 1e7, where the closed form cancels."""
 SPEED, MU, ROUGH, GRADE, SIZE = 1, 2, 3, 5, 11
 
 
@@ -79,7 +87,7 @@ def _quantile(weight: Array, mean: Array, std: Array, probability: float) -> flo
     """
     low, high, whole, centre, spread = np.inf, -np.inf, 0.0, 0.0, 0.0
     for h in range(weight.size):
-        low, high = min(low, mean[h] - 8.0 * std[h]), max(high, mean[h] + 8.0 * std[h])
+        low, high = min(low, mean[h] - TAIL * std[h]), max(high, mean[h] + TAIL * std[h])
         whole += weight[h]
         centre += weight[h] * mean[h]
         spread += weight[h] * (mean[h] ** 2 + std[h] ** 2)
@@ -91,13 +99,13 @@ def _quantile(weight: Array, mean: Array, std: Array, probability: float) -> flo
     x = centre + math.copysign(off, probability - 0.5) * math.sqrt(max(spread / whole - centre**2, 0.0))
     if not low < x < high:
         x = 0.5 * (low + high)
-    for _ in range(60):
+    for _ in range(STEPS):
         below, density, bend = 0.0, 0.0, 0.0
         for h in range(weight.size):
             z = (x - mean[h]) / std[h]
-            if z > 8.0:
+            if z > TAIL:
                 below += weight[h]
-            elif z > -8.0 and weight[h] > 0.0:
+            elif z > -TAIL and weight[h] > 0.0:
                 below += 0.5 * weight[h] * math.erfc(-z / math.sqrt(2.0))
                 each = weight[h] / std[h] * math.exp(-0.5 * z**2)
                 density += each
@@ -148,7 +156,7 @@ def _mean_ahead(relative: float) -> tuple[float, float]:
 @kernel
 def _grown(relative: float) -> float:
     """Mean along the way to a standstill of what grows by e to that until then."""
-    if abs(relative) < 1e-3:
+    if abs(relative) < STRAIGHT:
         return 1.0 + relative / 3.0
     return 2.0 * (math.expm1(relative) - relative) / relative**2
 
@@ -170,12 +178,12 @@ def counted_on(
     """
     count, mean, covariance = weight.size, bank.mean, bank.covariance
     middle, std = np.empty((speeds.size, count)), np.empty((speeds.size, count))
-    by, told = np.empty(SIZE), max(speeds[-1], 1.0)
+    by, told = np.empty(SIZE), max(speeds[-1], SLOWEST_MPS)
     for h in range(count):
         x, u, grade, k = mean[h], used.value[h], mean[h, GRADE], bank.kind[h]
         slope, slides = used.slope[h], used.slides[h]
-        speed = max(x[SPEED], 1.0)
-        slowing = GRAVITY * max(u + used.resisting[h] + grade, 0.005)
+        speed = max(x[SPEED], SLOWEST_MPS)
+        slowing = GRAVITY * max(u + used.resisting[h] + grade, LEAST_SLOWING)
         way_m, time_s = speed**2 / (2.0 * slowing), speed / slowing
         per_mps = 2.0 * slowing / GRAVITY / told  # of the adhesion that a train so much faster needs for the same way
         rough_kept, rough_added = _mean_ahead(way_m * rule.fading[k, 0] + time_s * rule.fading[k, 1])

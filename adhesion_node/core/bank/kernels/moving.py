@@ -31,6 +31,8 @@ StepNumbers = tuple[float, float, float, bool, float, float, float]
 GRAVITY = 9.8
 LEAST_MU = 0.03
 """Adhesion drifts in proportion to itself, from this on: else one that was believed to be 0 would stay so."""
+LEAST_MPS = 0.1
+"""What fades along the way fades as if the train were so fast at least: it may be, where it is believed to stand."""
 POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, RADIUS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10, 11
 
 
@@ -149,7 +151,7 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         resisting, basic = _resistance(model, x[POSITION], v), _basic(model, v)
         u, _, by_mu, by_rough, by_brake, by_speed = _used(model, x, k, resisting, step)
         slower = v - dt * GRAVITY * (u + resisting + x[GRADE])
-        way_m = max(v, 0.1) * dt
+        way_m = max(v, LEAST_MPS) * dt
         if model.free[k] > 0.0:
             lasting[MU] = math.exp(-dt / model.free[k])
             added[MU] = model.free_std**2 * (1.0 - lasting[MU] ** 2)

@@ -48,6 +48,8 @@ class Rule(NamedTuple):
     """Time in which axles begin to slide."""
     reached_s: float
     """Time in which axles roll that the brake no longer makes slide."""
+    reached: float
+    """Part of what the brake presses with from which adhesion is no longer reached by it."""
     passing: int
     """Kind of a rail whose border the train passes."""
     passing_s: float
@@ -57,7 +59,9 @@ class Rule(NamedTuple):
     less: Array
     """Parts of what the brake needs that a rail may give on which axles begin to slide."""
     less_std: float
-    """How well each of them is known, relative."""
+    """How well each of them is known, relative, ..."""
+    least_std: float
+    """... and how badly at least, as adhesion."""
     applied: float
     told: float
     laws: Array
@@ -118,7 +122,7 @@ def _rolling(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, 
             x, p = bank.mean[best], bank.covariance[best]
             reach = x[BRAKE] * rule.applied
             spread = math.hypot(math.sqrt(p[MU, MU]), math.sqrt(p[BRAKE, BRAKE]) * reach)
-            off = (x[MU] - 0.98 * reach) / max(spread, 1e-6)
+            off = (x[MU] - rule.reached * reach) / max(spread, 1e-6)
             near = 0.5 * math.erfc(-off / math.sqrt(2.0))
             prior = rule.elapsed_s * (1.0 / rule.change_s + near / rule.reached_s)
             rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = best, 0, HELD, ROLLS
@@ -186,5 +190,5 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
             _fresh(x, p, ROUGH, 0.0, rule.sliding[kind[row], 0])
         if new >= SLIDES:
             gives = rule.less[new - SLIDES] * needed[parent[row]]
-            _fresh(x, p, MU, gives, rule.less_std * gives + 0.003)
+            _fresh(x, p, MU, gives, rule.less_std * gives + rule.least_std)
     return mean, covariance, weight[:size].copy(), bank.noise[parent], law, kind, born, changed

@@ -29,15 +29,20 @@ if TYPE_CHECKING:
 
 S = 1_000_000_000
 
-LOOKS_S, SIGMA = (3.0, 1.5), 5.0
-"""Times over which positions are looked at, and the standard deviations beyond which no train brakes so: twice a second
-for minutes four come by chance."""
+LOOKS_S, SPANNED, SIGMA = (3.0, 1.5), 0.8, 5.0
+"""Times over which positions are looked at, the part of one that they must span, as the error is reckoned for all of
+it, and the standard deviations beyond which no train brakes so: twice a second for minutes four come by chance."""
 
 SPAN_NS, LEAST = round(max(LOOKS_S) * S), 8
 """Time of the positions that are kept, and how many must be looked at together."""
 
-BRAKE_ERROR, RESISTANCE_ERROR = 1.15, 1.2
-"""Factors on the full brake and the running resistance that are still possible."""
+BRAKE_ERROR, RESISTANCE_ERROR, GRADE_SIGMA = 1.15, 1.2, 2.0
+"""Factors on the full brake and the running resistance that are possible, and standard deviations of the grade."""
+
+WHITE, WANDERING = 720.0, 34.0
+"""Variance of the deceleration of a parabola through n positions over a time T: so many times that of white errors over
+n T^4, or that of errors which wander, over the time that they last and T^3. At the part u of the time a position weighs
+360 (u^2 - u + 1/6)/T^2: the mean square of that is 720/T^4, the one of its integral, twice, 240/7."""
 
 ALIKE_S, FAR, ALIKE, SAMPLES = 1.0, 3.2, 2.5, 4.0
 """Over such a time the product of deviations that follow each other, in standard deviations by the hypothesis nearest
@@ -90,7 +95,7 @@ class Course(NamedTuple):
         speed = max(bank.mean_of(SPEED), 0.0)
         brake = config.train.full_brake
         c0, c1, c2 = config.train.resistance_si
-        grade = 2.0 * config.grade_error
+        grade = GRADE_SIGMA * config.grade_error
         most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * (c0 + speed * (c1 + c2 * speed)) + grade)
         newest_ns, newest_m = self.recent[-1]
         time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
@@ -99,7 +104,7 @@ class Course(NamedTuple):
         for span_s in LOOKS_S:
             first = int(time.searchsorted(-span_s))
             count = time.size - first
-            if count < LEAST or time[first] > -0.8 * span_s:
+            if count < LEAST or time[first] > -SPANNED * span_s:
                 continue
             slowing = -2.0 * parabola.curvature(time[first:], places[first:])
             error = SIGMA * _error(white, slow, span_s, count)
@@ -125,4 +130,4 @@ def _wandering(declared_m: float) -> tuple[float, ...]:
 
 def _error(white: float, slow: float, span_s: float, count: int) -> float:
     """Standard deviation of the parabola's deceleration, m/s^2, by white errors and by the worst that wander."""
-    return math.sqrt(720.0 * white / (count * span_s**4) + 34.0 * slow / span_s**3)
+    return math.sqrt(WHITE * white / (count * span_s**4) + WANDERING * slow / span_s**3)

@@ -17,9 +17,9 @@ FORWARD_MPS2, BACKWARD_MPS2, MEAN_S, MEAN_SIGMA = 0.2, 0.1, 1.0, 3.0
 """What an accelerometer feels under the brake in the mean over such a time, beyond its noise, once it is turned round,
 and once it is seen not to be."""
 
-STILL_S, LEAST_STILL_S, WATCHED_S = 2.0, 0.3, 5.0
+STILL_S, LEAST_STILL_S, WATCHED_S, STILLER = 2.0, 0.3, 5.0, 3.0
 """No accelerometer shows the same to the bit for so long under the brake. One that was watched for so long before the
-brake, and whose noise made it differ, does not for more than this, and three times what it did then."""
+brake, and whose noise made it differ, does not for more than this, and so many times what it did then."""
 
 
 class Pointing(NamedTuple):
@@ -49,7 +49,7 @@ class Pointing(NamedTuple):
     @property
     def repeats(self) -> bool:
         """Whether it shows the same for longer than it is used to."""
-        return self.still_s > min(3.0 * self.longest_s if self.watched_s > WATCHED_S else STILL_S, STILL_S)
+        return self.still_s > min(STILLER * self.longest_s if self.watched_s > WATCHED_S else STILL_S, STILL_S)
 
     @property
     def is_still(self) -> bool:

@@ -42,6 +42,9 @@ PIVOT, NEAR, FAR, RIGHT, BORDER = 0, 1, 2, 3, 4
 WEIGHT_TOLERANCE = 1e-2
 """Change of a measurement's weight below which it has converged; what is left moves kappa by far less than sigma."""
 
+BELOW = 0.98
+"""Part of the brake's limit at which a search for kappa begins at most: from the limit on no step tells of it."""
+
 LIMIT_TOLERANCE = 1e-3
 """Relative width of the interval in which kappa is known to end at the brake's limit: bisection stops there."""
 
@@ -273,7 +276,7 @@ def _begun(given: Given, kappa: float, near: Array) -> tuple[Array, float]:
     trajectory[:known] = near
     s, v = near[known - 1, 0], near[known - 1, 1]
     resisting, (adhesion, _) = _resistance(given, s, v), _law(given, v)
-    kappa = min(kappa, 0.98 * _limit(given, window[APPLIED].max(), resisting) / adhesion)
+    kappa = min(kappa, BELOW * _limit(given, window[APPLIED].max(), resisting) / adhesion)
     for k in range(known - 1, window.shape[1]):
         used = min(kappa * adhesion, _limit(given, window[APPLIED, k], resisting))
         slower = v - GRAVITY * window[DT, k] * (used + resisting)

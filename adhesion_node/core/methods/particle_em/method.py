@@ -95,7 +95,7 @@ def judge(config: Config, identification: Identification, limit: float, context:
     """What the window shows, no brake, the brake's limit, or the adhesion, and what is known of the rail then."""
     before = context.rail
     learnt = learn(before, identification, float(ndtri(config.confidence)))
-    if not context.pressure_measured and learnt.mu <= 2.0 * learnt.std:
+    if not (context.pressure_measured or learnt.brakes):
         return Regime.COASTING, before
     if identification.kept > config.undecided_start_share:
         return Regime.COASTING, learnt

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from ...config import Config
 
 
+ROLLING = 0.5
+"""Part of the creep that slides below which wheels roll, in the median; between the two they tell nothing."""
+
+
 def most_used(config: Config, samples: Sequence[WindowSample], speeds_mps: Array, mu: float) -> float:
     """The most that the brake can use at the newest sample, as far as the wheels do not tell better.
 
@@ -41,7 +45,7 @@ def most_used(config: Config, samples: Sequence[WindowSample], speeds_mps: Array
     typical = float(np.median(measured))
     if typical >= config.sliding_creep:
         return math.inf
-    return mu if typical < 0.5 * config.sliding_creep else samples[-1].brake
+    return mu if typical < ROLLING * config.sliding_creep else samples[-1].brake
 
 
 def judge(

@@ -97,7 +97,7 @@ class RailCondition:
             following = _following(config, window, branches)
         limit = most_used(config, window.samples, leading.smoothed.trajectory[:, 1], leading.now.mu)
         regime, rail = judge(config, now, context.rail, following.known, limit)
-        if not context.pressure_measured and rail.mu <= 2.0 * rail.std:
+        if not (context.pressure_measured or rail.brakes):
             regime, rail = Regime.COASTING, context.rail
         fit = Fit(
             window=len(window.samples),
