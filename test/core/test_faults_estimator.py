@@ -20,13 +20,13 @@ import messages
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
+from estimator_line import FAST, Line
 from faulty import READERS, S
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from std_srvs.srv import SetBool, Trigger
-from test_estimator_node import FAST, Line
 
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.run.pipeline import Pipeline

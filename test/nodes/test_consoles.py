@@ -16,11 +16,11 @@ from collections.abc import Callable
 import messages
 import pytest
 from conftest import SpinUntil
+from monitor_line import curve, state
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from test_atp_monitor import curve, state
 
 from adhesion_node.nodes import atp_monitor
 from adhesion_node.nodes.atp_monitor import AtpMonitor

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
+from estimator_line import Line, samples
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from test_estimator_node import Line, samples
 from test_faults_monitor import QUIET, Train, known
 
 from adhesion_node.core.atp.supervision import Level

@@ -6,118 +6,40 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The estimator as a node: live equals offline to the bit, and what it says to good and bad messages."""
+"""The estimator as a node: live equals offline to the bit, its results agree, its parameters reach it."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import messages
-import numpy as np
 import pytest
 from conftest import SpinUntil
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
+from estimator_line import FAST, Line, S, estimating, offline_digest, samples
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from windowed import Failing
 
 from adhesion_node.core import Config, predict
 from adhesion_node.core.intake.samples import PositionSample, PressureSample, SpeedSample, WheelSample
 from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.nodes import estimator
 from adhesion_node.nodes.estimator import PARAMETERS, Estimator
-from adhesion_node.nodes.ros import qos, types
+from adhesion_node.nodes.ros import types
 from adhesion_node.run.pipeline import Pipeline
 from adhesion_node.wire import topics
 from adhesion_node.wire.line import ATMOSPHERE_PA
 from adhesion_node.wire.settings.setup import setup_of
-from adhesion_node.wire.topic import Topic
-from sim_node.train import scenario
-from sim_node.train.plant import Truth
-from sim_node.train.run import run
-from sim_node.train.sensors import Reading
-
-S = 10**9
-FAST = {"iterations": 3, "particles": 10}
-"""EM that is quick rather than good: these tests compare runs, not accuracy."""
 
 CURVES = (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)
-
-Sample = tuple[Truth, Reading]
-
-
-@dataclass
-class Line:
-    """An estimator, a driver that publishes sensors and listens to everything."""
-
-    executor: SingleThreadedExecutor
-    spin_until: SpinUntil
-    estimator: Estimator
-    driver: Node
-    heard: dict[Topic, list[Any]] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self.outputs = {topic: qos.advertise(self.driver, topic) for topic in self.estimator.inputs}
-        for topic in (*topics.RESULTS, topics.DIAGNOSTICS):
-            self.heard[topic] = []
-            qos.subscribe(self.driver, topic, self.heard[topic].append, qos.RESULT)
-        self.executor.add_node(self.estimator)
-        self.executor.add_node(self.driver)
-        self.spin_until(self.executor, self._matched)
-
-    def _matched(self) -> bool:
-        listening = all(output.get_subscription_count() for output in self.outputs.values())
-        return listening and all(self.estimator.count_subscribers(topic.name) for topic in self.heard)
-
-    def send(self, topic: Topic, message: Any) -> None:
-        before = self.estimator.heard[topic]
-        self.outputs[topic].publish(message)
-        self.spin_until(self.executor, lambda: self.estimator.heard[topic] > before)
-
-    def send_sample(self, reading: Reading) -> None:
-        self.send(topics.BRAKE_PRESSURE, messages.brake_pressure(reading.t_ns, reading.pressure_pa, 0.0))
-        if reading.position_m is not None:
-            self.send(topics.POSITION, messages.position(reading.t_ns, reading.position_m, 0.5))
-
-    def hear_all(self) -> None:
-        sent = self.estimator.published
-        self.spin_until(self.executor, lambda: all(len(heard) == sent[topic] for topic, heard in self.heard.items()))
-
-    def values(self) -> dict[str, str]:
-        status = self.heard[topics.DIAGNOSTICS][-1].status[0]
-        return {pair.key: pair.value for pair in status.values}
 
 
 @pytest.fixture
 def line(context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Line:
-    overrides = [Parameter(name, value=value) for name, value in FAST.items()]
-    return Line(
-        executor,
-        spin_until,
-        Estimator(context=context, parameter_overrides=overrides),
-        Node("driver", context=context),
-    )
-
-
-def samples(name: str, begin_s: float, end_s: float) -> Iterator[Sample]:
-    found = scenario.find(name)
-    return (sample for sample in run(found, 0.1, 1) if begin_s * 1e9 <= sample[0].t_ns < end_s * 1e9)
-
-
-def offline_digest(readings: list[Reading]) -> str:
-    pipeline = Pipeline(setup_of(FAST).config, 1)
-    for reading in readings:
-        pipeline.push(PressureSample(reading.t_ns, reading.pressure_pa - ATMOSPHERE_PA))
-        if reading.position_m is not None:
-            pipeline.push(PositionSample(reading.t_ns, reading.position_m, 0.25))
-    pipeline.finish()
-    return pipeline.digest
+    return estimating(context, executor, spin_until)
 
 
 def test_live_equals_offline_to_the_bit(line: Line) -> None:
@@ -188,92 +110,6 @@ def test_every_result_says_the_same_of_one_instant(line: Line) -> None:
     )
 
 
-def test_bad_messages_are_dropped_counted_and_change_nothing(line: Line) -> None:
-    readings = [reading for _, reading in samples("tunnel_entry", 15.0, 24.0)]
-    for index, reading in enumerate(readings):
-        line.send_sample(reading)
-        if index == 40:
-            for message in bad_positions(reading.t_ns + 1):
-                line.send(topics.POSITION, message)
-            gauge = messages.brake_pressure(reading.t_ns + 1, 410.0, 0.0)
-            line.send(topics.BRAKE_PRESSURE, gauge)
-    line.estimator.close()
-    line.hear_all()
-    values = line.values()
-    assert {key: value for key, value in values.items() if key.startswith("dropped.")} == {
-        "dropped.WRONG_FRAME": "2",
-        "dropped.NOT_FINITE": "2",
-        "dropped.BAD_VARIANCE": "2",
-        "dropped.IMPLAUSIBLE_POSITION": "1",
-        "dropped.IMPLAUSIBLE_PRESSURE": "1",
-    }
-    assert line.estimator.digest == offline_digest(readings)
-
-
-def bad_positions(t_ns: int) -> Iterator[Any]:
-    for frame in ("map", ""):
-        message = messages.position(t_ns, 10.0, 0.5)
-        message.header.frame_id = frame
-        yield message
-    for position in (float("nan"), float("inf"), 1e9):
-        yield messages.position(t_ns, position, 0.5)
-    for variance in (1e300, -1.0):
-        message = messages.position(t_ns, 10.0, 0.5)
-        message.pose.covariance[0] = variance
-        yield message
-
-
-def test_the_first_refusal_is_said_with_its_remedy(line: Line) -> None:
-    message = messages.position(10**9, 10.0, 0.5)
-    message.header.frame_id = "map"
-    line.send(topics.POSITION, message)
-    line.hear_all()
-    heard: list[DiagnosticArray] = line.heard[topics.DIAGNOSTICS]
-    (status,) = heard[-1].status
-    assert status.level == DiagnosticStatus.WARN
-    assert "header.frame_id = 'map', frame = 'track': set header.frame_id" in status.message
-
-
-def test_a_window_whose_numbers_fail_is_told(
-    context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    overrides = [Parameter("method", value="rail_condition")]
-    node = Estimator(context=context, parameter_overrides=overrides)
-    failing = Failing(np.linalg.LinAlgError("singular"), at=1)
-    node.pipeline.state = node.pipeline.state._replace(method=failing)
-    line = Line(executor, spin_until, node, Node("driver", context=context))
-    for _, reading in samples("tunnel_entry", 15.0, 21.5):
-        line.send_sample(reading)
-    line.hear_all()
-    told = [message.status[0] for message in line.heard[topics.DIAGNOSTICS]]
-    assert any("(singular): the numbers of a window failed" in status.message for status in told)
-    assert line.values()["dropped.FAILED"] == "1"
-
-
-def test_what_the_journey_teaches_is_told_with_its_standard_deviation(line: Line) -> None:
-    for _, reading in samples("cruise", 0.0, 2.0):
-        if reading.position_m is not None:
-            line.send(topics.POSITION, messages.position(reading.t_ns, reading.position_m, 0.5))
-    line.hear_all()
-    values = line.values()
-    free = float(values["probability.free"]) + float(values["probability.steady"])
-    assert float(values["brake_factor"]) == 1.0
-    assert free == pytest.approx(1.0, abs=1e-4)  # each is told to five digits
-    for name in ("brake_factor", "grade_residual", "position_error", "speed_scale_error", "acceleration_bias"):
-        assert float(values[f"{name}_std"]) > 0.0
-        assert abs(float(values[name])) < 3.0
-
-
-def test_a_missing_brake_pressure_is_said(line: Line) -> None:
-    for _, reading in samples("cruise", 0.0, 2.0):
-        if reading.position_m is not None:
-            line.send(topics.POSITION, messages.position(reading.t_ns, reading.position_m, 0.5))
-    line.hear_all()
-    (status,) = line.heard[topics.DIAGNOSTICS][-1].status
-    assert status.level == DiagnosticStatus.WARN
-    assert status.message.startswith("no brake pressure: mu is what slows the train")
-
-
 def test_a_combination_out_of_range_is_refused_at_start(context: Context) -> None:
     overrides = [Parameter("window", value=5), Parameter("step", value=10)]
     with pytest.raises(ValueError, match="step = 10: choose less than the window, 5"):
@@ -293,21 +129,6 @@ def test_parameters_reach_the_configuration(context: Context) -> None:
     assert config.low_adhesion == "wet"
     assert len({spec.name for spec in PARAMETERS}) == len(PARAMETERS)
     node.destroy_node()
-
-
-def test_two_clocks_in_one_topic_are_told(line: Line) -> None:
-    """Positions of a second source, 4000 s ahead: each is counted, /diagnostics names the sensor and its distance."""
-    for _, reading in samples("tunnel_entry", 15.0, 18.0):
-        line.send_sample(reading)
-        assert reading.position_m is not None
-        line.send(topics.POSITION, messages.position(reading.t_ns + 4000 * S, reading.position_m, 0.5))
-    line.hear_all()
-    told = [array.status[0].message for array in line.heard[topics.DIAGNOSTICS]]
-    assert any("PositionSample" in text and "s from all others" in text for text in told)
-    values = line.values()
-    assert int(values["dropped.STRAY"]) >= 25
-    assert values["resets"] == "0"
-    assert line.estimator.latest is not None
 
 
 def test_silence_ends_the_wait_for_a_pressure(line: Line) -> None:

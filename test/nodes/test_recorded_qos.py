@@ -21,9 +21,9 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSProfile
+from recorders import stamped
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import Reader
-from test_recorder import stamped
 
 from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.bag.qos import FOREVER

@@ -17,7 +17,7 @@ from conftest import SpinUntil
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.parameter import Parameter
-from test_recorder import S, clock, simulated, stamped, start
+from recorders import S, clock, simulated, stamped, start
 
 from adhesion_node.bag import BagReader, select_from
 from adhesion_node.nodes import recorder, waiting

@@ -6,72 +6,31 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Replay to topics: every byte arrives, /clock rises, pace, remapping, what is missing, the program itself."""
+"""Replay to topics: every byte arrives, /clock rises, pace, remapping, what is missing, what is refused."""
 
 from __future__ import annotations
 
-import json
-import os
-import re
 import subprocess
 import sys
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
 
 import cdrs
 import pytest
 from conftest import SpinUntil
-from messages import message_class
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
-from rclpy.node import Node
-from rclpy.qos import HistoryPolicy, QoSProfile, ReliabilityPolicy
 from recorded import write_steps
+from replays import UNLIMITED, Listener, S, of
 from rosbags.rosbag2 import StoragePlugin, Writer
+from test_replay_waits import turned_by_hand
 
-from adhesion_node.bag import BagReader, BagWriter, Record, select, serialize, typestore
+from adhesion_node.bag import BagReader, BagWriter, select, serialize, typestore
 from adhesion_node.command.options import DONE
-from adhesion_node.nodes import acknowledged, player, replay
+from adhesion_node.nodes import replay
 from adhesion_node.nodes.player import Replay
-from adhesion_node.nodes.ros import discovery, runtime
-from adhesion_node.nodes.ros.qos import SENSOR_SUBSCRIPTION, subscribe
+from adhesion_node.nodes.ros import runtime
 from adhesion_node.wire.topic import Topic
-from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, MU, POSITION, TRUTH_MU
-
-S = 10**9
-UNLIMITED = QoSProfile(history=HistoryPolicy.KEEP_ALL, depth=1, reliability=ReliabilityPolicy.RELIABLE)
-
-
-class Listener(Node):
-    """Keeps the raw bytes of each topic in the order of arrival, and the times of /clock."""
-
-    def __init__(self, context: Context, *topics: Topic, profile: QoSProfile = SENSOR_SUBSCRIPTION) -> None:
-        super().__init__("listener", context=context)
-        self.heard: list[tuple[str, bytes]] = []
-        self.clock: list[int] = []
-        for topic in topics:
-            self._listen(topic, profile)
-        subscribe(self, CLOCK, self._on_clock, profile)
-
-    def _listen(self, topic: Topic, profile: QoSProfile) -> None:
-        def keep(cdr: bytes) -> None:
-            self.heard.append((topic.name, cdr))
-
-        self.create_subscription(message_class(topic), topic.name, keep, profile, raw=True)
-
-    def _on_clock(self, message: Any) -> None:
-        self.clock.append(message.clock.sec * S + message.clock.nanosec)
-
-    def of(self, topic: Topic) -> list[bytes]:
-        return [cdr for name, cdr in self.heard if name == topic.name]
-
-
-def of(written: list[Record], topic: str) -> list[bytes]:
-    return [record.cdr for record in written if record.topic == topic]
+from adhesion_node.wire.topics import BRAKE_PRESSURE, MU, POSITION, TRUTH_MU
 
 
 @pytest.mark.parametrize("rate", [0.0, 20.0])
@@ -110,36 +69,6 @@ def test_the_rate_is_kept(tmp_path: Path, context: Context, monkeypatch: pytest.
     assert node.finished
 
 
-def turned_by_hand(monkeypatch: pytest.MonkeyPatch) -> list[int]:
-    """Return the time of the player's clock, ms, in a list to be changed."""
-    now_ms = [5000]
-    for module in (player, discovery):
-        monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=lambda: now_ms[0] / 1000))
-    return now_ms
-
-
-def test_a_machine_that_is_held_up_is_given_more_time_for_its_discovery(
-    tmp_path: Path,
-    context: Context,
-    executor: SingleThreadedExecutor,
-    spin_until: SpinUntil,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Three ticks a second: not even the longest wait for a subscriber ends the wait for the others."""
-    now_ms = turned_by_hand(monkeypatch)
-    write_steps(tmp_path / "bag", 2)
-    executor.add_node(Listener(context, POSITION))
-    with BagReader(tmp_path / "bag") as reader:
-        node = Replay(reader, select(reader.topics), 0.0, context=context)
-        spin_until(executor, lambda: node.count_subscribers("/position") == 1)
-        begun = []
-        for now_ms[0] in range(5000, 5000 + 300 * (discovery.SETTLE_LOOKS + 3), 300):
-            node.tick()
-            begun.append(node.published["/position"] > 0)
-        node.destroy_node()
-    assert begun.index(True) == discovery.SETTLE_LOOKS + 1
-
-
 def test_recorded_results_are_not_replayed_and_truth_is(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
@@ -176,39 +105,6 @@ def test_names_follow_the_remapping_and_the_namespace(
     assert [cdr for _, cdr in listener.heard] == positions
 
 
-def test_it_waits_for_a_subscriber_and_then_misses_nothing(
-    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    written = write_steps(tmp_path / "bag", 5)
-    with BagReader(tmp_path / "bag") as reader:
-        node = Replay(reader, select(reader.topics), 0.0, context=context)
-        executor.add_node(node)
-        for _ in range(50):
-            executor.spin_once(timeout_sec=0.01)
-        assert not node.published
-        listener = Listener(context, POSITION, BRAKE_PRESSURE)
-        executor.add_node(listener)
-        spin_until(executor, lambda: len(listener.heard) == len(written))
-
-
-def test_waiting_for_subscribers_is_bounded(
-    tmp_path: Path,
-    context: Context,
-    executor: SingleThreadedExecutor,
-    spin_until: SpinUntil,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.setattr(player, "SUBSCRIBERS_S", 0.3)
-    write_steps(tmp_path / "bag", 5)
-    with BagReader(tmp_path / "bag") as reader:
-        node = Replay(reader, select(reader.topics), 0.0, context=context)
-        executor.add_node(node)
-        spin_until(executor, lambda: node.finished)
-    assert node.published["/position"] == 5
-    assert "/position: fewer than 1 subscribers after 0.3 s: replaying all the same" in capfd.readouterr().err
-
-
 @pytest.mark.parametrize("rate", [-1.0, float("nan"), float("inf")])
 def test_a_bad_rate_is_refused(tmp_path: Path, context: Context, rate: float) -> None:
     write_steps(tmp_path / "bag", 1)
@@ -217,85 +113,6 @@ def test_a_bad_rate_is_refused(tmp_path: Path, context: Context, rate: float) ->
         pytest.raises(ValueError, match=r"rate = .*: give a finite factor, or 0"),
     ):
         Replay(reader, {"/position": "position"}, rate, context=context)
-
-
-REPLAY = [sys.executable, "-c", "import sys; from adhesion_node.nodes.replay import main; sys.exit(main())"]
-
-
-@contextmanager
-def replay_process(*arguments: str) -> Iterator[subprocess.Popen[str]]:
-    """Run the program; it does not outlive a test that fails."""
-    private = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
-    environment = {name: value for name, value in os.environ.items() if name not in private}
-    with subprocess.Popen(
-        [*REPLAY, *arguments], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as process:
-        try:
-            yield process
-        finally:
-            process.kill()
-
-
-def test_at_full_speed_a_slow_subscriber_in_another_process_slows_it_down(
-    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    """More messages than the queue of the publisher holds and a subscriber that stands still for a while."""
-    steps = 1500
-    written = write_steps(tmp_path / "bag", steps)
-    listener = Listener(context, POSITION, profile=UNLIMITED)
-    executor.add_node(listener)
-    with replay_process(str(tmp_path / "bag"), "--rate", "0", "--topics", "position", "--json", "-") as process:
-        spin_until(executor, lambda: len(listener.heard) > 10, 20.0)
-        time.sleep(0.5)  # not to synchronise: meanwhile the replay publishes several queues full
-        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == steps, 60.0)
-        out, err = process.communicate()
-    assert process.returncode == 0, err
-    assert json.loads(out) == {"messages": {"/position": steps}, "complete": True}
-    assert listener.of(POSITION) == of(written, "/position")
-
-
-def test_a_subscriber_that_hangs_is_waited_for_once(
-    tmp_path: Path,
-    context: Context,
-    executor: SingleThreadedExecutor,
-    spin_until: SpinUntil,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> None:
-    """DDS takes 5000 messages of each topic for it. What the others get is complete; the end says what it may lack."""
-    monkeypatch.setattr(acknowledged, "ACKNOWLEDGED_S", 1.0)
-    monkeypatch.setattr(acknowledged, "KEPT_S", 0.02)
-    steps, listener = 7000, Listener(context, POSITION, BRAKE_PRESSURE, profile=UNLIMITED)
-    written = write_steps(tmp_path / "bag", steps)
-    hung = Listener(context, POSITION, BRAKE_PRESSURE, profile=UNLIMITED)  # nobody spins it
-    executor.add_node(listener)
-    with BagReader(tmp_path / "bag") as reader:
-        node = Replay(reader, select(reader.topics), 0.0, subscribers=2, context=context)
-        executor.add_node(node)
-        spin_until(executor, lambda: node.finished, 60.0)
-        spin_until(executor, lambda: len(listener.heard) == len(written))
-    executor.add_node(hung)  # which is destroyed with it
-    assert listener.of(POSITION) == of(written, "/position")
-    assert listener.of(BRAKE_PRESSURE) == of(written, "/brake_pressure")
-    (told,) = [line for line in capfd.readouterr().err.splitlines() if "subscriber took nothing" in line]
-    assert told.endswith("/position, /brake_pressure: a subscriber took nothing for 1 s and is not waited for any more")
-    lost = re.fullmatch(r"a subscriber hung, messages may be lost to it: (.*)", str(node.failure))
-    assert lost
-    assert sorted(lost[1].split("; ")) == [f"/{name}, up to 2000 of 7000" for name in ("brake_pressure", "position")]
-
-
-def test_a_best_effort_subscriber_at_full_speed_is_named(
-    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
-) -> None:
-    write_steps(tmp_path / "bag", 5)
-    listener = Listener(context, POSITION)
-    executor.add_node(listener)
-    with replay_process(str(tmp_path / "bag"), "--rate", "0") as process:
-        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == 5, 20.0)
-        out, err = process.communicate()
-    assert process.returncode == 0
-    assert out.split() == ["5", "/brake_pressure", "5", "/position"]
-    assert "listener subscribes /position best effort and may lose messages: start it with -p qos_overrides./pos" in err
 
 
 def test_a_bag_without_position_says_what_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

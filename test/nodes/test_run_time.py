@@ -17,14 +17,14 @@ import messages
 import pytest
 import yaml
 from conftest import SpinUntil
+from estimator_line import Line, samples
+from monitor_line import NAMESPACE, SETTINGS
+from monitor_line import Line as Supervised
 from rcl_interfaces.srv import SetParameters, SetParametersAtomically
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from test_atp_monitor import NAMESPACE, SETTINGS
-from test_atp_monitor import Line as Supervised
-from test_estimator_node import Line, samples
 from test_faults_estimator import call
 
 from adhesion_node.core.physics.train import GRAVITY

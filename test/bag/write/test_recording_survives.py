@@ -30,8 +30,8 @@ from mcap.reader import make_reader
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from recorders import clock, has_messages, recording_process, stamped, start
 from rosbags.rosbag2 import Reader
-from test_recorder import clock, has_messages, recording_process, stamped, start
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
 from adhesion_node.bag.write.part import MARGIN_BYTES, STEP_BYTES

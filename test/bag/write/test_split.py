@@ -24,7 +24,7 @@ from messages import message_class
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from test_recorder import clock, publishers, simulated, stamped
+from recorders import clock, publishers, simulated, stamped
 from test_recording_survives import assert_complete, indexed, metadata
 
 from adhesion_node.bag import BagReader, BagWriter, Limits, Record

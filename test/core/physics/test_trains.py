@@ -18,6 +18,7 @@ from typing import Any
 
 from conftest import SpinUntil
 from diagnostic_msgs.msg import DiagnosticArray
+from estimator_line import FAST
 from faulty import READERS, S
 from messages import message_of
 from rclpy.context import Context
@@ -25,7 +26,6 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from start_stop import PRIVATE
-from test_estimator_node import FAST
 
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
