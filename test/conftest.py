@@ -180,6 +180,14 @@ def executor(context: Context) -> Iterator[SingleThreadedExecutor]:
         node.destroy_node()
 
 
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[None]:
+    """One browser for all pages of a module."""
+    browser = pytest.importorskip("browser", reason="playwright, of the extra `test`, is not installed")
+    with browser.launched():
+        yield
+
+
 @pytest.fixture
 def spin_until() -> SpinUntil:
     """Return the function `spin_until(executor, predicate, timeout_s=10.0)`.

@@ -16,18 +16,14 @@ from typing import Any, NamedTuple
 
 import pytest
 import seen
+from pages import Line, browser, line
 from test_live_view import S, estimate
-from test_pages import Line, browser, line
 
 from adhesion_node.core.atp.received import StampedCurve, TrainState
 from adhesion_node.core.physics.braking import curve
 from adhesion_node.core.physics.train import CRH3, KMH
 
-
-@pytest.fixture(autouse=True, scope="module")
-def chromium() -> Iterator[None]:
-    with browser.launched():
-        yield
+pytestmark = pytest.mark.usefixtures("chromium")
 
 
 class Level(NamedTuple):

@@ -16,10 +16,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from loud_rail import SEEN
 from numpy.typing import ArrayLike
 from oracles import (
     ExactEStep,
-    Linear,
     literal_pairwise,
     log_densities,
     log_likelihood,
@@ -46,8 +46,6 @@ from adhesion_node.core.physics.track import LEVEL, Grade, Track
 from adhesion_node.core.physics.train import CRH3
 
 PRIOR = Gaussian(np.array([100.0, 80.0]), np.array([[0.04, 0.005], [0.005, 0.01]]))
-SEEN = Linear(c0=0.79, c1=0.02, q_s=1e-4, q_v=2e-3)
-"""Loud and measured well: a window's positions hold a good share of what its states do, so EM moves."""
 
 
 def _window(mu: float = 0.06, seed: int = 10, brake: float = 0.0952) -> Window:

@@ -10,7 +10,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -23,10 +22,7 @@ from adhesion_node.report.__main__ import main
 browser = pytest.importorskip("browser", reason="playwright, of the extra `test`, is not installed")
 
 
-@pytest.fixture(autouse=True, scope="module")
-def chromium() -> Iterator[None]:
-    with browser.launched():
-        yield
+pytestmark = pytest.mark.usefixtures("chromium")
 
 
 @pytest.fixture(scope="module")
