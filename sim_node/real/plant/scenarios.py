@@ -63,16 +63,13 @@ def _dry(level: float = 0.30, level_std: float = 0.10) -> Rail:
     return Rail(steady(level), level_std=level_std)
 
 
-def _wet(level: float = 0.115) -> Rail:
-    return Rail(steady(level), cleaning=1.3, level_std=0.08)
-
-
 def _leaves(level: float = 0.042) -> Rail:
     return Rail(steady(level), cleaning=1.5, level_std=0.13)
 
 
+_WETTED = Rail(steady(0.115), cleaning=1.3, level_std=0.08)
 _UNIT = Scenario("dry", INTERCITY, 160 * KMH, _dry())
-_WET = replace(_UNIT, name="wet", rail=_wet())
+_WET = replace(_UNIT, name="wet", rail=_WETTED)
 _LEAVES = replace(_UNIT, name="leaves", rail=_leaves())
 _METRO = Scenario("metro_dry", METRO, 80 * KMH, _dry())
 _TRAM = Scenario("tram_dry", TRAM, 50 * KMH, _dry())
@@ -92,8 +89,8 @@ SCENARIOS: Mapping[str, Scenario] = {
         replace(_WET, name="wet_pads_weak", scatter=Scatter(pads=-0.15)),
         _LEAVES,
         replace(_LEAVES, name="leaves_severe", rail=_leaves(0.027)),
-        replace(_WET, name="wet_rough", rail=replace(_wet(), roughness=ROUGHER)),
-        replace(_WET, name="wet_falls", rail=replace(_wet(), level=along((0.0, 0.125), (1600.0, 0.095)))),
+        replace(_WET, name="wet_rough", rail=replace(_WETTED, roughness=ROUGHER)),
+        replace(_WET, name="wet_falls", rail=replace(_WETTED, level=along((0.0, 0.125), (1600.0, 0.095)))),
         replace(_LEAVES, name="leaves_rough", rail=replace(_leaves(), roughness=ROUGHER)),
         replace(_LEAVES, name="leaves_falls", rail=replace(_leaves(), level=along((0.0, 0.048), (3500.0, 0.034)))),
         replace(
@@ -118,13 +115,13 @@ SCENARIOS: Mapping[str, Scenario] = {
         ),
         replace(_WET, name="rotating", scatter=Scatter(rotating=0.08)),
         Scenario("salisbury", REGIONAL, 138 * KMH, _leaves(0.0208)),
-        replace(_METRO, name="metro_wet", rail=_wet()),
+        replace(_METRO, name="metro_wet", rail=_WETTED),
         replace(_METRO, name="metro_leaves", rail=_leaves()),
         _METRO,
         _FREIGHT,
-        replace(_FREIGHT, name="freight_wet", rail=_wet()),
+        replace(_FREIGHT, name="freight_wet", rail=_WETTED),
         replace(_FREIGHT, name="freight_leaves", rail=_leaves(0.024)),
-        replace(_TRAM, name="tram_wet", rail=_wet()),
+        replace(_TRAM, name="tram_wet", rail=_WETTED),
         replace(_TRAM, name="tram_leaves", rail=_leaves()),
         _TRAM,
     )

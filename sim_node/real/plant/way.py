@@ -26,6 +26,9 @@ CELL_M = 1.0
 ROUGHNESS, CORRELATION_M = 0.05, 100.0
 """Log-normal: standard deviation of log mu0, and length after which its correlation has fallen to 1/e."""
 
+WAVES_M = (1000.0, 4000.0)
+"""Shortest and longest wave of a grade that undulates."""
+
 CLEANED_BY = 4.0
 """Groups after which the cleaning of the rail is down to 1/e of what is still to come."""
 
@@ -137,11 +140,11 @@ def patches(
     return level
 
 
-def undulating(highest: float, wave_m: tuple[float, float] = (1000.0, 4000.0)) -> Grade:
+def undulating(highest: float) -> Grade:
     """Three waves of drawn lengths and phases, together at most `highest`."""
 
     def grade(place: Array, rng: np.random.Generator) -> Array:
-        shortest, longest = wave_m
+        shortest, longest = WAVES_M
         lengths = shortest * (longest / shortest) ** rng.random(3)
         phases = rng.uniform(0.0, 2.0 * np.pi, 3)
         weights = rng.dirichlet(np.ones(3))
