@@ -51,7 +51,8 @@ STRONG = 0.03
 
 LESS, LESS_STD, LESS_LEAST_STD = (0.9, 0.6, 0.4, 0.25), 0.22, 0.003
 """Parts of what the brake needs that a rail may give on which axles begin to slide, each known so well: in proportion,
-and as adhesion, as a brake that hardly presses tells little of a rail."""
+and as adhesion, as a brake that hardly presses tells little of a rail. Without the latter, on a seed of `study real`,
+the safe curve exceeds the way by 37 instead of 32 % on leaves where one cylinder is heard; else by about as much."""
 
 PASSING_S, PASSED_S = 300.0, 3.0
 """A border of the rail comes once in that time, and the train takes so long to pass it."""
@@ -60,8 +61,9 @@ CHANGE_S, BEND_S = 600.0, 60.0
 """Axles roll again, whatever the adhesion was, once in that time, and how it depends on speed changes."""
 
 REACHED = 0.98
-"""Part of what the brake presses with from which it no longer reaches the adhesion: the last axles slide no more, and a
-force that is 2 % less is told from the brake's own error by nothing."""
+"""Part of what the brake presses with from which it no longer reaches the adhesion: the last axles slide no more. With
+1 instead, on a seed of `study real`, the truth is covered 1 to 4 % of the time less on rough and patched rails by
+positions alone; all else is nearly as it was."""
 
 RISING_S, RISES, STEADY_S, FELL_S, REACHED_S = 5.0, 2.0, 60.0, 0.5, 2.0
 """In such times axles begin to slide while the brake is applied harder, in so many build-ups of a slow brake, while it
