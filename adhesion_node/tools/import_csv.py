@@ -109,7 +109,7 @@ def _write(log: Log, writer: BagWriter) -> None:
     for row in progress(_rows(log), "rows", len(log.rows)):
         values = {name: row[name] for name in topics_of if not math.isnan(row[name])}
         wheels = tuple(row[name] for name in axles)
-        for topic, numbers, variance in _messages(values, wheels, log.form):
+        for topic, numbers, variance in _messages(values, wheels, log.stds):
             writer.write(f"/{topic.name}", topic.type, encode(topic, row["t_ns"], numbers, variance), row["t_ns"])
 
 
@@ -119,14 +119,13 @@ def _rows(log: Log) -> Iterator[dict[str, Any]]:
 
 
 def _messages(
-    values: Mapping[str, float], wheels: Sequence[float], form: Format
+    values: Mapping[str, float], wheels: Sequence[float], stds: Mapping[str, float]
 ) -> Iterator[tuple[Topic, Sequence[float], float]]:
     """Yield the topics of a row with their numbers and variance, 0 where unknown; the position last, as in a run."""
-    std = form.position_std_m
     for topic, column, variance in (
         (topics.BRAKE_PRESSURE, "brake_pressure", 0.0),
         (topics.BRAKE_DEMAND, "brake_demand", 0.0),
-        (topics.SPEED, "speed", values.get("speed_std", 0.0) ** 2),
+        (topics.SPEED, "speed", values.get("speed_std", stds["speed"]) ** 2),
         (topics.IMU, "acceleration", 0.0),
     ):
         if column in values:
@@ -135,9 +134,9 @@ def _messages(
         yield topics.WHEEL_SPEED, wheels, 0.0
     if "lat" in values:
         place = values["lat"], values["lon"], values.get("height", math.nan)
-        yield topics.FIX, place, values.get("variance", (std or 0.0) ** 2)
+        yield topics.FIX, place, values.get("variance", stds["fix"] ** 2)
     if "position" in values:
-        yield topics.POSITION, (values["position"],), values.get("variance", (0.5 if std is None else std) ** 2)
+        yield topics.POSITION, (values["position"],), values.get("variance", stds["position"] ** 2)
 
 
 def _work(options: argparse.Namespace) -> int:

@@ -45,9 +45,9 @@ def text(rows: pd.DataFrame, delimiter: str = ",", decimal: str = ".", head: str
     return head + str(rows.to_csv(index=False, sep=delimiter, decimal=decimal))
 
 
-def read_as(importing: Import, capsys: pytest.CaptureFixture[str]) -> list[str]:
+def read_as(importing: Import, capsys: pytest.CaptureFixture[str], *options: str) -> list[str]:
     """What a dry run of the newest log says."""
-    import_csv.main([str(importing.log), "--dry-run"])
+    import_csv.main([str(importing.log), "--dry-run", *options])
     return capsys.readouterr().out.splitlines()
 
 

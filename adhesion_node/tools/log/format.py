@@ -129,7 +129,7 @@ class Format:
     """Whether the chainage rises as the train runs, or falls: `down`."""
     position_unit: str | None = None
     position_std_m: float | None = None
-    """Stands in where the log gives no variance; None: 0.5 m along the track, unknown of latitude and longitude."""
+    """Stands in where the log gives no variance; None: see steps.py."""
     pressure_unit: str | None = None
     pressure_is_gauge: bool = True
     ambient_pressure_pa: float = ATMOSPHERE_PA

@@ -81,7 +81,7 @@ def _unit_options(add: Callable[..., Any]) -> None:
     turned = "down: the chainage falls as the train runs, and is turned"
     add("--direction", choices=["up", "down"], default="up", help=turned)
     add("--position-unit", choices=list(POSITION_UNITS), help=f"{_TOLD} m; variance is in m^2")
-    std = "of all positions, where there is no variance (default: 0.5; of latitude and longitude: unknown)"
+    std = "of all positions, without a variance (default: 0.5, of latitude and longitude unknown; by coarse steps)"
     add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
     add("--pressure-unit", choices=list(PRESSURE_UNITS), help=f"{_TOLD} pa")
     add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="of all pressures")

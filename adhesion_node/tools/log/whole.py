@@ -9,7 +9,7 @@
 """A log as a whole: its times in order and in their zone, the chainage as the train runs, the demand in the pipe."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -24,6 +24,7 @@ from .columns import Columns
 from .format import PRESSURE_UNITS, Format
 from .held import without_held
 from .rows import measured, open_log
+from .steps import DEGREE_M, stds_of
 from .text import Refusal
 
 FULL_DROP_PA = 1.5e5
@@ -31,9 +32,6 @@ FULL_DROP_PA = 1.5e5
 
 RELEASED_PA = 2e5, 1.2e6
 """What a pipe may have while the brake is released; mostly it is 5 bar."""
-
-DEGREE_M = 111.2e3
-"""Of latitude."""
 
 MOVES_MPS, OVER_S = 2.0, 5.0
 """A train that is faster moves; slower positions, over so long, are noise."""
@@ -54,6 +52,8 @@ class Log(NamedTuple):
     """By line of the log: `t_ns`, which rises, and every column in SI, NaN where a cell is empty."""
     notes: tuple[str, ...]
     """What was done with it."""
+    stds: Mapping[str, float]
+    """By topic, where the log tells none; 0: the estimator's setting."""
 
 
 def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
@@ -85,7 +85,8 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     if "brake_pipe" in rows:
         rows, form, note = _demanded(rows, form)
         notes.append(note)
-    return Log(form, source.columns, rows, tuple(notes))
+    stds, coarse = stds_of(rows, form)
+    return Log(form, source.columns, rows, (*notes, *coarse), stds)
 
 
 def _rising(rows: pd.DataFrame, source: str, dated: bool) -> tuple[pd.DataFrame, list[Refusal]]:
