@@ -94,6 +94,31 @@ def test_an_unknown_unit_is_said_with_the_option(
     assert not cure or not any("unknown unit" in odd for odd in importing.summary["odd"])
 
 
+@pytest.mark.parametrize(
+    ("unit", "pa", "is_absolute"),
+    [
+        *(("bara", 1e5, True), ("bar(a)", 1e5, True), ("bar abs.", 1e5, True), ("psia", 6894.757, True)),
+        *(("barg", 1e5, False), ("bar(g)", 1e5, False), ("barü", 1e5, False), ("kPa gauge", 1e3, False)),
+        *(("kgf/cm2", 98066.5, False), ("kp/cm²", 98066.5, False), ("N/mm²", 1e6, False), ("kN/m^2", 1e3, False)),
+        *(("hPa", 1e2, False), ("MPa", 1e6, False), ("MPa abs", 1e6, True), ("psig", 6894.757, False)),
+    ],
+)
+def test_units_of_pressures_are_read_with_what_they_are_above(
+    importing: Import, unit: str, pa: float, is_absolute: bool
+) -> None:
+    rows = ride().assign(**{f"brake_pressure [{unit}]": (ride().brake_pressure + 101_325.0 * is_absolute) / pa})
+    assert importing(text(rows.drop(columns="brake_pressure"))) == 0, importing.errors
+    pressures = [BRAKE_PRESSURE.read(message).pressure_pa for message in importing.messages("brake_pressure")]
+    assert pressures == pytest.approx(ride().brake_pressure.tolist(), abs=1.0)
+
+
+def test_a_kind_of_pressures_that_is_said_twice_is_doubted(importing: Import) -> None:
+    log = text(ride().assign(brake_pressure=ride().brake_pressure / 1e5 + 1.0)).replace("brake_pressure", "p_barg")
+    assert importing(log, "--pressure", "p", "--pressure-kind", "absolute") == 1
+    said = "brake_pressure is said to be in 'barg', above the air, and by --pressure-kind absolute: which is right?"
+    assert importing.summary["odd"] == [said]
+
+
 def test_dates_are_in_no_unit(importing: Import) -> None:
     assert importing("time [UTC],speed [m/s]\n2024-11-21 08:15:03,1\n2024-11-21 08:15:04,1\n") == 0
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from .cell.units import known, meant, parted
+from .cell.units import kind_of, known, meant, parted
 from .format import FAMILIES, OPTIONAL, PLACES, UNITS, Format, option
 
 AXLE = re.compile(r"wheel_speed_\d+", re.IGNORECASE)
@@ -82,6 +82,8 @@ def in_doubt(told: Mapping[str, str], form: Format) -> Iterator[str]:
         unit, given, how = known(text, ours), form.given(ours), f"--{FAMILIES.get(ours)}-unit"
         if unit and given not in (unit, None):
             yield f"{ours} is said to be in {text!r}, and by {how} in {given}: which is right?"
+        elif kind_of(text, ours) == "gauge" and not form.pressure_is_gauge:
+            yield f"{ours} is said to be in {text!r}, above the air, and by --pressure-kind absolute: which is right?"
         elif unit is None and given is None:
             *more, last = UNITS[FAMILIES.get(ours, ours)]
             cure = f"say which with {how} {', '.join(more)} or {last}" if more else "convert it"

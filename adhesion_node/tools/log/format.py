@@ -35,7 +35,7 @@ EXCEL_1970 = 25_569
 """The day of a spreadsheet on which the epoch begins."""
 
 POSITION_UNITS = {"m": 1.0, "km": 1e3, "ft": 0.3048}
-PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757}
+PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757, "kgcm2": 98066.5}
 SPEED_UNITS = {"mps": 1.0, "kmh": KMH, "mph": 0.44704, "kn": 1852.0 / 3600.0}
 ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665, "mg": 9.80665e-3}
 WHEEL_UNITS = ("radps", "rpm", "mps", "kmh")
@@ -118,6 +118,8 @@ class Format:
     """Cells of the line of units between the header and the first row, where there is one."""
     told: Mapping[str, str] = field(default_factory=dict)
     """Units of columns, as the log itself names them; an option counts more."""
+    absolute: frozenset[str] = frozenset()
+    """Pressures that the log itself names absolute, `bara`."""
     time_unit: str | None = None
     """One of `TIME_UNITS`, or `iso`."""
     time_format: str | None = None
@@ -172,6 +174,11 @@ class Format:
         family = FAMILIES.get(column, column)
         of_family = (unit for other, unit in self.told.items() if FAMILIES.get(other) == family)
         return self.given(column) or self.told.get(column) or next(of_family, UNITS[family][0])
+
+    def offset(self, column: str) -> float:
+        """What is added to the numbers of a column in SI: the pressure of the air to those above it."""
+        is_gauge = column in PRESSURES and self.pressure_is_gauge and column not in self.absolute
+        return self.ambient_pressure_pa if is_gauge else 0.0
 
     def factors(self) -> Mapping[str, float]:
         """What one unit of a column is in SI, where it is not 1."""

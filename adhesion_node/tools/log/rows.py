@@ -20,9 +20,9 @@ import pandas as pd
 from ...command.checks import refuse
 from .cell.marks import marks
 from .cell.numbers import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
-from .cell.units import known
+from .cell.units import kind_of, known
 from .columns import Columns, columns_of, in_doubt, units_told
-from .format import LIMITS, PRESSURES, Format
+from .format import LIMITS, Format
 from .idle import require_meaning
 from .text import SAMPLE, Block, Refusal, blocks, names_of, understood
 
@@ -64,7 +64,9 @@ def open_log(path: Path, form: Format) -> Source:
         rows = blocks(path, form, names)
     columns = columns_of(names, str(path), form)
     told = units_told(columns, names, form)
-    form = replace(form, told={ours: unit for ours, text in told.items() if (unit := known(text, ours))})
+    absolute = frozenset(ours for ours, text in told.items() if kind_of(text, ours) == "absolute")
+    units = {ours: unit for ours, text in told.items() if (unit := known(text, ours))}
+    form = replace(form, told=units, absolute=absolute)
     first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
     timed = _timed(form, first.cells[columns.names["time"]])
     if timed.time_format is not None:
@@ -135,8 +137,7 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
         with np.errstate(over="ignore"):  # 1e300 km are out of range
             read *= factor
             read = read.round(6) if factor >= 10.0 else read  # 4.1 bar are 410000 Pa, not less
-        if form.pressure_is_gauge and kind in PRESSURES:
-            read += form.ambient_pressure_pa
+        read += form.offset(kind)
         least, most, remedy = LIMITS[kind]
         outside = (read < least) | (read > most)
         refuse(outside & stands_in, "no_value", name, lambda _: NO_VALUE)

@@ -28,16 +28,22 @@ _SPELT = {
     "kmh": ("km/h", "kph", "kmph", "km/hr", "kmh-1"),
     "mph": ("mi/h", "miles/h"),
     "kn": ("kt", "kts", "knot", "knots", "knoten"),
-    "pa": ("pascal",),
-    "bar": ("barg", "bar(g"),
+    "pa": ("pascal", "n/m2"),
+    "kpa": ("kn/m2",),
     "mbar": ("hpa",),
-    "psi": ("psig", "lbf/in2"),
+    "mpa": ("n/mm2",),
+    "psi": ("lbf/in2",),
+    "kgcm2": ("kgf/cm2", "kg/cm2", "kp/cm2", "at"),
     "mps2": ("m/s2", "ms-2", "m/s/s"),
     "radps": ("rad/s", "rads-1", "rad/sec"),
     "rpm": ("1/min", "min-1", "r/min", "u/min", "rev/min"),
     "deg": ("°", "degree", "degrees"),
 }
 """How units are written; in `min^-1` and `m s⁻²` what raises and what divides is left out."""
+
+_KINDS = {"gauge": "g|ga|gauge|rel|ü", "absolute": "a|abs|absolute?"}
+_WITH_KIND = {kind: re.compile(rf"(.+?)[(_]*(?:{ends})\.?") for kind, ends in _KINDS.items()}
+"""What follows a unit of pressures where it says above what they are: `barg`, `bar(a)`, `kPa abs`."""
 
 _BRACKETS = re.compile(r"(.*?)(?:\s*/|\s+in)?[\s_]*[\[(<{]\s*(.*?)\s*[\])>}]+")
 
@@ -50,13 +56,30 @@ def known(text: str, column: str) -> str | None:
 
     >>> known("km/h", "speed"), known("m s⁻²", "acceleration"), known("MPa", "brake_pipe"), known("rods", "speed")
     ('kmh', 'mps2', 'mpa', None)
-    >>> known("ms", "time"), known("ms", "speed"), known("(1/min)", "wheel_speed")
-    ('ms', 'mps', 'rpm')
+    >>> known("ms", "time"), known("ms", "speed"), known("(1/min)", "wheel_speed"), known("bar(g)", "brake_demand")
+    ('ms', 'mps', 'rpm', 'bar')
     """
+    return _known(text, column)[0]
+
+
+def kind_of(text: str, column: str) -> str | None:
+    """Return whether a unit of pressures says that they are `gauge`, above the air, or `absolute`.
+
+    >>> [kind_of(text, "brake_pressure") for text in ("barg", "psia", "MPa", "bar abs.", "at")]
+    ['gauge', 'absolute', None, 'absolute', None]
+    """
+    return _known(text, column)[1]
+
+
+def _known(text: str, column: str) -> tuple[str | None, str | None]:
+    """The unit and the kind."""
     plain = unicodedata.normalize("NFKC", text).replace("\u2212", "-").casefold().strip("[](){}<> ")
     plain = re.sub(r"\^1$|[\s^*·⋅]", "", plain)
-    of_column = UNITS[FAMILIES.get(column, column)]
-    return next((unit for unit in of_column if plain == unit or plain in _SPELT.get(unit, ())), None)
+    family = FAMILIES.get(column, column)
+    ends = _WITH_KIND if family == "pressure" else {}
+    texts = {plain: None, **{match[1]: kind for kind, end in ends.items() if (match := end.fullmatch(plain))}}
+    found = ((unit, texts[each]) for each in texts for unit in UNITS[family] if each in (unit, *_SPELT.get(unit, ())))
+    return next(found, (None, None))
 
 
 def parted(name: str, column: str) -> tuple[str, str]:

@@ -89,7 +89,7 @@ def _too_far(log: Log, t_s: Array) -> Iterator[str]:
 
 def _pressures(log: Log) -> Iterator[str]:
     for name in ("brake_pressure", "brake_demand"):
-        if name not in log.rows or name not in log.columns.names or not log.form.pressure_is_gauge:
+        if name not in log.rows or name not in log.columns.names or not log.form.offset(name):
             continue
         gauge = log.rows[name] - log.form.ambient_pressure_pa
         least, most = gauge.min(), gauge.max()

@@ -14,7 +14,6 @@ import numpy as np
 
 from ....core.physics.train import Array
 from ..cell.marks import marks
-from ..format import PRESSURES
 from ..whole import Log
 
 LEAST_ROWS = 3
@@ -32,8 +31,7 @@ def sentinels(log: Log) -> Iterator[str]:
     factors = log.form.factors()
     for name in log.rows.columns.drop("t_ns"):
         kind = "wheel_speed" if name in log.columns.axles else name
-        offset = log.form.ambient_pressure_pa if name in PRESSURES and log.form.pressure_is_gauge else 0.0
-        values = log.rows[name].dropna().to_numpy() - offset
+        values = log.rows[name].dropna().to_numpy() - log.form.offset(name)
         for mark, rows in _extremes(values):
             written = mark / factors.get(kind, 1.0)
             others = values[values != mark]
