@@ -63,7 +63,7 @@ def held_in(values: Array) -> Held | None:
     Of a long standstill one value is kept for each time that a value is usually held.
     """
     known = np.flatnonzero(np.isfinite(values).all(axis=1))
-    begins = _changes(values[known])
+    begins = changes(values[known])
     held_rows = np.diff(begins)
     if len(held_rows) < LEAST_CHANGES:
         return None
@@ -83,10 +83,10 @@ def held_in(values: Array) -> Held | None:
 def _with_place(speed: Array, place: Held) -> bool:
     """Whether a speed, shape (n, 1), changes where the place does, alone."""
     known = np.flatnonzero(np.isfinite(speed[:, 0]))
-    changes = known[_changes(speed[known])[1:]]
-    return len(changes) >= LEAST_CHANGES and bool(place.begins[changes].mean() >= TOGETHER)
+    rows = known[changes(speed[known])[1:]]
+    return len(rows) >= LEAST_CHANGES and bool(place.begins[rows].mean() >= TOGETHER)
 
 
-def _changes(values: Array) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+def changes(values: Array) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
     """Rows that differ from the one before, and the first one."""
     return np.flatnonzero(np.append(True, (values[1:] != values[:-1]).any(axis=1))[: len(values)])

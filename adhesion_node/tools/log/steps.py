@@ -9,7 +9,7 @@
 """Columns that go by coarse steps, tens of metres or 5 km/h: none is known better than its step over root 12."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -60,7 +60,7 @@ def stds_of(rows: pd.DataFrame, form: Format) -> tuple[dict[str, float], list[st
         if form.position_std_m is not None and topic != "speed":
             stds[topic] = form.position_std_m
         elif set(known.columns) <= set(rows) and (known.told_by not in rows or rows[known.told_by].isna().any()):
-            step = max(step_of(metres, SHOWS * math.sqrt(12.0) * known.std) for metres in _metres(rows, known.columns))
+            step = max(step_of(metres, SHOWS * math.sqrt(12.0) * known.std) for metres in metres(rows, known.columns))
             if step:
                 least = step / math.sqrt(12.0)
                 stds[topic] = least if least > known.std else stds[topic]
@@ -93,7 +93,7 @@ def step_of(values: Array, least: float) -> float:
     return step if (np.abs(gaps - step * np.round(gaps / step)) < tolerance).all() else 0.0
 
 
-def _metres(rows: pd.DataFrame, columns: tuple[str, ...]) -> Iterator[Array]:
+def metres(rows: pd.DataFrame, columns: Sequence[str]) -> Iterator[Array]:
     """The columns, and degrees as metres."""
     for name in columns:
         scale = {"lat": DEGREE_M, "lon": DEGREE_M * math.cos(math.radians(float(rows.get("lat", rows[name]).median())))}

@@ -23,6 +23,7 @@ from ....wire.line import ATMOSPHERE_PA
 from ..cell.clock import has_dates
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from ..whole import MOVES_MPS, Log, moment
+from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
@@ -53,8 +54,10 @@ def odd(log: Log) -> list[str]:
     of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *_pressures(log)]
     if of_time or stand_ins or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *(of_time or _too_far(log, t_s)), *texts]
-    motion = motion_of(log, t_s)
     of_way = [*leaps(log, t_s)]
+    if not of_way and (froze := [*frozen(log, t_s)]):
+        return [*log.columns.doubts, *texts, *froze]
+    motion = motion_of(log, t_s)
     alone = () if motion.by_fixes else slow_or_falling(motion)
     of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else alone)]
     of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion, log.form)]
