@@ -62,7 +62,7 @@ def test_a_row_that_is_no_date_is_not_said_to_be_another(importing: Import, caps
 def test_degrees_and_minutes_of_nmea_are_named(importing: Import, lat: str, lon: str, name: str) -> None:
     assert importing(f"time,lat,lon\n1,{lat},{lon}\n") == 2
     assert importing.errors[0].startswith(f"import_csv: FILE:2: {name} = ")
-    assert "ddmm.mmmm, as NMEA has it: write the degrees dd + mm.mmmm / 60" in importing.errors[0]
+    assert "ddmm.mmmm, as NMEA has it: write N, S, E or W behind it, in its cell" in importing.errors[0]
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,7 @@ UNITS: Mapping[str, Sequence[str]] = {
 """By family, the first one where nothing is said; the last ones by column, of which there is no other."""
 
 _IS_PRESSURE = "Pa absolute: is the --pressure-unit, --pressure-kind or --ambient-pressure another?"
-_NMEA = "Or ddmm.mmmm, as NMEA has it: write the degrees dd + mm.mmmm / 60, below 0 for S and W"
+_NMEA = "Or ddmm.mmmm, as NMEA has it: write N, S, E or W behind it, in its cell"
 _ABSOLUTE = (MIN_ABSOLUTE_PA, MAX_ABSOLUTE_PA, _IS_PRESSURE)
 
 LIMITS = {

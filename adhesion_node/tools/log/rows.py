@@ -11,6 +11,7 @@
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,6 +21,7 @@ import pandas as pd
 from ...command.checks import refuse
 from .cell.marks import marks
 from .cell.numbers import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
+from .cell.places import PARTS, in_numbers
 from .cell.units import kind_of, known
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, Format
@@ -82,19 +84,26 @@ class Measured(NamedTuple):
 
     rows: pd.DataFrame
     refused: list[Refusal]
-    grouped: dict[str, str]
-    """By column a whole number in groups of thousands, where there is one."""
+    read_as: dict[str, str]
+    """By column how a cell is read that is no plain number: in groups of thousands, or in parts."""
 
 
 def measured(source: str, log: Source) -> Iterator[Measured]:
     """Yield what was measured, block by block."""
+    decimal = log.form.decimal or "."
     for cells, refused in log.blocks:
+        read_as = {}
+        for name, theirs in log.columns.names.items():
+            column = cells[theirs]
+            if log.form.thousands and (in_groups := grouped(column, decimal)).any():
+                cell = str(column[in_groups].iloc[0])
+                read_as[name] = f"{cell!r} is read as {re.sub('[.,]', '', cell)}"
+            if name in PARTS:
+                cells[theirs] = in_numbers(column, name, log.form.unit(name), decimal)
+                if (in_parts := cells[theirs] != column).any():
+                    read_as[name] = f"{column[in_parts].iloc[0]!r} is read as {cells[theirs][in_parts].iloc[0]}"
         rows, unusable = _rows(cells, log, source)
-        decimal = log.form.decimal or "."
-        read = {name: cells[theirs] for name, theirs in log.columns.names.items() if log.form.thousands}
-        examples = {name: column[grouped(column, decimal)] for name, column in read.items()}
-        in_groups = {name: str(found.iloc[0]) for name, found in examples.items() if len(found)}
-        yield Measured(rows, sorted([*refused, *unusable]), in_groups)
+        yield Measured(rows, sorted([*refused, *unusable]), read_as)
 
 
 def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, list[Refusal]]:
@@ -132,7 +141,7 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
         bad = filled[name] & np.isnan(read)
         if bad.any():
             refuse(bad & grouped(theirs[name], decimal), "not_a_number", name, lambda _: IN_GROUPS)
-            refuse(bad, "not_a_number", name, lambda _: NO_NUMBER)
+            refuse(bad, "not_a_number", name, partial(_no_number, name))
         factor, stands_in = factors.get(kind, 1.0), marks(read)
         with np.errstate(over="ignore"):  # 1e300 km are out of range
             read *= factor
@@ -168,6 +177,10 @@ def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any
 
 def _out_of_range(read: Any, least: float, most: float, remedy: str) -> Callable[[int], str]:
     return lambda i: f"{read[i]:g} is not from {least:g} to {most:g} {remedy}"
+
+
+def _no_number(name: str, _: int) -> str:
+    return NO_NUMBER + PARTS.get(name, "")
 
 
 def _filled(cells: "pd.Series[Any]") -> Flags:

@@ -8,7 +8,6 @@
 
 """A log as a whole: its times in order and in their zone, the chainage as the train runs, the demand in the pipe."""
 
-import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -62,10 +61,10 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     Raises ValueError when the file is empty or a column is missing.
     """
     source = open_log(path, form)
-    parts, in_groups = [], dict[str, str]()
-    for rows, refused, grouped in measured(str(path), source):
+    parts, read_as = [], dict[str, str]()
+    for rows, refused, said in measured(str(path), source):
         parts.append(rows)
-        in_groups |= grouped
+        read_as |= said
         for each in refused:
             tell(each)
     rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
@@ -75,7 +74,7 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         tell(each)
     rows, held = without_held(rows)
     notes += source.notes + digits + held
-    notes += [f"{name}: {cell!r} is read as {re.sub('[.,]', '', cell)}" for name, cell in in_groups.items()]
+    notes += [f"{name}: {said}" for name, said in read_as.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
         notes.append(
