@@ -235,7 +235,7 @@ def test_a_stop_of_ten_minutes_without_rows_is_no_step_of_the_clock(importing: I
 
 
 @pytest.mark.parametrize("drop", [[], ["speed"]])
-@pytest.mark.parametrize(("ends_m", "times"), [(3000.0, ""), (1000.0, ", 2 times so")])
+@pytest.mark.parametrize(("ends_m", "times"), [(3000.0, ""), (1100.0, ", 3 times so")])
 def test_an_odometer_that_begins_anew_is_no_way_back(
     importing: Import, ends_m: float, times: str, drop: list[str]
 ) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import Array
-from .cell.numbers import Flags
+from .cell.numbers import Flags, Rows
 
 LEAST_CHANGES = 10
 """Of fewer nothing is said."""
@@ -87,6 +87,6 @@ def _with_place(speed: Array, place: Held) -> bool:
     return len(rows) >= LEAST_CHANGES and bool(place.begins[rows].mean() >= TOGETHER)
 
 
-def changes(values: Array) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+def changes(values: Array) -> Rows:
     """Rows that differ from the one before, and the first one."""
     return np.flatnonzero(np.append(True, (values[1:] != values[:-1]).any(axis=1))[: len(values)])

@@ -25,6 +25,7 @@ from .held import without_held
 from .rows import measured, open_log
 from .steps import DEGREE_M, stds_of
 from .text import Refusal
+from .wraps import unwrapped
 
 FULL_DROP_PA = 1.5e5
 """The pipe's pressure falls by so much for a full brake (UIC 540)."""
@@ -73,7 +74,8 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     for each in refused:
         tell(each)
     rows, held = without_held(rows)
-    notes += source.notes + digits + held
+    rows, wrapped = unwrapped(rows, form)
+    notes += source.notes + digits + held + wrapped
     notes += [f"{name}: {said}" for name, said in read_as.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]

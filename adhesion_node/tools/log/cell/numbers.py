@@ -21,6 +21,7 @@ from ....core.physics.train import Array
 from ..format import EXCEL_1970, TIME_UNITS, Format
 
 Flags = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 
 NO_TIME = -1
 """Stands for a cell that is no time, and for one before 1970."""

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from ....core.physics.train import Array
-from ..cell.numbers import Flags
+from ..cell.numbers import Flags, Rows
 from ..held import changes
 from ..steps import metres, step_of
 from ..whole import MOVES_MPS, Log, moment
@@ -30,8 +30,6 @@ CHANGES_MPS, NOISE_M = 2.0, 2.0
 """A speed that froze misses such a change, more than a step of 5 km/h, by positions as noisy as this."""
 
 BRAKED_PA = 5e4
-
-Rows = np.ndarray[tuple[int], np.dtype[np.intp]]
 
 
 def frozen(log: Log, t_s: Array) -> Iterator[str]:
