@@ -150,6 +150,23 @@ def test_a_speed_that_falls_at_once_is_not_cured_by_the_unit_that_it_is_read_in(
     assert "is it of a wheel that locked, or do numbers stand for no value? Leave those cells empty" in odd
 
 
+def test_a_metro_in_km_h_is_told_by_its_brake(importing: Import) -> None:
+    """72 km/h read as 72 m/s that fall by 1.8 m/s^2."""
+    rows = ride().assign(speed=(72.0 - 1.8 * (ride().time - 20.0).clip(0.0)).clip(0.0)).drop(columns="position")
+    assert importing(text(rows)) == 1
+    assert importing.summary["odd"][0].endswith("Leave those cells empty")
+    assert "km/h read as m/s, --speed-unit kmh? Or" in importing.summary["odd"][0]
+    importing.output = importing.output.with_name("cured")
+    assert importing(text(rows), "--speed-unit", "kmh") == 0
+
+
+@pytest.mark.parametrize("drop", [[], ["speed"]], ids=str)
+def test_radians_are_told(importing: Import, drop: list[str]) -> None:
+    rows = ride().assign(lat=np.radians(47.0 + ride().position / 111_181.0), lon=np.radians(8.0))
+    assert importing(text(rows.drop(columns=["position", *drop]))) == 1
+    assert importing.summary["odd"] == ["lat and lon are 0.8208 and 0.1396 at most: are they radians? Write degrees"]
+
+
 def test_small_wheels_are_not_odd(importing: Import) -> None:
     assert importing(text(ride().assign(wheel_speed_1=ride().speed / 0.31))) == 0, importing.errors
 

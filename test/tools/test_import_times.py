@@ -71,6 +71,18 @@ def test_the_days_of_a_spreadsheet(importing: Import) -> None:
     assert last - first == pytest.approx(59.9 * S, abs=S / 100)
 
 
+def test_a_part_of_the_day_is_a_time(importing: Import) -> None:
+    assert importing(text(ride().assign(time=0.25 + ride().time / 86_400.0)), "--time-unit", "excel") == 0
+    assert [sample.t_ns for sample in importing.positions()][:2] == pytest.approx([21_600 * S, 21_600 * S + S // 10])
+
+
+def test_a_date_in_digits_alone_is_told(importing: Import) -> None:
+    log = "time,speed\n20241121085940,1\n20241121085941,1\n"
+    assert importing(log) == 2
+    assert importing.errors[0].endswith("is the --time-unit another? Or --time-format %Y%m%d%H%M%S?")
+    assert importing(log, "--time-format", "%Y%m%d%H%M%S") == 0
+
+
 def test_a_clock_of_whole_seconds_is_told(importing: Import) -> None:
     rows = ride()
     assert importing(text(rows.assign(time=rows.time.astype(int)))) == 1

@@ -31,6 +31,9 @@ TOLD: list[tuple[str, str]] = [
     ("suffixes", "time_ms,position_ft,speed_kmh,brake_pressure_Bar\n"),
     ("strokes", "time/ms,position / ft,speed/(km/h),brake_pressure/bar\n"),
     ("words", "time in ms,position in ft,speed in km/h,brake_pressure in bar\n"),
+    ("blanks", "time ms,position ft,Speed KMH,brake_pressure bar\n"),
+    ("full stops", "time.ms,position.ft,speed.km/h,brake_pressure.bar\n"),
+    ("wide brackets", "time（ms）,position【ft】,speed（km/h）,brake_pressure［bar］\n"),
     ("a line below", OURS + "ms,ft,km/h,bar\n"),
     ("brackets below a preamble", "Recorder X,,,\n" + OURS + "[ms],[ft],[km h⁻¹],[bar]\n"),
 ]
@@ -56,6 +59,8 @@ def test_units_that_the_log_names_count_and_are_said(
 
 
 def test_a_column_is_named_with_its_unit_or_without(importing: Import) -> None:
+    assert importing("t;v km/h\n1;36\n2;36\n", "--time", "t", "--speed", "v km/h") == 0
+    assert SPEED.read(importing.messages("speed")[0]).speed_mps == 10.0
     for name in ("v [km/h]", "v", "V"):
         importing.output = importing.output.with_name(f"of {name[-1]}")
         assert importing("t;v [km/h]\n1;36\n2;36\n", "--time", "t", "--speed", name) == 0

@@ -29,7 +29,7 @@ from ...wire.messages.refused import MAX_WHEEL_RADPS
 
 TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "min": 60 * 10**9, "h": 3600 * 10**9}
 TIME_UNITS |= {"excel": 86_400 * 10**9}
-"""In ns; besides there is `iso`, a date. `excel`: days, those of 1970 from 25569 on."""
+"""In ns; besides there is `iso`, a date. `excel`: days, those of 1970 from 25569 on, else of none."""
 
 EXCEL_1970 = 25_569
 """The day of a spreadsheet on which the epoch begins."""

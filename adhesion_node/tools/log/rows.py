@@ -170,7 +170,7 @@ def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any
         refuse(bad, "not_a_time", "time", lambda _: how)
         return
     outside = bad & np.isfinite(numbers(cells, form.decimal or "."))
-    range_ = "a stamp lies between 1970 (or 0) and 2038: is the --time-unit another?"
+    range_ = "a stamp lies between 1970 (or 0) and 2038: is the --time-unit another? Or --time-format %Y%m%d%H%M%S?"
     refuse(outside, "out_of_range", "time", lambda _: range_)
     refuse(bad, "not_a_number", "time", lambda _: f"{NO_NUMBER}; a date is told by --time-format")
 

@@ -127,7 +127,7 @@ def _cure(rows: pd.DataFrame, late: Flags, set_back: str) -> str:
     if falls < 3 and late.sum() > 10 * max(falls, 1):
         if falls:
             return set_back
-        if rows["t_ns"][late].nunique() == 1:
+        if rows["t_ns"][late].nunique() == 1 and not late[1]:
             return "the clock stands still from there on: cut the log there"
         repeated = bool(rows.duplicated()[late].all())
         return (

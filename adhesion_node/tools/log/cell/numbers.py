@@ -159,7 +159,9 @@ def _stamps(read: "pd.Series[Any]") -> "np.ndarray[Any, np.dtype[np.int64]]":
 def _count(text: str, unit: str) -> int:
     """A number of units, exactly; digits beyond the nanosecond are rounded."""
     try:
-        value = (Decimal(text) - (EXCEL_1970 if unit == "excel" else 0)) * TIME_UNITS[unit]
+        value = Decimal(text)
+        value -= EXCEL_1970 if unit == "excel" and value >= EXCEL_1970 else 0  # less is the time of a day alone
+        value *= TIME_UNITS[unit]
     except ArithmeticError:
         return NO_TIME
     # Python also reads 1_000 as a number; in a log it is a misprint.

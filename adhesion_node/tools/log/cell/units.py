@@ -45,10 +45,12 @@ _KINDS = {"gauge": "g|ga|gauge|rel|ü", "absolute": "a|abs|absolute?"}
 _WITH_KIND = {kind: re.compile(rf"(.+?)[(_]*(?:{ends})\.?") for kind, ends in _KINDS.items()}
 """What follows a unit of pressures where it says above what they are: `barg`, `bar(a)`, `kPa abs`."""
 
-_BRACKETS = re.compile(r"(.*?)(?:\s*/|\s+in)?[\s_]*[\[(<{]\s*(.*?)\s*[\])>}]+")
+_BRACKETS = re.compile(r"(.*?)(?:\s*/|\s+in)?[\s_]*[\[(<{（【［]\s*(.*?)\s*[\])>}）】］]+")
 
-_MARKS = re.compile(r"(.+)_(.+)$"), re.compile(r"(.+?)\s*/\s*(.+)$"), re.compile(r"(.+)\s+in\s+(.+)$")
-"""What stands between a name and its unit without brackets, `p_bar`, `v/km/h`, `v in km/h`; so DIN 1313 has it."""
+_MARKS = tuple(
+    map(re.compile, (r"(.+)_(.+)$", r"(.+?)\s*/\s*(.+)$", r"(.+)\s+in\s+(.+)$", r"(.+)[\s.](.+)$", r"(.+?)\s(.+)$"))
+)
+"""What stands between a name and its unit without brackets: `p_bar`, `v/km/h` (DIN 1313), `v in km/h`, `v km/h`."""
 
 
 def known(text: str, column: str) -> str | None:
@@ -73,7 +75,7 @@ def kind_of(text: str, column: str) -> str | None:
 
 def _known(text: str, column: str) -> tuple[str | None, str | None]:
     """The unit and the kind."""
-    plain = unicodedata.normalize("NFKC", text).replace("\u2212", "-").casefold().strip("[](){}<> ")
+    plain = unicodedata.normalize("NFKC", text).replace("\u2212", "-").casefold().strip("[](){}<>【】 ")
     plain = re.sub(r"\^1$|[\s^*·⋅]", "", plain)
     family = FAMILIES.get(column, column)
     ends = _WITH_KIND if family == "pressure" else {}

@@ -27,10 +27,13 @@ from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
 from .sentinels import sentinels
-from .ways import leaps, slow_or_falling, speed_against_positions
+from .ways import leaps, radians, slow_or_falling, speed_against_positions
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
+
+FAST_MPS, FAST_MPS2 = 45.0, 1.6
+"""No train that is faster than the one brakes harder than the other."""
 
 SLOWEST_ROWS_S, FASTEST_ROWS_S, USUAL_ROWS_S = 10.0, 5e-4, 0.3
 """Between two rows of a recorder."""
@@ -54,13 +57,13 @@ def odd(log: Log) -> list[str]:
     of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *_pressures(log)]
     if of_time or stand_ins or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *(of_time or _too_far(log, t_s)), *texts]
-    of_way = [*leaps(log, t_s)]
+    of_way = [*leaps(log, t_s), *radians(log)]
     if not of_way and (froze := [*frozen(log, t_s)]):
         return [*log.columns.doubts, *texts, *froze]
     motion = motion_of(log, t_s)
     alone = () if motion.by_fixes else slow_or_falling(motion)
     of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else alone)]
-    of_way = of_way or [*_too_fast(motion, log.form), *_hard(motion, log.form)]
+    of_way = of_way or [*_too_fast(motion, log.form)] or [*_hard(motion, log.form)]
     return [
         *log.columns.doubts,
         *texts,
@@ -137,7 +140,8 @@ def _empty(log: Log) -> Iterator[str]:
 def _hard(motion: Motion, form: Format) -> Iterator[str]:
     """Without positions only the braking tells of a wrong unit of the speed."""
     steps = (motion.speed_mps[HARD_S:] - motion.speed_mps[:-HARD_S]) / HARD_S
-    if np.nanmin(steps, initial=0.0) < -HARDEST_MPS2:
+    slows_fast = motion.slows_mps2[np.abs(motion.speed_mps) > FAST_MPS] < -FAST_MPS2
+    if np.nanmin(steps, initial=0.0) < -HARDEST_MPS2 or slows_fast.any():
         unit = "km/h read as m/s, --speed-unit kmh? Or " if form.unit("speed") == "mps" else ""
         other = "is it of a wheel that locked, or do numbers stand for no value? Leave those cells empty"
         yield f"the speed falls by {-np.nanmin(steps):.1f} m/s^2, harder than any train brakes: {unit}{other}"

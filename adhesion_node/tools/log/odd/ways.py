@@ -42,6 +42,14 @@ def leaps(log: Log, t_s: Array) -> Iterator[str]:
         )
 
 
+def radians(log: Log) -> Iterator[str]:
+    """Degrees of no railway: all between the coasts of Ghana and Brazil."""
+    if {"lat", "lon"} <= set(log.rows):
+        lat, lon = (log.rows[name].abs().max() for name in ("lat", "lon"))
+        if lat <= math.pi / 2.0 and lon <= math.pi:
+            yield f"lat and lon are {lat:.4g} and {lon:.4g} at most: are they radians? Write degrees"
+
+
 def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
     """Positions and speeds tell the same way; if not, what the one is of the other tells why."""
     course, speed = motion.course_mps[motion.both], motion.pace_mps[motion.both]
