@@ -301,6 +301,20 @@ def test_a_number_that_stands_for_no_value_is_said(importing: Import, column: st
     assert importing.summary["odd"] == []
 
 
+@pytest.mark.parametrize("drop", [[], ["position"]], ids=str)
+@pytest.mark.parametrize(("column", "mark"), [("speed", 0), ("speed", -1), ("position", -1)])
+def test_a_number_to_which_no_train_leaps_stands_for_no_value(
+    importing: Import, column: str, mark: float, drop: list[str]
+) -> None:
+    rows = ride()
+    gaps = rows.index % 7 == 3
+    importing(
+        text(rows.assign(**{column: rows[column].mask(gaps, mark)}).drop(columns=drop if column == "speed" else []))
+    )
+    told = f"{column} is {mark:g} in {gaps.sum()} rows, far from all others: no value? Leave those cells empty"
+    assert importing.summary["odd"] == [told]
+
+
 @pytest.mark.parametrize(
     ("column", "mark", "options"),
     [

@@ -73,6 +73,17 @@ def test_degrees_in_parts(importing: Import, form: str, decimal: str) -> None:
     assert [fix.longitude for fix in fixes] == pytest.approx(lon.tolist(), abs=1e-8)
 
 
+@pytest.mark.parametrize("form", ["{d:0{w}}{mm:010.7f}", "{dd:.9f}"])
+def test_a_letter_in_the_next_column_counts(importing: Import, form: str) -> None:
+    cells = [form.format(d=d, w=w, mm=30.0, dd=d + 0.5) for d, w in ((33, 2), (7, 3))]
+    log = f"time,lat,ns,lon,ew,speed\n1,{cells[0]},S,{cells[1]},W,2\n2,,S,,,2\n3,{cells[0]},S,{cells[1]},E,2\n"
+    assert importing(log) == 0, importing.errors
+    assert [(fix.latitude, fix.longitude) for fix in importing.messages("fix")] == [(-33.5, -7.5), (-33.5, 7.5)]
+    importing.output = importing.output.with_name("other")
+    assert importing("time,lat,next,lon\n1,33.5,N,7.5\n2,33.5,X,7.5\n") == 0
+    assert importing.messages("fix")[0].latitude == 33.5
+
+
 @pytest.mark.parametrize("cell", ["51°28'N", "51°61'E", "-1°30'W", "129.18,E", "1°28'75\"E", "1°30'O", "E1°30'E"])
 def test_what_is_no_longitude_is_refused(importing: Import, cell: str) -> None:
     assert importing(f"time;lat;lon\n1;51.5;{cell}\n2;51.5;{cell}\n") == 2

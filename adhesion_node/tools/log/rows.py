@@ -21,7 +21,7 @@ import pandas as pd
 from ...command.checks import refuse
 from .cell.marks import marks
 from .cell.numbers import FORMATS, NO_TIME, Flags, grouped, numbers, time_formats, time_unit, times_ns
-from .cell.places import PARTS, in_numbers
+from .cell.places import PARTS, in_numbers, with_letters
 from .cell.units import kind_of, known
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import LIMITS, Format
@@ -99,6 +99,7 @@ def measured(source: str, log: Source) -> Iterator[Measured]:
                 cell = str(column[in_groups].iloc[0])
                 read_as[name] = f"{cell!r} is read as {re.sub('[.,]', '', cell)}"
             if name in PARTS:
+                column = with_letters(cells, theirs, name)
                 cells[theirs] = in_numbers(column, name, log.form.unit(name), decimal)
                 if (in_parts := cells[theirs] != column).any():
                     read_as[name] = f"{column[in_parts].iloc[0]!r} is read as {cells[theirs][in_parts].iloc[0]}"

@@ -67,6 +67,16 @@ def number_of(cell: str, column: str, unit: str) -> float | None:
     return sign * round(read["d"] + read.get("m", 0.0) / 60.0 + read.get("s", 0.0) / 3600.0, 12)
 
 
+def with_letters(rows: pd.DataFrame, name: str, column: str) -> "pd.Series[Any]":
+    """Return the cells of a latitude or longitude with the N, S, E or W that the column to its right holds alone."""
+    right = list(rows)[list(rows).index(name) + 1 :][:1]
+    letters = rows[right[0]].astype(str) if right else pd.Series("", index=rows.index)
+    allowed = {"lat": ("N", "S", ""), "lon": ("E", "W", "")}.get(column, ())
+    if not letters.isin(allowed).all() or (letters == "").all():
+        return rows[name]
+    return rows[name].where(rows[name].isna() | (rows[name] == ""), rows[name].astype(str) + letters)
+
+
 def in_numbers(cells: "pd.Series[Any]", column: str, unit: str, decimal: str) -> "pd.Series[Any]":
     """Return the cells of a column of places with the numbers that those in parts mean."""
     if pd.api.types.is_numeric_dtype(cells):

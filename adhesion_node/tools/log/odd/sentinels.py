@@ -11,8 +11,10 @@
 from collections.abc import Iterator
 
 import numpy as np
+import pandas as pd
 
 from ....core.physics.train import Array
+from ....run.results.seen import FASTEST_MPS
 from ..cell.marks import marks
 from ..whole import Log
 
@@ -21,6 +23,9 @@ LEAST_ROWS = 3
 
 FAR, FAR_MARK = 3.0, 0.01
 """From the next number: in spreads of all others; for one of the marks in its own size."""
+
+LEAPS, MOSTLY = {"position": (100.0, FASTEST_MPS), "speed": (5.0, 30.0)}, 0.9
+"""No train's place or speed changes by the first and so much in a second besides."""
 
 OF_A_PLACE = ("position", "lat", "lon", "height")
 """They change little by little, whereas a pressure or an acceleration may leave 0 at once."""
@@ -37,8 +42,20 @@ def sentinels(log: Log) -> Iterator[str]:
             others = values[values != mark]
             away = float(np.abs(others - mark).min())
             is_mark = bool(marks(np.array(written))) and away > FAR_MARK * abs(mark)
-            if is_mark or (name in OF_A_PLACE and away > FAR * np.ptp(others) > 0.0):
+            if is_mark or _leaps(log.rows, name, mark) or (name in OF_A_PLACE and away > FAR * np.ptp(others) > 0.0):
                 yield f"{name} is {written:.6g} in {rows} rows, far from all others: no value? Leave those cells empty"
+
+
+def _leaps(rows: pd.DataFrame, name: str, mark: float) -> bool:
+    """Whether a train's place or speed leaps to 0, or below, and back as none can, nearly whenever it has it."""
+    if name not in LEAPS or mark > 0.0:
+        return False
+    known = rows[["t_ns", name]].dropna().to_numpy()
+    is_mark = known[:, 1] == mark
+    at = np.flatnonzero(is_mark[1:] != is_mark[:-1])
+    steps_s, steps = np.diff(known, axis=0)[at].T
+    least, per_s = LEAPS[name]
+    return len(at) > 2 * LEAST_ROWS and bool((np.abs(steps) > least + per_s * steps_s / 1e9).mean() > MOSTLY)
 
 
 def _extremes(values: Array) -> Iterator[tuple[float, int]]:
