@@ -22,7 +22,8 @@ from .cell.numbers import Flags
 from .columns import Columns
 from .format import PRESSURE_UNITS, Format
 from .held import without_held
-from .rows import measured, open_log
+from .opened import open_log
+from .rows import measured
 from .steps import DEGREE_M, stds_of
 from .text import Refusal
 from .wraps import unwrapped
