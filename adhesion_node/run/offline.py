@@ -29,7 +29,7 @@ from ..wire.settings.given import given
 from ..wire.settings.nodes import SEED, SETTINGS
 from ..wire.settings.setup import setup_of
 from ..wire.topic import Topic
-from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_MU, TRUTH_STATE, WHEEL_SPEED
+from ..wire.topics import ADHESION_INPUTS, FIX, SENSORS, SPEED, TRUTH_LIMITED, TRUTH_MU, TRUTH_STATE, WHEEL_SPEED
 from .engine import EstimatorPipeline
 from .pipeline import BACK_M, BACKWARDS, Pipeline
 from .reader import Reader
@@ -163,9 +163,13 @@ def _noting(truth: Truth, recorded: Iterable[Recorded]) -> Iterator[Recorded]:
     """Pass the messages on, and note what the simulator knew."""
     for name, message, log_ns in recorded:
         try:
-            if name == TRUTH_MU.name and not isinstance(message, Rejected):
+            if isinstance(message, Rejected):
+                pass
+            elif name == TRUTH_MU.name:
                 truth.mu[log_ns] = TRUTH_MU.read(message)
-            elif name == TRUTH_STATE.name and not isinstance(message, Rejected):
+            elif name == TRUTH_LIMITED.name:
+                truth.limited[log_ns] = TRUTH_LIMITED.read(message)
+            elif name == TRUTH_STATE.name:
                 state = TRUTH_STATE.read(message)
                 truth.speed_mps[state.t_ns] = state.speed_mps
         except Rejected as refusal:

@@ -13,6 +13,7 @@ and with a page in the browser.
 """
 
 import argparse
+import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -42,7 +43,6 @@ from ..live.__main__ import address_of, address_options
 from ..live.node import Live
 from ..report.drawn.picture import draw
 from ..report.drawn.table import table
-from ..report.found.braking_row import true_used
 from ..report.found.regimes import IN_WORDS, Band
 from ..report.read.gathered import read_status
 from ..report.read.recorded import read_run
@@ -179,26 +179,12 @@ def _true_bands(regimes: Sequence[tuple[int, str]], run: Run) -> list[Band]:
 
 
 def _found(truth: Sequence[Band], run: Run) -> dict[str, float]:
-    """When adhesion first limited the train, s, how long after that an estimate says so, and the error from then on.
-
-    The error is that of mu against the mean over 1 s of the adhesion used, while adhesion limits in truth.
-    """
+    """When adhesion first limited the train, s, and how long after that an estimate says so."""
     limited = Regime.ADHESION_LIMITED.name
-    bands = [band for band in truth if band.regime == limited]
+    begun_s = next((band.start_s for band in truth if band.regime == limited), math.inf)
     said_s = run.seconds(run.regime.t_ns[run.regime.values == limited])
-    said_s = said_s[said_s >= bands[0].start_s] if bands else said_s[:0]
-    if not said_s.size:
-        return {}
-    used = true_used(run).at(run.mu.t_ns)
-    at_s = run.seconds(run.mu.t_ns)
-    counts = (at_s >= said_s[0]) & np.any([(at_s > band.start_s) & (at_s < band.end_s) for band in bands], axis=0)
-    error = float(np.mean(np.abs(run.mu.values[counts] / used[counts] - 1.0)))
-    begun_s = bands[0].start_s
-    return {
-        "limited_from_s": begun_s,
-        "told_after_s": float(said_s[0]) - begun_s,
-        "mean_relative_error_percent": 100.0 * error,
-    }
+    said_s = said_s[said_s >= begun_s]
+    return {"limited_from_s": begun_s, "told_after_s": float(said_s[0]) - begun_s} if said_s.size else {}
 
 
 def _said(result: dict[str, Any]) -> Iterator[str]:

@@ -114,6 +114,13 @@ TRUTH_MU = _number(
     "simulators only: the available adhesion; of a real train the one that its force *uses*, as that stops it; of "
     "`slip_simulator` the peak",
 )
+TRUTH_LIMITED = Topic(
+    "truth/limited",
+    "std_msgs/msg/Bool",
+    Role.TRUTH,
+    codec=results.FLAG,
+    meaning="simulators only, of a real train: whether its adhesion limits, as half of its axle groups slide by turns",
+)
 
 MU = _number("adhesion/mu", Role.ADHESION, results.MU, "μ̂, one per estimate, for plots: it has no stamp")
 MU_LOWER = _number(

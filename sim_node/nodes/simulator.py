@@ -10,7 +10,7 @@
 
     position, brake_pressure            measurements, one stamp per sample
     speed, wheel_speed                  more of them, where their noise is above 0
-    truth/state, truth/mu               the true train
+    truth/state, truth/mu               the true train; of a real one truth/limited, too
     /clock                              time of the sample
 
 The parameter `fault` lets something go wrong. The scenarios of a real train have wheels, slide protection and the
@@ -36,7 +36,7 @@ from ..real.run import ticks
 from ..real.sensors.fitted import FITTED
 from ..settings import SENSORS, SIMULATOR
 from ..train import scenario
-from ..train.plant import Truth
+from ..train.plant import ADHESION_LIMITED, Truth
 from ..train.sensors import SensorMessage, SensorSettings, Tick
 from .pace import RunNode
 
@@ -67,7 +67,8 @@ class Simulator(RunNode):
         """When, s of the run, it begins and ends, in words."""
         self._refuse_unheeded()
         run, there, period_s = self._real_run() if self._real else self._run_of_paper()
-        self.begin(run, (*topics.TRUTH, *there), period_s, paced=paced)
+        truth = topics.TRUTH if self._real else (topics.TRUTH_STATE, topics.TRUTH_MU)
+        self.begin(run, (*truth, *there), period_s, paced=paced)
 
     def _refuse_unheeded(self) -> None:
         """Raise ValueError for the first parameter that is set though this scenario does not heed it."""
@@ -120,6 +121,8 @@ class Simulator(RunNode):
         if not (self._real and measured):
             self.send(topics.TRUTH_STATE, self.now_ns, truth.position_m, truth.speed_mps)
             self.send(topics.TRUTH_MU, truth.mu)
+            if self._real:
+                self.send(topics.TRUTH_LIMITED, truth.regime == ADHESION_LIMITED)
         for one in measured:
             t_ns = max(self.now_ns - truth.t_ns + one.t_ns, 0)
             self.send(one.topic, t_ns, one.values, one.variance, one.frame)

@@ -22,7 +22,7 @@ def test_selection_renames_and_takes_sensors_and_truth_alone() -> None:
     own = {f"/{topic.name}": topic.type for topic in RECORDED} | {CLOCK.name: CLOCK.type}
     places = ("position", "fix", "odometry")
     sensors = (*places, "brake_pressure", "brake_demand", "speed", "imu", "wheel_speed", "traction_force")
-    assert select(own) == {f"/{name}": name for name in (*sensors, "truth/state", "truth/mu")}
+    assert select(own) == {f"/{name}": name for name in (*sensors, "truth/state", "truth/mu", "truth/limited")}
     creep = {"/wheel_speed": WHEEL_SPEED.type}
     assert select(creep) == {"/wheel_speed": "wheel_speed"}, "a recording for the creep curve needs no position"
     for other in (FIX, ODOMETRY):

@@ -29,6 +29,7 @@ from sim_node.nodes import simulator
 from sim_node.nodes.simulator import Simulator
 from sim_node.real.drive import START_S, drive
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
+from sim_node.real.run import truths
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.run import run
 from sim_node.train.scenario import find
@@ -138,6 +139,10 @@ def test_a_real_train_sends_what_its_drive_holds_in_order_of_arrival(
     assert len(clocks) == len(stamps) + len(lists["/truth/mu"]) == len(stamps) + len(lists["/truth/state"])
     used = [m.data for m in lists["/truth/mu"]]
     assert used == [driven.journey.used[5 * k] for k in range(len(used))]
+    known = truths(driven.journey)
+    assert [m.data for m in lists["/truth/limited"]] == [
+        known[5 * k].regime == "ADHESION_LIMITED" for k in range(len(used))
+    ]
     assert [state for _, state in node.changes][-1] == "COASTING"  # it stands
 
 

@@ -26,7 +26,7 @@ from rclpy.publisher import Publisher
 from test_simulator import _destroy, _nanoseconds, _simulator
 
 from adhesion_node.nodes.ros.qos import subscribe
-from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH
+from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, POSITION, SPEED, TRUTH_MU, TRUTH_STATE
 from sim_node.nodes.pace import MAX_BURST, due_s
 from sim_node.nodes.simulator import Simulator
 from sim_node.settings import SLOWEST
@@ -40,7 +40,7 @@ class _Listener(Node):
     def __init__(self, context: Context) -> None:
         super().__init__("listener", context=context)
         self.heard: dict[str, list[Any]] = defaultdict(list)
-        for topic in (CLOCK, *TRUTH, POSITION, BRAKE_PRESSURE, SPEED):
+        for topic in (CLOCK, TRUTH_STATE, TRUTH_MU, POSITION, BRAKE_PRESSURE, SPEED):
             self.create_subscription(message_class(topic), topic.name, self.heard[topic.name].append, 100)
 
 

@@ -32,9 +32,10 @@ from adhesion_node.core import Estimate
 from adhesion_node.core.physics.adhesion import DRY, WET
 from adhesion_node.core.physics.track import LEVEL
 from adhesion_node.nodes import replay
+from adhesion_node.report import __main__ as report
 from adhesion_node.tools import demo, line, staged
 from adhesion_node.tools.line import executor_of_line
-from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH
+from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH_MU, TRUTH_STATE
 from sim_node.nodes import simulator
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
 from sim_node.train import scenario
@@ -111,7 +112,7 @@ def _check_bag(path: Path) -> None:
     assert counts.pop(ATP_STATUS.name) >= 1
     assert counts.pop(DIAGNOSTICS.name.lstrip("/")) > estimates, "the monitor speaks of its changes, too"
     assert counts == {
-        **{topic.name: SAMPLES for topic in (POSITION, BRAKE_PRESSURE, *TRUTH)},
+        **{topic.name: SAMPLES for topic in (POSITION, BRAKE_PRESSURE, TRUTH_STATE, TRUTH_MU)},
         **{topic.name.lstrip("/"): estimates for topic in RESULTS},
     }
 
@@ -138,6 +139,11 @@ def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_k
     left = {path.name for path in Path(result["picture"]).parent.iterdir()}
     assert left == {"bag", "params.yaml", "run.png"} | ({"track.geojson"} if sensors == "fix" else set())
     assert digest_of_what_it_says(out, tmp_path) == result["live_digest"]
+    again = json.loads((tmp_path / "again.json").read_text())
+    assert again["mean_relative_error_percent"] == result["mean_relative_error_percent"]
+    report.main([result["bag"], "--output", str(tmp_path / "page"), "--json", str(tmp_path / "report.json")])
+    (run,) = json.loads((tmp_path / "report.json").read_text())["runs"]
+    assert run["mean_relative_error_percent"] == pytest.approx(result["mean_relative_error_percent"], rel=1e-9)
 
 
 def test_equal_runs_leave_equal_bytes_however_busy_the_machine_is(tmp_path: Path) -> None:

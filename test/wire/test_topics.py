@@ -44,6 +44,7 @@ from adhesion_node.wire.topics import (
     SPEED,
     TOPICS,
     TRACTION_FORCE,
+    TRUTH_LIMITED,
     TRUTH_MU,
     TRUTH_STATE,
     WHEEL_SPEED,
@@ -85,6 +86,7 @@ def values_of(topic: Topic) -> tuple[Any, ...]:
     others: dict[Topic, tuple[Any, ...]] = {
         TRUTH_STATE: (T_NS, 1500.0, 70.0),
         TRUTH_MU: (0.0726,),
+        TRUTH_LIMITED: (True,),
         ATP_TARGET: (T_NS, Target(6000.0, 27.8)),
         CLOCK: (T_NS,),
     }

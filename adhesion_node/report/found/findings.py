@@ -89,9 +89,10 @@ def why_not(run: Run) -> str | None:
 
 
 def _error(run: Run, config: Config) -> float | None:
-    """The score of an offline replay; None where the recording holds no truth of the estimates' stamps."""
+    """The score of an offline replay; None where the truth does not tell it."""
     if not run.true_mu.t_ns.size:
         return None
     pressure_pa = run.pressure.by_time()
-    truth = Truth(mu=run.true_mu.by_time(), speed_mps=run.true_speed.by_time(), pressure_pa=pressure_pa)
+    mu, speed, limited = (series.by_time() for series in (run.true_mu, run.true_speed, run.true_limited))
+    truth = Truth(mu, speed, pressure_pa, limited)
     return mean_relative_error_percent(config, truth, [Point(*row) for row in run.mu.by_time().items()])

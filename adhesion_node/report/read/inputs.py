@@ -23,10 +23,11 @@ class Inputs:
 
     def __init__(self) -> None:
         self.pressure, self.demand = (Numbers(attrgetter("pressure_pa")) for _ in range(2))
-        self.creep, self._mu = CreepTaken(), Numbers()
+        self.creep, self._mu, self._limited = CreepTaken(), Numbers(), Numbers()
         self._position, self._speed = Numbers(attrgetter("position_m")), Numbers(attrgetter("speed_mps"))
         self.truth: tuple[tuple[Topic, Take], ...] = (
             (topics.TRUTH_MU, self._mu.take),
+            (topics.TRUTH_LIMITED, self._limited.take),
             (topics.TRUTH_STATE, self._position.take),
             (topics.TRUTH_STATE, self._speed.take),
         )
@@ -45,6 +46,7 @@ class Inputs:
         return Run(
             creep=self.creep.curves(),
             true_mu=self._mu.series,
+            true_limited=self._limited.series,
             true_position=self._position.series,
             true_speed=self._speed.series,
             pressure=pressure if pressure.t_ns.size else self.demand.series,

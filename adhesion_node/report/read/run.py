@@ -26,6 +26,8 @@ class Run(NamedTuple):
     """The series of a recording; empty where it holds none."""
 
     true_mu: Series = NONE
+    true_limited: Series = NONE
+    """1 where adhesion limits a real train, as its simulator knows, else 0."""
     true_position: Series = NONE
     true_speed: Series = NONE
     pressure: Series = NONE

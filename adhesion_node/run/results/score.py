@@ -8,14 +8,16 @@
 
 """How good the estimates of a run are against the simulator's truth."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...core import Config
-from ...core.physics.train import GRAVITY, KMH, Train
+from ...core.physics.train import GRAVITY, KMH, Array, Train
+from .used import averaged
 
 CONVERGED_AFTER_MPS = 30.0 * KMH
 """Speed lost under the brake after which the paper's estimates count as converged."""
@@ -28,6 +30,12 @@ grade or an error of the believed resistance does is less."""
 
 SMOOTH_S = 2.0
 """The motion of a simulated train is noisy, too."""
+
+AFTER_SHARE = 0.25
+"""Part of its first speed that a real train loses before its estimates count, where 30 km/h is more."""
+
+SLOWEST_MPS = 3.0
+"""Until a real train is down to it, its estimates count."""
 
 
 class Identified(Protocol):
@@ -55,6 +63,8 @@ class Truth:
     speed_mps: dict[int, float] = field(default_factory=dict)
     pressure_pa: dict[int, float] = field(default_factory=dict)
     """Gauge."""
+    limited: dict[int, bool] = field(default_factory=dict)
+    """Of a real train, whether adhesion limited it; `mu` is then what it used."""
 
     def limits(self, config: Config, t_ns: int) -> bool:
         """Whether the true adhesion, not the brake, limited the train at a time."""
@@ -85,8 +95,10 @@ def mean_relative_error_percent(config: Config, truth: Truth, estimates: Iterabl
     """Mean of abs(mu - true mu)/true mu in % over all estimates while adhesion limits, after the first 30 km/h.
 
     Every estimate counts, whatever regime it claims; none where the train in truth uses less, as by worn pads. None
-    where there is no truth to compare with.
+    where there is no truth to compare with. Of a real train see `_of_real_train`.
     """
+    if truth.limited:
+        return _of_real_train(truth, estimates)
     slow_enough, used = truth.converged_speed(config), truth.used(config.train)
     errors = [
         abs(estimate.mu - truth.mu[estimate.t_ns]) / truth.mu[estimate.t_ns]
@@ -96,3 +108,28 @@ def mean_relative_error_percent(config: Config, truth: Truth, estimates: Iterabl
         and truth.mu[estimate.t_ns] - used.get(estimate.t_ns, np.inf) < max(LESS * truth.mu[estimate.t_ns], LEAST_LESS)
     ]
     return 100.0 * float(np.mean(errors)) if errors else None
+
+
+def _of_real_train(truth: Truth, estimates: Iterable[Identified]) -> float | None:
+    """The same by the mean over a second of what a real train used, whatever the stamps, as `study real` has it.
+
+    A quarter of the speed is enough where that is less than 30 km/h; a train slower than 3 m/s does not count.
+    """
+    points = [(estimate.t_ns, estimate.mu) for estimate in estimates]
+    if not (points and truth.mu and truth.speed_mps):
+        return None
+    t_ns, mu = np.array([t_ns for t_ns, _ in points]), np.array([mu for _, mu in points])
+    (mu_ns, used), (speed_ns, speed), (limited_ns, limited) = (
+        _by_time(values) for values in (truth.mu, truth.speed_mps, truth.limited)
+    )
+    true, now = np.interp(t_ns, mu_ns, averaged(mu_ns, used)), np.interp(t_ns, speed_ns, np.abs(speed))
+    before = np.interp(t_ns, speed_ns, np.maximum.accumulate(np.abs(speed)))
+    limits = np.interp(t_ns, limited_ns, limited, left=0.0, right=0.0) == 1.0
+    counts = limits & (now > SLOWEST_MPS) & (now < before - np.minimum(CONVERGED_AFTER_MPS, AFTER_SHARE * before))
+    return 100.0 * float(np.mean(np.abs(mu[counts] / true[counts] - 1.0))) if counts.any() else None
+
+
+def _by_time(values: Mapping[int, float]) -> tuple[NDArray[np.int64], Array]:
+    """Times and values in the order of time."""
+    t_ns = np.array(sorted(values), dtype=np.int64)
+    return t_ns, np.array([values[one] for one in t_ns.tolist()], dtype=np.float64)

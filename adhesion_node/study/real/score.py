@@ -37,16 +37,13 @@ from numpy.typing import NDArray
 
 from ...core import Regime
 from ...core.physics.train import Array
-from ...run.results.score import CONVERGED_AFTER_MPS
+from ...run.results.score import AFTER_SHARE, CONVERGED_AFTER_MPS, SLOWEST_MPS
 from ..trial.score import TWO_SIDED_95, statistic
 from ..trial.trials import Rows
-from .trials import SLOWEST_MPS, Found
+from .trials import Found
 
 LIMITS_FROM, BRAKE_BELOW = 0.5, 0.05
 """Shares of sliding axle groups from which adhesion limits, and below which the brake does."""
-
-AFTER_SHARE = 0.25
-"""Part of the first speed that is lost before estimates count for the error, where 30 km/h is more."""
 
 TOLERANCE_M = 5.0
 LONG_WAY_M = 100.0

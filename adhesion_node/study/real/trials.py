@@ -23,6 +23,7 @@ from ...command.running import Arrays, Running, run_all
 from ...core import Config
 from ...core.physics.train import GRAVITY, Array
 from ...run.pipeline import Pipeline
+from ...run.results.score import SLOWEST_MPS
 from ...wire.line import NOMINAL, Line
 from ...wire.topics import POSITION
 from ..trial.estimators import LaneResult, through
@@ -50,9 +51,6 @@ run ended; the speed at the first."""
 
 BORDER = np.dtype([("seed", np.int64), *((name, np.float64) for name in Border._fields)])
 """A border of the rail that a run passed, as in `truth.Border`."""
-
-SLOWEST_MPS = 3.0
-"""Speed above which estimates count."""
 
 NAIVE_S = 5.0
 """Length of the parabola of the naive estimate."""

@@ -174,6 +174,7 @@ def write_status(new: New, t_ns: int, status: Status) -> Fields:
 
 
 NUMBER = Codec(read_number, lambda _, value: {"data": value}, _numbers)
+FLAG = Codec(lambda message, _: bool(message.data), lambda _, value: {"data": value})
 MU = NUMBER._replace(write=lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu})
 MU_LOWER = NUMBER._replace(write=lambda _, made: None if made.estimate.withheld else {"data": made.estimate.mu_lower})
 CREEP_MU_MAX = Codec(read_number, lambda _, found: {"data": found.mu_max} if found.known else None)

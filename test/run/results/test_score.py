@@ -36,6 +36,15 @@ def at(second: int, mu: float, regime: Regime = Regime.ADHESION_LIMITED) -> Esti
     return Estimate(second * S, mu, 0.01, mu, regime, 0.0, 0.0, 0.1, 0.1)
 
 
+def real_truth(*rows: tuple[float, float, bool]) -> Truth:
+    """Build the truth of a real train from (used, speed in km/h, limited), a row per second."""
+    return Truth(
+        mu={second * S: used for second, (used, _, _) in enumerate(rows)},
+        speed_mps={second * S: kmh / 3.6 for second, (_, kmh, _) in enumerate(rows)},
+        limited={second * S: limited for second, (_, _, limited) in enumerate(rows)},
+    )
+
+
 BRAKING = truth_of(
     (0.080, 300, 0.0),
     (0.080, 300, FULL_PA),  # the first braking: estimates count below 270 km/h
@@ -97,3 +106,32 @@ def test_without_truth_or_estimates_there_is_no_score() -> None:
     nameless = truth_of(*((0.08, 300 - 10 * second, FULL_PA) for second in range(10)))
     nameless.mu.clear()
     assert mean_relative_error_percent(CONFIG, nameless, [at(9, 0.1)]) is None
+
+
+SLIDING = real_truth(
+    (0.05, 80, False),
+    (0.05, 80, True),
+    (0.04, 60, True),  # a quarter is lost
+    (0.04, 59, True),
+    (0.05, 50, True),
+    (0.05, 48, False),
+    (0.05, 10, True),
+)
+
+
+def between(second: float, mu: float) -> Estimate:
+    return at(0, mu)._replace(t_ns=round(second * S))
+
+
+def test_a_real_train_counts_while_it_slides_whatever_the_stamps() -> None:
+    assert mean_relative_error_percent(CONFIG, SLIDING, [between(2.9, 0.05)]) == pytest.approx(25.0)
+    assert mean_relative_error_percent(CONFIG, SLIDING, [between(3.5, 0.045)]) == pytest.approx(0.0)
+    for second in (0.5, 1.5, 4.1, 5.5, 7.0, 99.0):  # not limited, too early, about to end, after the end
+        assert mean_relative_error_percent(CONFIG, SLIDING, [between(second, 0.05)]) is None
+    both = [between(2.9, 0.05), between(5.5, 0.9)]
+    assert mean_relative_error_percent(CONFIG, SLIDING, both) == pytest.approx(25.0)
+
+
+def test_a_real_train_of_which_nothing_else_is_known_has_no_error() -> None:
+    assert mean_relative_error_percent(CONFIG, Truth(limited={S: True}), [at(1, 0.1)]) is None
+    assert mean_relative_error_percent(CONFIG, SLIDING, []) is None

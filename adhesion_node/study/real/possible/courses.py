@@ -20,10 +20,9 @@ from sim_node.real.plant.journey import PERIOD_S, Journey
 from sim_node.real.plant.validation import slid
 
 from ....core.physics.train import Array
-from ....run.results.score import CONVERGED_AFTER_MPS
+from ....run.results.score import AFTER_SHARE, CONVERGED_AFTER_MPS, SLOWEST_MPS
 from ..cases import Case
-from ..score import AFTER_SHARE, LIMITS_FROM, LONG_WAY_M, UNSEEN_S
-from ..trials import SLOWEST_MPS
+from ..score import LIMITS_FROM, LONG_WAY_M, UNSEEN_S
 from ..truth import Border, borders
 from .unknown import STEP_S, Unknown, unknown_of
 

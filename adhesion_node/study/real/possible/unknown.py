@@ -25,8 +25,8 @@ from sim_node.real.plant.train import FADE_MPS, USUAL
 from sim_node.real.plant.way import CELL_M, LEVEL, draw
 
 from ....core.physics.train import Array
+from ....run.results.score import SLOWEST_MPS
 from .. import point_mass
-from ..trials import SLOWEST_MPS
 
 if TYPE_CHECKING:
     from .courses import Course
