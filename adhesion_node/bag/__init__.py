@@ -10,7 +10,7 @@
 
 from .read.reader import BagReader
 from .read.recordings import Record
-from .selection import parse_remap, select, select_from
+from .selection import choose_train, parse_remap, select, select_from
 from .types import deserialize, encode, serialize, typestore
 from .write.writer import BagWriter, Limits
 
@@ -19,6 +19,7 @@ __all__ = [
     "BagWriter",
     "Limits",
     "Record",
+    "choose_train",
     "deserialize",
     "encode",
     "parse_remap",

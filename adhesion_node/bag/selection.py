@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Which topics of a recording stand for which of ours: remapping, and clear words when they do not fit."""
+"""Which topics of a recording stand for which of ours: whose train, remapping, and clear words when they do not fit."""
 
 from collections.abc import Iterable, Mapping, Sequence
 
@@ -15,6 +15,11 @@ from .read.reader import BagReader
 from .types import same_name
 
 _OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}
+
+_ENOUGH = (*topics.POSITIONS, topics.SPEED, topics.WHEEL_SPEED)
+"""Without any of these a recording has nothing to replay."""
+
+_FORCES = (topics.BRAKE_PRESSURE, topics.BRAKE_DEMAND, topics.TRACTION_FORCE)
 
 
 def parse_remap(text: str) -> tuple[str, str]:
@@ -29,19 +34,53 @@ def parse_remap(text: str) -> tuple[str, str]:
     return source, target
 
 
+def choose_train(reader: BagReader, wanted: str | None) -> None:
+    """Read from now on the train of the namespace `wanted`; without one that in none, or else the only one there is.
+
+    Raises ValueError where the choice is open, or the recording lacks the train.
+    """
+    trains = _trains(reader.topics)
+    if wanted is not None:
+        reader.namespace = f"/{wanted.strip('/')}".rstrip("/")
+        if not any(name.startswith(f"{reader.namespace}/") for name in reader.topics):
+            known = ", ".join(trains) or "none"
+            raise ValueError(f"namespace = {wanted}: not in the recording {reader.path}: choose of {known}")
+    elif trains and "" not in trains:
+        if len(trains) > 1:
+            each = ", ".join(trains)
+            raise ValueError(f"bag = {reader.path}: holds the trains {each}: choose one, --namespace {trains[0]}")
+        (reader.namespace,) = trains
+
+
+def _trains(recorded: Mapping[str, str]) -> list[str]:
+    """Namespaces that hold an adhesion, or a place or speed with a force; without a namespace these are enough."""
+    held: dict[str, set[str]] = {}
+    for name, kind in recorded.items():
+        for topic in (*_ENOUGH, *_FORCES, topics.MU):
+            space, found, _ = f"/{name.lstrip('/')}".rpartition(f"/{topic.name}")
+            if found and topic.type == kind and name.endswith(topic.name):
+                held.setdefault(space, set()).add(topic.name)
+    enough, forces = ({topic.name for topic in each} for each in (_ENOUGH, _FORCES))
+    return sorted(
+        space for space, has in held.items() if topics.MU.name in has or (has & enough and (has & forces or not space))
+    )
+
+
 def select(
-    recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]] = (), names: Iterable[str] | None = None
+    recorded: Mapping[str, str],
+    remaps: Sequence[tuple[str, str]] = (),
+    names: Iterable[str] | None = None,
+    namespace: str = "",
 ) -> dict[str, str]:
     """Return the topics to replay: from the name in the recording to the name after remapping.
 
     `recorded` holds the types by name. Replayed are `names` (after remapping), or else the sensors and the truth,
-    not recorded results. Our own topics come out under their relative names, so that namespaces apply. Raises
-    ValueError when a remapped or named topic is missing, has the wrong type, or when there is neither a position nor
-    a speed nor, for the creep curve, a wheel speed.
+    not recorded results; of several trains that of `namespace`. Our own topics come out under their relative names, so
+    that namespaces apply. Raises ValueError when a remapped or named topic is missing, has the wrong type, or when
+    there is neither a position nor a speed nor, for the creep curve, a wheel speed.
     """
-    renamed = _rename(recorded, remaps)
-    enough = (*topics.POSITIONS, topics.SPEED, topics.WHEEL_SPEED)
-    has_any = any(same_name(target, topic.name) for target in renamed.values() for topic in enough)
+    renamed = _rename(recorded, remaps, namespace)
+    has_any = any(same_name(target, topic.name) for target in renamed.values() for topic in _ENOUGH)
     chosen = list(_OURS) if names is None else list(names)
     selection: dict[str, str] = {}
     for name in chosen:
@@ -57,16 +96,23 @@ def select(
     return selection
 
 
-def select_from(reader: BagReader, remaps: Sequence[str], names: Iterable[str] | None = None) -> dict[str, str]:
-    """Select as `select` does from a recording, by remaps in their written form; errors name the recording."""
+def select_from(
+    reader: BagReader, remaps: Sequence[str], names: Iterable[str] | None = None, namespace: str | None = None
+) -> dict[str, str]:
+    """Select as `select` does from a recording, by remaps in their written form; errors name the recording.
+
+    The train is chosen as by `choose_train`, unless topics are named and no namespace is.
+    """
+    if namespace is not None or not (remaps or names):
+        choose_train(reader, namespace)
     try:
-        return select(reader.topics, [parse_remap(text) for text in remaps], names)
+        return select(reader.topics, [parse_remap(text) for text in remaps], names, reader.namespace)
     except ValueError as error:
         raise ValueError(f"bag = {reader.path}: {error}") from error
 
 
-def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]]) -> dict[str, str]:
-    """Return the name after remapping by recorded name; what a remapping displaces is left out."""
+def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]], namespace: str) -> dict[str, str]:
+    """Return the name after remapping by recorded name; what a remapping displaces, or others have, is left out."""
     renamed = {}
     for source, target in remaps:
         match = next((name for name in recorded if same_name(name, source)), None)
@@ -74,7 +120,10 @@ def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]]) -> d
             raise ValueError(f"remap from {source}: not in the recording. {_what_there_is(target, recorded)}")
         renamed[match] = target
     taken = {target.lstrip("/") for target in renamed.values()}
-    return renamed | {name: name for name in recorded if name not in renamed and name.lstrip("/") not in taken}
+    own = {name: name.removeprefix(namespace) for name in recorded if not namespace or name.startswith(f"{namespace}/")}
+    return renamed | {
+        name: target for name, target in own.items() if name not in renamed and target.lstrip("/") not in taken
+    }
 
 
 def _what_there_is(name: str, recorded: Mapping[str, str]) -> str:

@@ -102,9 +102,10 @@ def version_of(program: str) -> str:
 
 
 def remap_option(add: Callable[..., Any]) -> None:
-    """Add --remap by a parser's `add_argument`."""
+    """Add --remap and --namespace, which say what the topics of a recording are, by a parser's `add_argument`."""
     shown = "which recorded topic is which of ours, for instance /odometry/position:=position"
     add("--remap", metavar="FROM:=TO", action="extend", nargs="+", default=[], help=shown)
+    add("--namespace", metavar="NAME", help="of the train, as /train1 (default: none, or the only one recorded)")
 
 
 def out_option(add: Callable[..., Any]) -> None:

@@ -101,7 +101,7 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
     """Return the topics to replay and say what the recording lacks."""
     for loss in reader.damage:
         print(f"replay: {loss}", file=sys.stderr)
-    return select_from(reader, options.remap, options.topics)
+    return select_from(reader, options.remap, options.topics, options.namespace)
 
 
 def _parser() -> argparse.ArgumentParser:

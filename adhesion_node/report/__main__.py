@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag import BagReader, select_from
+from ..bag import BagReader, choose_train, select_from
 from ..command.checks import refuse
 from ..command.options import (
     DONE,
@@ -33,11 +33,14 @@ from ..command.options import (
     run_tool,
     setting_options,
 )
-from ..core.physics.train import KMH
+from ..core.physics.train import KMH, Train
+from ..core.setting import settings_of
 from ..run.offline import parameters_of
 from ..run.pipeline import off_track
 from ..run.results.rows import rows_to
+from ..wire.settings.nodes import TRAIN_FILE
 from ..wire.settings.setup import Setup, setup_of
+from ..wire.settings.shared import AMBIENT, DIRECTION
 from .drawn.page import report_page
 from .drawn.page_data import Subject
 from .drawn.table import table
@@ -46,10 +49,16 @@ from .found.distances import FIXED_MU
 from .found.findings import findings
 from .found.rows import KEYS, rows_of
 from .read.estimated import estimate_run
+from .read.numbers import odd
 from .read.recorded import RESULTS, read_run
 
 RECORDED = "as recorded"
 """Where the results of a run are from."""
+
+AS_RECORDED = "results are shown as recorded"
+
+HEEDED = frozenset(one.name for one in (AMBIENT, DIRECTION, TRAIN_FILE, *settings_of(Train, "train.")))
+"""Settings that count for results as recorded, too: how the recording is read, and the train by its papers."""
 
 PICTURES = (".png", ".pdf")
 
@@ -80,7 +89,8 @@ def _work(options: argparse.Namespace) -> int:
     setup, output = setup_of(given), Path(options.output)
     subjects = [_subject(path, printable(name), options, setup) for path, name in _named(options.bags)]
     if all(subject.source == RECORDED for subject in subjects):
-        refuse(options, ["seed", "remap"], "results are shown as recorded: add --estimate, or leave this out")
+        refuse(options, ["seed", "remap"], f"{AS_RECORDED}: add --estimate, or leave this out")
+        _refuse_unheeded(options)
     page = _page(output, subjects, options, given)
     from .drawn.picture import draw  # only now: what the messages and the page took is free, and no table is drawn
 
@@ -102,6 +112,15 @@ def _work(options: argparse.Namespace) -> int:
     return DONE if identified else FAILED
 
 
+def _refuse_unheeded(options: argparse.Namespace) -> None:
+    """Raise ValueError for a setting that would be of no effect; of a file of settings only say what counts."""
+    options.set = [text for text in options.set if text.partition("=")[0] not in HEEDED]
+    refuse(options, ["set"], f"{AS_RECORDED}: add --estimate, or leave this out")
+    if options.params:
+        counts = "only the train, direction and ambient_pressure_pa count"
+        print(f"report: {AS_RECORDED}: of {options.params} {counts}; --estimate heeds all", file=sys.stderr)
+
+
 def _page(output: Path, subjects: Sequence[Subject], options: argparse.Namespace, given: Mapping[str, Any]) -> Path:
     html = report_page(", ".join(subject.name for subject in subjects), subjects, options.target, given)
     output.mkdir(parents=True, exist_ok=True)
@@ -115,13 +134,18 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
     with BagReader(path) as reader, rows_to(options.out) as write:
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
+        if not options.remap:
+            choose_train(reader, options.namespace)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
             run, source = read_run(reader, setup.line, KEYS if options.out else (), targets), RECORDED
             lost: Mapping[str, int] = reader.undecodable
+            if told := odd(run.counts):
+                print(f"report: {name}: its diagnostics tell no number: {told}: left out", file=sys.stderr)
             for row in rows_of(run, setup.line.sign) if options.out else ():
                 write(row)
         else:
-            run, lost = estimate_run(reader, select_from(reader, options.remap), setup, write, targets)
+            selection = select_from(reader, options.remap, namespace=options.namespace)
+            run, lost = estimate_run(reader, selection, setup, write, targets)
             source = "estimated from the recorded sensors"
             if (off := off_track(setup.config.track, run.position.values.min(), run.position.values.max())) is not None:
                 print(f"report: {name}: {off}", file=sys.stderr)

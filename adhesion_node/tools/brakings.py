@@ -67,6 +67,7 @@ class Recording(NamedTuple):
     """Bytes and time of change, of it and of the files that the settings name: other contents are another task."""
     settings: tuple[tuple[str, Any], ...]
     remaps: tuple[str, ...]
+    namespace: str | None
     cell_m: float
 
     @property
@@ -91,7 +92,7 @@ class Recording(NamedTuple):
         """Its brakings, the pieces of track of those, and whether these are known: by a speed alone they are not."""
         setup = setup_of(dict(self.settings))
         with BagReader(Path(self.path)) as reader:
-            recorded = offline.messages(reader, select_from(reader, self.remaps), setup.line)
+            recorded = offline.messages(reader, select_from(reader, self.remaps, namespace=self.namespace), setup.line)
             pipeline = Pipeline(setup.config, setup.seed)
             made = offline.predictions(pipeline, None, recorded, setup.line, array("d"))
             found = list(brakings(made, self.cell_m, setup.line.sign))
@@ -209,7 +210,8 @@ def _recording(text: str, values: dict[str, Any], options: argparse.Namespace) -
     named = [value for value in values.values() if isinstance(value, str) and value and Path(value).is_file()]
     as_of = tuple(_as_of(Path(each)) for each in (path, *named))
     train = name or Path(path).resolve().stem
-    return Recording(train, path, as_of, tuple(sorted(values.items())), tuple(options.remap), options.cell)
+    settings, remaps = tuple(sorted(values.items())), tuple(options.remap)
+    return Recording(train, path, as_of, settings, remaps, options.namespace, options.cell)
 
 
 def _as_of(path: Path) -> tuple[int, int]:

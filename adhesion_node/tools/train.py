@@ -85,7 +85,7 @@ def main(args: Sequence[str] | None = None) -> int:
 def _work(options: argparse.Namespace) -> int:
     if options.check is None:
         return _estimate(options)
-    of_estimate = ["output", "remap", "seed", "set", "params", "train", "node"]
+    of_estimate = ["output", "remap", "namespace", "seed", "set", "params", "train", "node"]
     refuse(options, of_estimate, "is for --estimate: --check takes the train's file alone, leave this out")
     file = read_train(options.check)
     rows, odd = stopping(file), [one.told for one in likely(file) if not one.low <= one.value <= one.high]
@@ -165,7 +165,7 @@ def _estimate(options: argparse.Namespace) -> int:
     with BagReader(options.estimate) as reader:
         for loss in reader.damage:
             print(f"train: {loss}", file=sys.stderr)
-        selection = select_from(reader, options.remap)
+        selection = select_from(reader, options.remap, namespace=options.namespace)
         recorded = progress(offline.messages(reader, selection, setup.line), "messages")
         found = train_found.find(setup.config, train_found.read(recorded, setup.line))
     text = [f"believed: {setup.train}", *found.told()]

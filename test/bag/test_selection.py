@@ -10,9 +10,12 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import cast
+
 import pytest
 
-from adhesion_node.bag import parse_remap, select
+from adhesion_node.bag import BagReader, choose_train, parse_remap, select
 from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, FIX, MU, ODOMETRY, POSITION, RECORDED, WHEEL_SPEED
 
 RECORDED_ELSEWHERE = {"/odo/pose": POSITION.type, "/brake_pressure": BRAKE_PRESSURE.type, "/x": MU.type}
@@ -54,3 +57,31 @@ def test_a_selection_that_does_not_fit_says_so(
 def test_a_remap_without_two_names_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match=r"write FROM:=TO, for instance /odometry/position:=position"):
         parse_remap(text)
+
+
+OF_A_TRAIN = {f"/{topic.name}": topic.type for topic in (POSITION, BRAKE_PRESSURE)}
+
+
+def chosen(recorded: dict[str, str], wanted: str | None = None) -> str:
+    reader = SimpleNamespace(topics=recorded, path="bag", namespace="")
+    choose_train(cast(BagReader, reader), wanted)
+    return cast(str, reader.namespace)
+
+
+def within(space: str, topics: dict[str, str] = OF_A_TRAIN) -> dict[str, str]:
+    return {f"{space}{name}": kind for name, kind in topics.items()}
+
+
+def test_the_train_without_a_namespace_counts_first_then_the_only_one() -> None:
+    assert chosen(OF_A_TRAIN | within("/train1")) == chosen(OF_A_TRAIN) == chosen({}) == ""
+    assert chosen(OF_A_TRAIN | within("/train1"), "train1") == chosen(within("/train1")) == "/train1"
+    assert chosen({"/a/b/adhesion/mu": MU.type, "/imu": "sensor_msgs/msg/Imu"}) == "/a/b"
+    for no_train in ({"/gnss/position": POSITION.type}, within("/a", {"/position": "x", "/brake_pressure": "y"})):
+        assert chosen(no_train) == ""
+
+
+def test_a_train_is_selected_by_its_namespace_alone() -> None:
+    both = within("/a") | within("/b")
+    assert select(both, namespace="/b") == {"/b/position": "position", "/b/brake_pressure": "brake_pressure"}
+    mended = select(both, [("/a/brake_pressure", "brake_pressure")], namespace="/b")
+    assert mended == {"/b/position": "position", "/a/brake_pressure": "brake_pressure"}

@@ -147,7 +147,7 @@ def test_messages_that_do_not_decode_are_left_out_and_told(
             last = one.topic in spoilt or one.log_ns < START_NS + 5 * S
             writer.write(one.topic, one.type, one.cdr if last else b"\0\1\0\0\xff", one.log_ns)
             spoilt |= set() if last else {one.topic}
-    result, _ = make(tmp_path, str(tmp_path / "bag"), *QUICK)
+    result, _ = make(tmp_path, str(tmp_path / "bag"), *(() if results else QUICK))
     assert result["runs"][0]["source"] == "as recorded" if results else "estimated from the recorded sensors"
     told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("report: ")]
     assert len(spoilt) > 3
@@ -189,6 +189,53 @@ def test_a_recorded_number_that_is_none_leaves_a_gap(tmp_path: Path) -> None:
     _, page = make(tmp_path, str(tmp_path / "bag"))
     values = lines(page.data["runs"][0], "Adhesion")["true"]["y"]
     assert [second for second, value in enumerate(values) if value is None] == [7]
+
+
+@pytest.mark.parametrize("text", ["high", "", "inf", "\u00b2", "9" * 5000])
+def test_what_should_be_a_number_and_is_none_is_told(
+    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told = dict.fromkeys(("confidence", "dropped.LATE", "changes", "stamp_ns"), text) | {"dropped.OLD": "2"}
+    with BagWriter(tmp_path / "bag") as writer:
+        for second in range(20):
+            for topic, cdr in rows(second, **(told if second > 10 else {})):
+                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
+    result, _ = make(tmp_path, str(tmp_path / "bag"))
+    assert result["runs"][0]["dropped"] == {"OLD": 2}
+    (line,) = capsys.readouterr().err.splitlines()
+    odd = ", ".join(f"{key} = {text[:20]!r}" for key in ("confidence", "dropped.LATE"))
+    assert line == f"report: bag: its diagnostics tell no number: {odd}: left out"
+
+
+def test_the_only_train_of_a_recording_is_shown_whatever_its_namespace(tmp_path: Path) -> None:
+    without, _ = make(tmp_path, str(record(tmp_path / "bag")))
+    within, page = make(tmp_path, str(record(tmp_path / "other" / "bag", namespaces=["/line1/train7"])))
+    assert within == without
+    assert lines(page.data["runs"][0], "Adhesion")["identified"]["y"] == [None] * 5 + [0.09] * 15
+
+
+def test_of_several_trains_one_is_to_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = str(record(tmp_path / "both", namespaces=["/train2", "/train1"]))
+    assert main([both, "--output", str(tmp_path / "report")]) == 2
+    assert capsys.readouterr().err == (
+        f"report: bag = {both}: holds the trains /train1, /train2: choose one, --namespace /train1\n"
+    )
+    assert main([both, "--output", str(tmp_path / "report"), "--namespace", "/train3"]) == 2
+    remedy = f"namespace = /train3: not in the recording {both}: choose of /train1, /train2"
+    assert remedy in capsys.readouterr().err
+    result, _ = make(tmp_path, both, "--namespace", "train2")
+    assert result["runs"][0]["source"] == "as recorded"
+
+
+def test_a_setting_that_counts_for_a_recording_with_results_is_taken(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    result, _ = make(tmp_path, str(record(tmp_path / "bag")), "--set", "train.mass_kg=400000")
+    assert "400 t" in result["train"]
+    (tmp_path / "my.yaml").write_text("estimator: {ros__parameters: {start_mu: 0.3, train.mass_kg: 4.0e+5}}\n")
+    again, _ = make(tmp_path, str(tmp_path / "bag"), "--params", str(tmp_path / "my.yaml"))
+    assert again == result
+    assert "only the train, direction and ambient_pressure_pa count; --estimate heeds all" in capsys.readouterr().err
 
 
 def test_a_name_cannot_break_the_page(tmp_path: Path) -> None:
@@ -240,6 +287,10 @@ def test_changes_of_a_text() -> None:
         (["mine", "--target", "-1"], "target = -1.0: give"),
         (["mine", "--set", "windov=3"], "windov"),
         (["mine", "--low", "0.05"], "--low 0.05: is for tables of brakings, not for recordings: leave it out"),
+        (
+            ["mine", "--set", "start_mu=0.1"],
+            "--set start_mu=0.1: results are shown as recorded: add --esti",
+        ),
         (["mine", "--seed", "1"], "--seed 1: results are shown as recorded: add --estimate, or leave this out"),
         (["mine", "--remap", "/a:=position"], "--remap /a:=position: results are shown as recorded: add --est"),
         (["mine", "--node", "/a"], "--node /a: says whose of --params: add that, or leave this out"),

@@ -19,6 +19,7 @@ from test_offline import (
     KEYS,
     NO_TRUTH,
     START_NS,
+    TRUTH_AND_SENSORS,
     Offline,
     bag,
     in_frame,
@@ -177,6 +178,16 @@ def test_fixes_that_are_not_wanted_are_not_missed(tmp_path: Path, offline: Offli
     assert (named.result["measurements"], named.result["dropped"]) == (100, {})
     off = offline(tmp_path / "fixes", "--set", "use_fix=false")
     assert off.result["dropped"] == {"SWITCHED_OFF": 100}
+
+
+def test_the_only_train_is_replayed_whatever_its_namespace(bag: Path, tmp_path: Path, offline: Offline) -> None:
+    names = {topic: f"/train7/{topic.name}" for topic in TRUTH_AND_SENSORS}
+    write_run(tmp_path / "seventh", samples(), names=names)
+    own, seventh = offline(bag).result, offline(tmp_path / "seventh").result
+    unlike = ("ms_per_window_p50", "ms_per_window_p99")
+    assert [{key: value for key, value in each.items() if key not in unlike} for each in (own, seventh)] == [
+        {key: value for key, value in own.items() if key not in unlike}
+    ] * 2
 
 
 def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offline) -> None:

@@ -47,6 +47,8 @@ class BagReader:
         losses = [f"{name}: {count} messages are lost" for name, count in self.lost.items()]
         self.damage = (*self._recording.damage, *losses)
         self.complete = not self.damage
+        self.namespace = ""
+        """Of the train that is read, as "/train1": relative names are its topics."""
         self._undecodable: set[Record] = set()
 
     def messages(self, names: Iterable[str] | None = None) -> Iterator[Record]:
@@ -77,7 +79,8 @@ class BagReader:
 
     def resolve(self, name: str) -> str | None:
         """Return the name under which a topic is recorded, or None when it is not there."""
-        return next((recorded for recorded in self.topics if same_name(recorded, name)), None)
+        whole = name if name.startswith("/") else f"{self.namespace}/{name}"
+        return next((recorded for recorded in self.topics if same_name(recorded, whole)), None)
 
     def close(self) -> None:
         """Close the files."""

@@ -18,7 +18,7 @@ from ...wire.settings.nodes import SETTINGS
 from ..found.distances import FIXED_MU
 from ..found.events import events
 from ..found.findings import findings
-from ..read.dropped import listed
+from ..read.numbers import listed
 from ..read.run import Run
 from .creep import creep_in_words
 from .page_data import Subject, chart_data

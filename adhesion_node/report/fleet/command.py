@@ -21,7 +21,7 @@ from . import is_table
 from .page import fleet_page
 from .rail import low_spots, read_fleet
 
-OF_RECORDINGS = ("seed", "set", "params", "train", "node", "estimate", "remap", "target", "out")
+OF_RECORDINGS = ("seed", "set", "params", "train", "node", "estimate", "remap", "namespace", "target", "out")
 """Options that say how recordings are estimated and shown."""
 
 

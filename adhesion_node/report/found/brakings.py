@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from ...run.results.brakings import split
 from ...run.results.seen import BRAKED_PA
+from ..read.numbers import number
 from ..read.run import Run
 from ..read.series import Series
 
@@ -60,5 +61,5 @@ def rises(series: Series, start_ns: int, end_ns: int) -> list[int]:
     """Times within which a counter has risen."""
     first, end = np.searchsorted(series.t_ns, [start_ns, end_ns + 1])
     part = slice(max(first - 1, 0), end)
-    counts = np.array([int(value) if value.isdigit() else 0 for value in series.values[part].tolist()])
+    counts = np.nan_to_num([number(value) for value in series.values[part].tolist()])
     return [int(t) for t in series.t_ns[part][1:][np.diff(counts) > 0]]

@@ -18,7 +18,7 @@ from ...core import Config, Regime
 from ...core.physics.train import KMH
 from ...run.results.score import CONVERGED_AFTER_MPS, Point, Truth, mean_relative_error_percent
 from ...run.results.seen import Seen
-from ..read.dropped import dropped
+from ..read.numbers import dropped
 from ..read.run import Run
 from ..read.series import in_rows
 from .braking_row import bound_kept, row_of

@@ -28,9 +28,9 @@ from ...wire.messages.refused import Rejected
 from ...wire.settings.setup import Setup
 from ...wire.topic import Frame
 from ...wire.topics import ADHESION_INPUTS, DIAGNOSTICS, TRUTH
-from .dropped import listed
 from .inputs import Inputs
 from .messages import read_topics, sample_of
+from .numbers import listed
 from .predicted import Curves
 from .run import Run
 from .series import Series

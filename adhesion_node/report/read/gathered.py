@@ -23,6 +23,7 @@ from ...wire.line import NOMINAL, Line
 from ...wire.messages.results import Status
 from ...wire.topic import Topic
 from .messages import Sample, read_topics, with_key
+from .numbers import number
 from .series import NONE, Series
 
 
@@ -108,21 +109,12 @@ class Keyed:
     def note(self, t_ns: int, status: Status) -> None:
         """Take a status."""
         for key, numbers in self._numbers.items():
-            numbers.add(t_ns, _number(status.values.get(key, "")))
+            numbers.add(t_ns, number(status.values.get(key, "")))
 
     @property
     def series(self) -> dict[str, Series]:
         """The numbers by key."""
         return {key: numbers.series for key, numbers in self._numbers.items()}
-
-
-def _number(text: str) -> float:
-    """A finite number; NaN for what is none."""
-    try:
-        value = float(text)
-    except ValueError:
-        return math.nan
-    return value if math.isfinite(value) else math.nan
 
 
 class Texts:

@@ -21,6 +21,7 @@ from ...wire.messages.parts import stamp_ns, stamps_ns
 from ...wire.messages.refused import Rejected
 from ...wire.messages.results import Status
 from ...wire.topic import Frame, Topic
+from .numbers import number
 
 
 class Sample(NamedTuple):
@@ -98,7 +99,7 @@ def with_key(key: str, take: Callable[[int, Status], None]) -> Take:
     def taken(sample: Sample) -> None:
         for status in sample.read.entries:
             stamp = str(status.values.get("stamp_ns", sample.t_ns))
-            is_one = stamp.removeprefix("-").isdecimal() and abs(int(stamp)) <= LATEST_NS  # "none": of no estimate
+            is_one = stamp.removeprefix("-").isdecimal() and abs(number(stamp)) <= LATEST_NS  # "none": of no estimate
             if key in status.values and is_one:
                 take(int(stamp), status)
 

@@ -41,6 +41,7 @@ def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = (), 
     mu, mu_lower, told, inputs, levels = Logged(), Logged(), _Told(), Inputs(), Texts()
     position_std, speed_std = Numbers(attrgetter("position_std_m")), Numbers(attrgetter("speed_std_mps"))
     values, said = Keyed(keys), Keyed(TOLD)
+    takes = told.take, with_key("regime", told.note), with_key("regime", values.note)
     curves = {topic: Curves(targets) for topic in (topics.BRAKING_CURVE, topics.BRAKING_CURVE_NOMINAL)}
     read_topics(
         reader,
@@ -53,9 +54,7 @@ def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = (), 
             (topics.STATE, speed.take),
             *((topics.STATE, each.take) for each in (position_std, speed_std) if keys),
             (topics.DECELERATION, stamped.take),
-            (topics.DIAGNOSTICS, _of_this_train(told.take)),
-            (topics.DIAGNOSTICS, _of_this_train(with_key("regime", told.note))),
-            (topics.DIAGNOSTICS, _of_this_train(with_key("regime", values.note))),
+            *((topics.DIAGNOSTICS, _of_train(reader.namespace, take)) for take in takes),
             (topics.ATP_STATUS, with_key("level", said.note)),
             (topics.ATP_STATUS, with_key("level", lambda t_ns, status: levels.add(t_ns, status.values["level"]))),
         ],
@@ -63,6 +62,7 @@ def read_run(reader: BagReader, line: Line = NOMINAL, keys: Sequence[str] = (), 
     )
     deceleration = stamped.series
     run = inputs.run._replace(
+        creep=inputs.creep.curves(reader.namespace.strip("/")),
         mu=deceleration if deceleration.t_ns.size else mu.stamped_by(speed),
         mu_lower=mu_lower.stamped_by(speed, stamped),
         position=position.series.known,
@@ -102,11 +102,11 @@ class _Told:
             self.changes.add(t_ns, status.values["changes"])
 
 
-def _of_this_train(take: Take) -> Take:
-    """Leave out what the nodes of others tell: its own have no namespace, as the topics that are read."""
+def _of_train(namespace: str, take: Take) -> Take:
+    """Leave out what the nodes of others tell: its own have the namespace of the topics that are read."""
 
     def taken(sample: Sample) -> None:
-        own = tuple(entry for entry in sample.read.entries if not entry.namespace)
+        own = tuple(entry for entry in sample.read.entries if entry.namespace == namespace.strip("/"))
         take(sample._replace(read=sample.read._replace(entries=own)))
 
     return taken

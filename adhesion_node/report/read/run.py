@@ -8,6 +8,7 @@
 
 """A run as series over time: what its pictures, tables and pages are made from."""
 
+import math
 from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -18,6 +19,7 @@ from numpy.typing import NDArray
 from ...core import Regime
 from ...core.physics.train import Array
 from .creep import CreepCurves
+from .numbers import CONFIDENCE, number
 from .predicted import Curves
 from .series import NONE, Series, Times
 
@@ -59,7 +61,8 @@ class Run(NamedTuple):
     @property
     def confidence(self) -> float | None:
         """Of the lower bound; None where the recording does not tell."""
-        return float(self.counts["confidence"]) if "confidence" in self.counts else None
+        told = number(self.counts.get(CONFIDENCE, ""))
+        return None if math.isnan(told) else told
 
     @property
     def learnt(self) -> NDArray[np.bool_]:

@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Sequence
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -60,12 +62,13 @@ FREE = Train(resistance_c0=0.0, resistance_c1=0.0, resistance_c2=0.0)
 TRUTH = (TRUTH_MU, TRUTH_STATE)
 
 
-def rows(second: int) -> list[tuple[Topic, bytes]]:
+def rows(second: int, space: str = "", **told: str) -> list[tuple[Topic, bytes]]:
     """Return a second of a run: 20 s from 80 m/s at 2 m/s^2, true adhesion 0.1, 0.09 identified, at least 0.08."""
     t_ns = START_NS + second * S
     speed, place = 80.0 - 2.0 * second, 80.0 * second - second**2
     regime = "COASTING" if second < 5 else "ADHESION_LIMITED"
-    status = DiagnosticStatus(values=[KeyValue(key="regime", value=regime)])
+    values = [KeyValue(key=key, value=value) for key, value in {"regime": regime, **told}.items()]
+    status = DiagnosticStatus(name=f"{space}/estimator/adhesion".lstrip("/"), values=values)
     plain: tuple[tuple[Topic, Any], ...] = (
         (TRUTH_STATE, messages.state_message(t_ns, place, 0.0, speed, 0.0)),
         (TRUTH_MU, Float64(data=0.1)),
@@ -78,12 +81,14 @@ def rows(second: int) -> list[tuple[Topic, bytes]]:
     return [pressure, *((topic, serialize_message(message)) for topic, message in plain)]
 
 
-def record(path: Path, *left_out: Topic, seconds: int = 20) -> Path:
+def record(path: Path, *left_out: Topic, seconds: int = 20, namespaces: Sequence[str] = ("",)) -> Path:
+    """Record a run, or the same of several trains."""
     with BagWriter(path) as writer:
-        for second in range(seconds):
-            for topic, cdr in rows(second):
+        for second, space in product(range(seconds), namespaces):
+            for topic, cdr in rows(second, space):
                 if topic not in left_out:
-                    writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
+                    name = topic.name if topic is DIAGNOSTICS else f"{space}/{topic.name}"
+                    writer.write(name, topic.type, cdr, START_NS + second * S)
     return path
 
 
