@@ -16,7 +16,7 @@ import adhesion_node
 from adhesion_node.core import Outcome
 from adhesion_node.core.bank.findings.learnt import KIND, QUANTITIES, SCATTERS, WHEEL
 from adhesion_node.core.bank.labels.kinds import KINDS
-from adhesion_node.core.setting import Setting, by_group
+from adhesion_node.core.setting import Setting, bound, by_group
 from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.messages.refused import Reason
 from adhesion_node.wire.topic import Quality
@@ -78,7 +78,7 @@ def _range(spec: Setting) -> str:
         return ", ".join(spec.choices)
     if isinstance(spec.default, bool):
         return "true, false"
-    return "text" if isinstance(spec.default, str) else f"{spec.low:g} to {spec.high:g}"
+    return "text" if isinstance(spec.default, str) else f"{bound(spec.low)} to {bound(spec.high)}"
 
 
 def _cell(text: str) -> str:

@@ -78,10 +78,19 @@ class Setting(NamedTuple):
         if not self.is_number:
             return "true or false" if isinstance(self.default, bool) else "a text"
         if math.isfinite(self.low) and math.isfinite(self.high):
-            return f"a value from {self.low:g} to {self.high:g} {self.unit}".rstrip()
-        least = f" of at least {self.low:g}" if math.isfinite(self.low) else ""
-        most = f" of at most {self.high:g}" if math.isfinite(self.high) else ""
+            return f"a value from {bound(self.low)} to {bound(self.high)} {self.unit}".rstrip()
+        least = f" of at least {bound(self.low)}" if math.isfinite(self.low) else ""
+        most = f" of at most {bound(self.high)}" if math.isfinite(self.high) else ""
         return f"a finite value{least}{most} {self.unit}".rstrip()
+
+
+def bound(number: float) -> str:
+    """The end of a range in digits; a whole one is not rounded.
+
+    >>> bound(2**31 - 1), bound(1e8)
+    ('2147483647', '1e+08')
+    """
+    return str(number) if isinstance(number, int) else f"{number:g}"
 
 
 def setting(

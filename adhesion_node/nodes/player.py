@@ -58,7 +58,7 @@ class Replay(SettingsNode):
         self, reader: BagReader, selection: Mapping[str, str], rate: float = 1.0, subscribers: int = 1, **kwargs: Any
     ) -> None:
         if not math.isfinite(rate) or rate < 0:
-            raise ValueError(f"rate = {rate!r}: give a finite factor, or 0 for as fast as possible")
+            raise ValueError(f"rate = {rate!r}: give a factor above 0, or 0 for as fast as possible")
         super().__init__("replay", automatically_declare_parameters_from_overrides=True, **kwargs)
         values = declare(self, TELLING, quiet=True)
         self.finished = False

@@ -110,7 +110,7 @@ def test_a_bad_rate_is_refused(tmp_path: Path, context: Context, rate: float) ->
     write_steps(tmp_path / "bag", 1)
     with (
         BagReader(tmp_path / "bag") as reader,
-        pytest.raises(ValueError, match=r"rate = .*: give a finite factor, or 0"),
+        pytest.raises(ValueError, match=r"rate = .*: give a factor above 0, or 0"),
     ):
         Replay(reader, {"/position": "position"}, rate, context=context)
 
@@ -133,7 +133,7 @@ def test_a_bag_without_position_says_what_there_is(tmp_path: Path, capsys: pytes
         (["--remap", "/nothing:=position"], "remap from /nothing: not in the recording. It holds: "),
         (["--remap", "/brake_pressure:=position"], "topic /brake_pressure: type = sensor_msgs/msg/FluidPressure: "),
         (["--topics", "wheel_speed"], "topic wheel_speed: not in the recording"),
-        (["--rate", "-1"], "rate = -1.0: give a finite factor, or 0"),
+        (["--rate", "-1"], "rate = -1.0: give a factor above 0, or 0"),
         (["--wait-for-subscribers", "-1"], "wait-for-subscribers = -1: give at least 0"),
         (["--set", "a=1"], "--set a=1: is for --offline: add that, or start the live estimator of your choice"),
         (["--params", "p.yaml"], "--params p.yaml: is for --offline"),

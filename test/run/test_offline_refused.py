@@ -208,7 +208,7 @@ def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offl
         (["--set", "train.mass_kg=nan"], "train.mass_kg = nan: give a value from 1000 to 1e+08 kg"),
         (["--set", "low_adhesion=ice"], "low_adhesion = 'ice': choose one of "),
         (["--set", "track=tunnel 0"], "track section 'tunnel 0': write 'grade START END RISE'"),
-        (["--seed", "-1"], "seed = -1: give "),
+        (["--seed", "-1"], "seed = -1: give a value from 0 to 2147483647"),
         (["--seed", "3000000000"], "seed = 3000000000: give "),
         (["--remap", "position"], "remap = 'position': write FROM:=TO"),
         (["--remap", "/nothing:=position"], "remap from /nothing: not in the recording. It holds: "),

@@ -31,6 +31,9 @@ from .world import World, simulate, stopping_m
 FIRST_SEED = 1000
 """Run r of a table has simulator and estimator seed FIRST_SEED + r."""
 
+MOST_RUNS = 10**6
+"""More would fill the memory before the first begins."""
+
 ROW = np.dtype(
     [
         *(("seed", np.int64), ("start", np.float64), ("t_ns", np.int64), ("out_s", np.float64)),
@@ -89,8 +92,8 @@ class Trials(NamedTuple):
 
     def tasks(self) -> list[Trials]:
         """Divide the seeds into tasks. Raises ValueError without any."""
-        if self.seeds < 1:
-            raise ValueError(f"runs = {self.seeds}: give at least 1")
+        if not 1 <= self.seeds <= MOST_RUNS:
+            raise ValueError(f"runs = {self.seeds}: give at least 1, at most {MOST_RUNS}")
         chunk = WAYS[self.estimator.way].lanes // len(self.starts)
         return [
             self._replace(first_seed=self.first_seed + first, seeds=min(chunk, self.seeds - first))
