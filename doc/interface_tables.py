@@ -16,6 +16,7 @@ import adhesion_node
 from adhesion_node.core import Outcome
 from adhesion_node.core.bank.findings.learnt import KIND, QUANTITIES, SCATTERS, WHEEL
 from adhesion_node.core.bank.labels.kinds import KINDS
+from adhesion_node.core.readers import READERS
 from adhesion_node.core.setting import Setting, bound, by_group
 from adhesion_node.tools.defaults import all_settings
 from adhesion_node.wire.messages.refused import Reason
@@ -69,7 +70,9 @@ def _groups(specs: Sequence[Setting]) -> Iterator[str]:
 
 def _parameter(spec: Setting) -> tuple[str, ...]:
     default = f"{spec.default:.6g}" if isinstance(spec.default, float) else str(spec.default).lower()
-    meaning = f"{spec.description} (may change at run time)" if spec.changes else spec.description
+    told = [f"read by {' and '.join(READERS[spec.name])}"] if spec.name in READERS else []
+    told += ["may change at run time"] if spec.changes else []
+    meaning = f"{spec.description} ({'; '.join(told)})" if told else spec.description
     return f"`{spec.name}`", default, spec.unit, _range(spec), meaning
 
 

@@ -61,7 +61,7 @@ class Estimator(EstimatingNode[Pipeline]):
 def _set_up(values: Mapping[str, Any]) -> SetUp[Pipeline]:
     setup = setup_of(values)
     warm_up(setup.config)
-    return SetUp(Pipeline(setup.config, setup.seed), setup.line, setup.sensor_timeout_s)
+    return SetUp(Pipeline(setup.config, setup.seed), setup.line, setup.sensor_timeout_s, setup.unread)
 
 
 def _findings(pipeline: Pipeline) -> list[Finding]:

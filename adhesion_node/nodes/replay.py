@@ -31,7 +31,7 @@ from ..wire.topics import POSITIONS, TRACTION_FORCE
 
 EXAMPLES = (
     "replay my_run --offline",
-    "replay my_run --offline --set start_mu=0.12 --json result.json",
+    "replay my_run --offline --set confidence=0.99 --json result.json",
     "replay my_run --offline --out results.csv",
     "replay my_run --rate 5",
     "replay their_run --offline --remap /gnss/along_track:=position",

@@ -91,6 +91,9 @@ def _work(options: argparse.Namespace) -> int:
     if all(subject.source == RECORDED for subject in subjects):
         refuse(options, ["seed", "remap"], f"{AS_RECORDED}: add --estimate, or leave this out")
         _refuse_unheeded(options)
+    else:
+        for remark in setup.unread:
+            print(f"report: {remark}", file=sys.stderr)
     page = _page(output, subjects, options, given)
     from .drawn.picture import draw  # only now: what the messages and the page took is free, and no table is drawn
 

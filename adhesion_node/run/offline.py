@@ -75,7 +75,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     why = seen.why_not(brake)
     if why is not None:
         result["why"] = why
-    for remark in _remarks(pipeline, why, brake):
+    for remark in (*setup.unread, *_remarks(pipeline, why, brake)):
         print(f"replay: {remark}", file=sys.stderr)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return DONE if seen.identified else FAILED

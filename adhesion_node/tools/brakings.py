@@ -126,6 +126,8 @@ def _work(options: argparse.Namespace) -> int:
         raise ValueError(f"cell = {options.cell}: give a length of 1 to 100000 m")
     values = offline.parameters_of(options)
     setup = setup_of(values)
+    for remark in setup.unread:
+        print(f"brakings: {remark}", file=sys.stderr)
     if values.get(TRAIN_FILE.name):  # by its contents, which may change under its name
         values = {**read_train(values.pop(TRAIN_FILE.name)).values, **values}
     tasks = _once([_recording(text, values, options) for text in options.bags])

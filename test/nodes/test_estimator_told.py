@@ -96,6 +96,12 @@ def test_a_window_whose_numbers_fail_is_told(
     assert line.values()["dropped.FAILED"] == "1"
 
 
+def test_a_parameter_of_another_method_is_warned_of(context: Context, capfd: pytest.CaptureFixture[str]) -> None:
+    overrides = [Parameter("particles", value=50), Parameter("window", value=50)]
+    Estimator(context=context, parameter_overrides=overrides).destroy_node()
+    assert capfd.readouterr().err.count("does not read it") == 1
+
+
 def test_what_the_journey_teaches_is_told_with_its_standard_deviation(line: Line) -> None:
     for _, reading in samples("cruise", 0.0, 2.0):
         if reading.position_m is not None:

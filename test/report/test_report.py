@@ -35,7 +35,7 @@ from adhesion_node.report.found.regimes import Band, bands
 from adhesion_node.report.read.series import Series
 from adhesion_node.wire.topics import DIAGNOSTICS, TRUTH_MU
 
-QUICK = ("--set", "iterations=3")
+QUICK = ("--set", "estimate_s=1.0")
 
 
 class Parser(HTMLParser):
@@ -127,7 +127,7 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     (bound,) = (line["y"][-1] for label, line in adhesion.items() if label.startswith("lower bound, "))
     assert bound == pytest.approx(replayed["mu_lower_final"], abs=1e-5)
     assert run["bands"][-1]["kind"] == replayed["regime_final"].lower()
-    assert "iterations = 3" in page.texts
+    assert "estimate_s = 1.0" in page.texts
     last = run["moments"][-1]
     assert last["safe"]["x"][0] == last["nominal"]["x"][0] == pytest.approx(last["place"], abs=0.1)
     assert last["safe"]["y"][-1] == 0.0

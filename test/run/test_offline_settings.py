@@ -15,6 +15,7 @@ from pathlib import Path
 import pytest
 from test_offline import FAST, FAST_CONFIG, FAST_SETTINGS, Offline, bag, offline, samples, straight
 
+from adhesion_node.tools.defaults import text
 from adhesion_node.wire.settings.setup import setup_of
 
 __all__ = ["bag", "offline"]
@@ -30,6 +31,14 @@ def test_a_setting_is_used(bag: Path, offline: Offline) -> None:
     config = setup_of({**FAST, "window": 40}).config
     shorter = offline(bag, "--set", "window=40").result
     assert shorter["mu_final"] == straight(samples(), config)[-1].mu != straight(samples(), FAST_CONFIG)[-1].mu
+
+
+def test_a_setting_of_another_method_is_told(bag: Path, offline: Offline, tmp_path: Path) -> None:
+    told = offline(bag, "--set", "particles=50", "--set", "method=bank", fast=False).err
+    assert "replay: particles = 50: method = bank does not read it, particle_em would" in told
+    (tmp_path / "all.yaml").write_text(text(), encoding="utf-8")
+    complete = offline(bag, "--params", str(tmp_path / "all.yaml"), fast=False)
+    assert not any("does not read" in line for line in complete.err)
 
 
 def test_the_resistance_is_not_the_adhesions(bag: Path, offline: Offline) -> None:

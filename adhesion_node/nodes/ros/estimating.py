@@ -53,6 +53,8 @@ class SetUp(NamedTuple, Generic[P]):
     pipeline: P
     line: Line
     sensor_timeout_s: float
+    unread: Sequence[str] = ()
+    """Parameters that the chosen method does not read, in words."""
 
 
 class Kind(NamedTuple, Generic[P]):
@@ -87,7 +89,9 @@ class EstimatingNode(ManagedNode, Generic[P]):
 
     def open(self) -> None:
         """Subscribe and advertise, with nothing known of train and rail."""
-        self.pipeline, line, timeout_s = self._kind.set_up(current(self, self._kind.parameters))
+        self.pipeline, line, timeout_s, unread = self._kind.set_up(current(self, self._kind.parameters))
+        for remark in unread:
+            self.get_logger().warning(remark)
         self._resets: deque[int] = deque(maxlen=OFTEN)
         """When the latest ones were seen."""
         self._seen_resets = 0
@@ -126,7 +130,7 @@ class EstimatingNode(ManagedNode, Generic[P]):
 
     def _change(self, values: Mapping[str, Any]) -> Callable[[], None]:
         """What is known of train and rail stays; an offline replay gives other numbers from here on."""
-        pipeline, line, timeout_s = self._kind.set_up(values)
+        pipeline, line, timeout_s, _ = self._kind.set_up(values)
 
         def put_in_force() -> None:
             if self.configured:

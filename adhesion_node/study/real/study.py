@@ -15,6 +15,7 @@ all runs. A figure that misses its goal is marked with !, and the distances stan
 """
 
 import argparse
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from typing import Any
@@ -23,6 +24,9 @@ import numpy as np
 
 from ...command.checks import at_least
 from ...command.running import add_running_options, running
+from ...core import Config
+from ...core.readers import unread
+from ...core.setting import settings_of
 from ..trial.figures import add_figure_options, figures_of
 from ..trial.text import Column, lines
 from .cases import Case, chosen
@@ -93,6 +97,8 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
     at_least(options, runs=1, first_seed=0)
     figures = figures_of(options)
     wanted, where = chosen(options.only, options.set), running(options)
+    for remark in unread(dict(wanted[0].told), settings_of(Config)):
+        print(f"study: {remark}", file=sys.stderr)
     cases, bounds = found(wanted, options.first_seed, options.runs, where), least(wanted, where)
     table = [row(case, score(of_case), bounds[case]) for case, of_case in cases.items()]
     for entry in table:

@@ -17,13 +17,24 @@ from ...core.creep.config import CreepConfig
 from ...core.creep.vehicle import Vehicle
 from ...core.physics.track import Grade, Track, parse_track
 from ...core.physics.train import CRH3, Train
+from ...core.readers import unread
 from ...core.setting import Setting, make
 from ..files.rail_map import read_rail_map
 from ..files.train import read_train
 from ..line import Line
 from ..topics import ADHESION_INPUTS, CREEP_INPUTS
 from . import sensing
-from .nodes import CREEP_SETTINGS, RAIL_MAP, SEED, SENSOR_TIMEOUT, SETTINGS, TRACK, TRACK_LINE, TRACK_START, TRAIN_FILE
+from .nodes import (
+    CREEP_SETTINGS,
+    RAIL_MAP,
+    SEED,
+    SENSOR_TIMEOUT,
+    SETTINGS,
+    TRACK,
+    TRACK_LINE,
+    TRACK_START,
+    TRAIN_FILE,
+)
 from .shared import OF_NODES_ALONE
 
 if TYPE_CHECKING:
@@ -43,6 +54,8 @@ class Setup(NamedTuple):
     """Silence of the position after which /diagnostics says STALE; no result depends on it."""
     train: str = ""
     """The train in words, for the top of what is reported."""
+    unread: tuple[str, ...] = ()
+    """What is given though the method does not read it, in words."""
 
 
 class CreepSetup(NamedTuple):
@@ -70,9 +83,10 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     Raises ValueError naming the setting when one is unknown, of a wrong type or out of range.
     """
     check_names(values, SETTINGS)
-    named = ""
+    named, given = "", values
     if values.get(TRAIN_FILE.name):
         file = read_train(str(TRAIN_FILE.check(values[TRAIN_FILE.name])))
+        given = {name: value for name, value in values.items() if value != file.values.get(name)}
         named, values = file.name, {**file.values, **values}
     seed, timeout_s, track = (one.check(values.get(one.name, one.default)) for one in (SEED, SENSOR_TIMEOUT, TRACK))
     train = make(Train, values, "train.")
@@ -83,7 +97,7 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
     track_run = profile.turned() if of_line.sign < 0 else profile
     config = make(Config, values, train=train, track=track_run, rail_map=_rail_map(values, of_line.sign))
     words = _in_words(named or (DEFAULT_TRAIN if train == CRH3 else OWN_TRAIN), train)
-    return Setup(config, int(seed), of_line, float(timeout_s), words)
+    return Setup(config, int(seed), of_line, float(timeout_s), words, tuple(unread(given, SETTINGS)))
 
 
 def preset(settings: Sequence[Setting], given: Mapping[str, Any]) -> tuple[Setting, ...]:
