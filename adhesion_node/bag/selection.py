@@ -34,10 +34,10 @@ def parse_remap(text: str) -> tuple[str, str]:
     return source, target
 
 
-def choose_train(reader: BagReader, wanted: str | None) -> None:
+def choose_train(reader: BagReader, wanted: str | None, *, remapped: bool = False) -> None:
     """Read from now on the train of the namespace `wanted`; without one that in none, or else the only one there is.
 
-    Raises ValueError where the choice is open, or the recording lacks the train.
+    Raises ValueError where the recording lacks the train, or the choice is open, unless remaps make it.
     """
     trains = _trains(reader.topics)
     if wanted is not None:
@@ -47,6 +47,8 @@ def choose_train(reader: BagReader, wanted: str | None) -> None:
             raise ValueError(f"namespace = {wanted}: not in the recording {reader.path}: choose of {known}")
     elif trains and "" not in trains:
         if len(trains) > 1:
+            if remapped:
+                return
             each = ", ".join(trains)
             raise ValueError(f"bag = {reader.path}: holds the trains {each}: choose one, --namespace {trains[0]}")
         (reader.namespace,) = trains
@@ -103,8 +105,8 @@ def select_from(
 
     The train is chosen as by `choose_train`, unless topics are named and no namespace is.
     """
-    if namespace is not None or not (remaps or names):
-        choose_train(reader, namespace)
+    if namespace is not None or names is None:
+        choose_train(reader, namespace, remapped=bool(remaps))
     try:
         return select(reader.topics, [parse_remap(text) for text in remaps], names, reader.namespace)
     except ValueError as error:

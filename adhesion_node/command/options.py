@@ -30,6 +30,7 @@ DONE, FAILED, BAD_INPUT = 0, 1, 2
 """Exit codes of every tool."""
 
 REMEDIES: Mapping[type[OSError], str] = {
+    FileNotFoundError: ": name one that is there, or make the folder first",
     FileExistsError: ": it is a file; name a folder, or one that is to be made",
     NotADirectoryError: ": a part of it is a file; name a folder, or one that is to be made",
     IsADirectoryError: ": it is a folder; name a file",

@@ -21,9 +21,11 @@ HARDWARE, ENTRIES = "train", ("atp_monitor/supervision", "estimator/adhesion")
 _OURS = "|".join(sorted((re.escape(topic.name) for topic in TOPICS if not topic.name.startswith("/")), reverse=True))
 _TOPIC = re.compile(rf'(?<=")/({_OURS})(?=["./\[])')
 
+_SPACE = re.compile(r"[a-z_]\w*(/[a-z_]\w*)*", re.ASCII | re.IGNORECASE)
+
 
 def layout(name: str, namespace: str = "") -> str:
-    """Return one of `NAMES` for the nodes of a namespace.
+    """Return one of `NAMES` for the nodes of a namespace. Raises ValueError for what can be none.
 
     >>> '"/line/train1/adhesion/mu.data"' in layout("foxglove.json", "/line/train1")
     True
@@ -31,6 +33,8 @@ def layout(name: str, namespace: str = "") -> str:
     text, inner = files(__package__).joinpath(name).read_text(encoding="utf-8"), namespace.strip("/")
     if not inner:
         return text
+    if not _SPACE.fullmatch(inner):
+        raise ValueError(f"namespace = {namespace!r}: give names of letters, digits and _, as /train1 or /line/train1")
     text = _TOPIC.sub(rf"/{inner}/\1", text)
     text = text.replace(f"/{HARDWARE}/{ENTRIES[0]}/", f"/{inner}/{inner}/{ENTRIES[0]}/")
     for entry in ENTRIES:

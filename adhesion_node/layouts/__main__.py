@@ -27,10 +27,11 @@ def main(args: Sequence[str] | None = None) -> int:
 
 
 def _work(options: argparse.Namespace) -> int:
+    texts = {name: layout(name, options.namespace) for name in NAMES}
     options.output.mkdir(parents=True, exist_ok=True)
-    for name in NAMES:
+    for name, text in texts.items():
         path = options.output / name
-        path.write_text(layout(name, options.namespace), encoding="utf-8")
+        path.write_text(text, encoding="utf-8")
         print(path)
     return DONE
 

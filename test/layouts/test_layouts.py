@@ -280,3 +280,12 @@ def test_the_layouts_are_installed() -> None:
     installed = {(folder, Path(file).name) for folder, files in setup_arguments()["data_files"] for file in files}
     for name in ("foxglove.json", "plotjuggler.xml"):
         assert ("share/adhesion_node/layouts", name) in installed
+
+
+@pytest.mark.parametrize("namespace", ["a b", "/\u00dc", "/1st", "/a//b"])
+def test_what_can_be_no_namespace_is_refused(
+    namespace: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["--namespace", namespace, "--output", str(tmp_path / "new")]) == 2
+    assert "give names of letters, digits and _, as /train1 or /line/train1" in capsys.readouterr().err
+    assert not (tmp_path / "new").exists()

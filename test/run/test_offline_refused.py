@@ -188,6 +188,8 @@ def test_the_only_train_is_replayed_whatever_its_namespace(bag: Path, tmp_path: 
     assert [{key: value for key, value in each.items() if key not in unlike} for each in (own, seventh)] == [
         {key: value for key, value in own.items() if key not in unlike}
     ] * 2
+    mended = offline(tmp_path / "seventh", "--remap", "/train7/position:=position").result
+    assert mended["digest"] == own["digest"]
 
 
 def test_a_bag_without_position_says_what_there_is(tmp_path: Path, offline: Offline) -> None:

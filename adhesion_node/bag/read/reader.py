@@ -119,7 +119,11 @@ def _open(path: Path, metadata: Metadata) -> Recording:
         return McapRecording([path])
     if path.suffix == ".db3":
         return ForeignRecording([path])
-    hints = {".bag": "convert it with rosbags-convert", ".csv": "make one of a log by import_csv"}
+    hints = {
+        ".zstd": "name its directory",
+        ".bag": "convert it with rosbags-convert",
+        ".csv": "make one of a log by import_csv",
+    }
     hint = hints.get(path.suffix.lower(), "name a rosbag2 directory or an .mcap file")
     raise ValueError(f"bag = {path}: is no recording of ROS 2: {hint}")
 
@@ -134,7 +138,9 @@ def _open_directory(path: Path, metadata: Metadata) -> Recording:
     elif databases := _numbered(path, ".db3"):
         recording = ForeignRecording(databases)
     else:
-        raise ValueError(f"bag = {path}: holds no .mcap or .db3 file: name the directory of a recording")
+        inner = sorted(file.parent for ending in ("mcap", "db3") for file in path.glob(f"*/*.{ending}"))
+        hint = f", as {inner[0]}" if inner else ""
+        raise ValueError(f"bag = {path}: holds no .mcap or .db3 file: name the directory of a recording{hint}")
     if not (metadata.readable or recording.damage):
         recording.damage.append(f"{path} has no readable metadata.yaml: its recording was interrupted")
     recording.damage += [f"{path / name} is missing" for name in metadata.files if not (path / name).exists()]

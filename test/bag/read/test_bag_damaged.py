@@ -229,6 +229,7 @@ def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
         ("x.db3", b"garbage " * 100, r"x\.db3: unreadable \(.*\): name another recording"),
         ("x.bag", b"#ROSBAG V2.0", r"x\.bag: is no recording of ROS 2: convert it with rosbags-convert"),
         ("x.CSV", b"time,speed", r"x\.CSV: is no recording of ROS 2: make one of a log by import_csv"),
+        ("x.mcap.zstd", b"text", r"x\.mcap\.zstd: is no recording of ROS 2: name its directory"),
         ("x.txt", b"text", r"x\.txt: is no recording of ROS 2: name a rosbag2 directory or an \.mcap file"),
     ],
 )
@@ -242,6 +243,14 @@ def test_directories_without_a_recording_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"missing: does not exist: name a rosbag2 directory"):
         BagReader(tmp_path / "missing")
     with pytest.raises(ValueError, match=r"holds no \.mcap or \.db3 file"):
+        BagReader(tmp_path)
+
+
+def test_recordings_within_a_folder_are_named(tmp_path: Path) -> None:
+    for name in ("tuesday", "monday"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "run_0.mcap").touch()
+    with pytest.raises(ValueError, match=r"name the directory of a recording, as .*monday$"):
         BagReader(tmp_path)
 
 

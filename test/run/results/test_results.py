@@ -105,7 +105,7 @@ def test_estimates_come_while_the_recording_is_read(bag: Path) -> None:
     ("out", "options", "said"),
     [
         ("results.txt", [], "results.txt: give a file that ends in .csv or .parquet"),
-        ("nowhere/results.csv", [], "nowhere/results.csv: No such file or directory"),
+        ("nowhere/results.csv", [], "nowhere/results.csv: No such file or directory: name one that is there, or make"),
         (
             "results.csv",
             ["--estimator", "creep"],
