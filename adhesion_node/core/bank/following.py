@@ -50,7 +50,8 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
     off = None if predicted is None else predicted.stds
     course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked, off)
     if (predicted is not None and predicted.bank is not None) or memory.is_placed:
-        *beliefs, total = weighing.placed(*bank[:4], white_variances(declared), measurement.position_m, CLIPPED)
+        white = white_variances(declared, memory.coarse.std_m)
+        *beliefs, total = weighing.placed(*bank[:4], white, measurement.position_m, CLIPPED)
         return memory._replace(
             bank=bank.believing(*beliefs),
             declared_m=declared,
@@ -146,7 +147,8 @@ def heard(memory: Memory, measurement: Measurement) -> tuple[Memory, Measurement
         return memory, measurement
     told = measurement.variance_m2
     places = memory.places.after(measurement.t_ns, measurement.position_m, told, far=PLACE_FAR)
-    return memory._replace(places=places), measurement._replace(variance_m2=places.variance_of(told))
+    memory = memory._replace(places=places, coarse=memory.coarse.after(measurement.position_m))
+    return memory, measurement._replace(variance_m2=places.variance_of(told))
 
 
 def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
@@ -154,7 +156,8 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
     if not (measurement.has_position and memory.is_placed):
         return Foreseen()
     before = memory.bank, (measurement.t_ns - memory.t_ns) / S, memory.braking, memory.declared_m
-    return foreseen(config, *before, measurement.position_m, math.sqrt(measurement.variance_m2))
+    white = white_variances(math.sqrt(measurement.variance_m2), memory.coarse.std_m)
+    return foreseen(config, *before, measurement.position_m, white)
 
 
 def _may_slide(memory: Memory) -> bool:

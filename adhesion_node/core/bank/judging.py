@@ -66,7 +66,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if not before:
         return _coasted(memory)
     if memory.asks:
-        if memory.course.is_impossible(config, bank, memory.declared_m):
+        if memory.course.is_impossible(config, bank, memory.declared_m, memory.coarse.std_m):
             return misled(config, memory)
         if memory.braking.told:
             bank = wheels_seen(config, bank, memory.braking, memory.since_s).normalised()

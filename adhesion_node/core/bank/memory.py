@@ -26,6 +26,7 @@ from .kernels import weighing
 from .layout import POSITION, Bank
 from .motion import Braking, moved
 from .seeing import Observation, corrected
+from .sensors.coarse import Coarse
 from .sensors.plausible import Course
 from .sensors.pointing import Pointing
 from .sensors.scatter import LASTING, Coloured, Scatter
@@ -82,6 +83,7 @@ class Memory(NamedTuple):
     repeating: Repeating = Repeating()
     pointing: Pointing = Pointing()
     places: Scatter = Scatter()
+    coarse: Coarse = Coarse()
     speeds: Coloured = Coloured(LASTING)
     shaking: Coloured = Coloured()
     left_out: tuple[Event, ...] = ()

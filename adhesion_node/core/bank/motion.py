@@ -125,12 +125,12 @@ def foreseen(
     braking: Braking,
     declared_m: float,
     position_m: float,
-    position_std_m: float,
+    variances: Array,
 ) -> Foreseen:
-    """As `moved`, and how far a position is off, whose declared standard deviation is only a hint."""
+    """As `moved`, and how far a position is off; `variances` are those of its white part by the label `noise`."""
     step = (dt_s, *braking, declared_m)
     mean, covariance, metres, std_m, nearest = moving.foreseen(
-        model_of(config)[:], bank[:], step, position_m, white_variances(position_std_m)
+        model_of(config)[:], bank[:], step, position_m, variances
     )
     return Foreseen(metres, std_m, nearest, bank.believing(mean, covariance, bank.log_weight))
 
@@ -168,15 +168,16 @@ def open_variance(config: Config, bank: Bank) -> Array:
     return np.asarray(config.grade_error**2 + np.square(config.resistance_std * resisting))
 
 
-def white_variance(bank: Bank, declared_m: float) -> Array:
+def white_variance(bank: Bank, declared_m: float, rounded_m: float = 0.0) -> Array:
     """Variance of the positions' white part, m^2, shape (H,)."""
-    return white_variances(declared_m)[bank.noise]
+    return white_variances(declared_m, rounded_m)[bank.noise]
 
 
 @lru_cache(maxsize=64)  # a receiver mostly declares the same
-def white_variances(declared_m: float) -> Array:
-    """The same by the label `noise`, shape (N,)."""
-    return np.asarray(np.square(np.maximum(noises.WHITE[:, 0] * declared_m, noises.WHITE[:, 1])))
+def white_variances(declared_m: float, rounded_m: float = 0.0) -> Array:
+    """The same by the label `noise`, shape (N,), where so much is rounded off at least."""
+    least_m = np.maximum(noises.WHITE[:, 1], rounded_m)
+    return np.asarray(np.square(np.maximum(noises.WHITE[:, 0] * declared_m, least_m)))
 
 
 def slow_variance(bank: Bank, declared_m: float) -> Array:

@@ -92,7 +92,7 @@ def test_a_correction(position_m: float) -> None:
 
 @pytest.mark.parametrize("position_m", [500.0, 540.0])
 def test_how_far_a_position_is_off(position_m: float) -> None:
-    ours = motion.foreseen(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9, position_m, 1.3)
+    ours = motion.foreseen(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9, position_m, motion.white_variances(1.3))
     bank = motion.moved(CONFIGS[1], BANK, 0.17, BRAKINGS[1], 0.9)
     assert ours.bank is not None
     for one, other in zip(ours.bank, bank, strict=True):

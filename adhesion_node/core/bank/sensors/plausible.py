@@ -86,7 +86,7 @@ class Course(NamedTuple):
         """Whether the positions under the brake run off in a way that none of the known errors does."""
         return self.samples > SAMPLES and self.alike > ALIKE * self.samples
 
-    def is_impossible(self, config: Config, bank: Bank, declared_m: float) -> bool:
+    def is_impossible(self, config: Config, bank: Bank, declared_m: float, rounded_m: float = 0.0) -> bool:
         """Whether no train moves so: they run off, or a parabola through them says so in spite of their errors."""
         if self.runs_off:
             return True
@@ -100,7 +100,7 @@ class Course(NamedTuple):
         newest_ns, newest_m = self.recent[-1]
         time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
         places = np.array([place_m - newest_m for _, place_m in self.recent])
-        white, slow = _errors(bank, declared_m)
+        white, slow = _errors(bank, declared_m, rounded_m)
         for span_s in LOOKS_S:
             first = int(time.searchsorted(-span_s))
             count = time.size - first
@@ -117,9 +117,9 @@ class Course(NamedTuple):
 UNBRAKED = Course()
 
 
-def _errors(bank: Bank, declared_m: float) -> tuple[float, float]:
+def _errors(bank: Bank, declared_m: float, rounded_m: float = 0.0) -> tuple[float, float]:
     """Mean variance of the white errors, m^2, and of the worst that wander over the time that they last, m^2/s."""
-    white, slow = float(bank.weight @ white_variance(bank, declared_m)), _wandering(declared_m)
+    white, slow = float(bank.weight @ white_variance(bank, declared_m, rounded_m)), _wandering(declared_m)
     return white, max(slow[noise] for noise in {noises.RECEIVER, *bank.noise.tolist()})
 
 
