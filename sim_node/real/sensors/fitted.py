@@ -73,6 +73,7 @@ _WHEELS = {"wheels": Mounted(Wheels(), _BUS, "slide protection")}
 _PATCHY_WHEELS = {"wheels": Mounted(Wheels(dropouts=Spells(15.0, 5.0, 70.0)), _BUS, "slide protection")}
 _HANDLE = {"handle": Mounted(Pressure(DEMANDED, topic=BRAKE_DEMAND), _BUS, "handle")}
 _DEMANDED, _CYLINDER, _MEAN = map(_pressure, (DEMANDED, CYLINDER, MEAN))
+_BLENDED = {"pressure blended mean": Mounted(Pressure(MEAN, electric=0.7), _BUS, "brake")}
 
 _RECORDED = Gnss(4.0, 1800.0, 0.08)
 """Two such receivers differ by 0.11 m of white, 1.4 m over 60 s, 6 m over a trip, as two on an intercity train did."""
@@ -112,6 +113,14 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("mean_cylinder", "satellites, the mean pressure of the cylinders", _gnss(), _MEAN),
             ("mean_cylinder_wheels", "the same and the wheels", _gnss(), _MEAN, _WHEELS),
             ("mean_cylinder_demand", "the same and the demand, no wheels", _gnss(), _MEAN, _HANDLE),
+            (
+                "electric_demand",
+                "an electric brake gives 70 %, the cylinders the rest; the demand, and the wheels",
+                _gnss(),
+                _BLENDED,
+                _HANDLE,
+                _WHEELS,
+            ),
             ("wheel_dropouts", "one bogie's wheels after the other missing", _gnss(), _MEAN, _PATCHY_WHEELS),
             ("tunnel_wheels", "minutes without a fix, and the wheels", _gnss(timing=_TUNNELS), _DEMANDED, _WHEELS),
             ("no_pressure", "satellites alone", _gnss()),

@@ -6,7 +6,10 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Brake pressures, absolute: what the driver or the valve demands, one cylinder's, or the mean of all."""
+"""Brake pressures, absolute: what the driver or the valve demands, one cylinder's, or the mean of all.
+
+Where a train brakes electrically, too, its force is the same: the cylinders are pressed with what is lacking.
+"""
 
 from dataclasses import dataclass
 
@@ -22,6 +25,9 @@ from .sensor import Measured, Ride, one
 
 DEMANDED, CYLINDER, MEAN = "demanded", "cylinder", "mean"
 
+FADES_MPS = 2.0, 6.0
+"""An electric brake gives nothing below the first speed, all it can above the second."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pressure:
@@ -29,6 +35,9 @@ class Pressure:
 
     of: str = setting(DEMANDED, "What it is the pressure of", choices=(DEMANDED, CYLINDER, MEAN))
     axle: int = 0
+    electric: float = setting(
+        0.0, "Part of the full brake that an electric brake gives, and cylinders lack", "", 0.0, 1.0
+    )
     std_pa: float = setting(2e3, "Noise", "Pa", 0.0, 1e5)
     topic: Topic = BRAKE_PRESSURE
 
@@ -36,8 +45,10 @@ class Pressure:
         check_settings(self, "pressure ")
 
     def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
-        """Measure the pressure, Pa absolute."""
-        cylinders = ride.journey.cylinder_pa
+        """Measure the pressure, Pa absolute; the journey's is that of a train without an electric brake."""
+        fading = np.interp(ride.journey.speed_mps, FADES_MPS, (0.0, 1.0))
+        lacks_pa = self.electric * ride.nominal.full_pa * fading[:, np.newaxis]
+        cylinders = np.maximum(ride.journey.cylinder_pa - lacks_pa, 0.0)
         gauge = {DEMANDED: ride.journey.demanded_pa, CYLINDER: cylinders[:, self.axle], MEAN: cylinders.mean(axis=1)}
         noise = self.std_pa * rng.standard_normal(time_s.size)
         return one(ride.at(time_s, gauge[self.of]) + ATMOSPHERE_PA + noise, self.std_pa**2)

@@ -120,6 +120,18 @@ def test_pressures_are_absolute_with_their_noise(of: str, axle: int, gauge_pa: f
     assert (shown.variance == 4e6).all()
 
 
+@pytest.mark.parametrize("part", [0.5, 0.9])
+def test_beside_an_electric_brake_cylinders_are_pressed_with_what_is_lacking(part: float) -> None:
+    """Its part of the full brake at speed, nothing of it below 2 m/s; the demand is the same."""
+    whole, lacking = (Pressure(MEAN, electric=each).measure(RIDE, TIMES, _rng()).values[:, 0] for each in (0.0, part))
+    speed, less_pa = _true(RIDE.journey.speed_mps), part * RIDE.nominal.full_pa
+    left_pa = np.mean([max(each - less_pa, 0.0) for each in (300e3, 300e3, 300e3, 150e3)])
+    assert lacking[BRAKED & (speed > 6.0)].mean() - 101_325.0 == pytest.approx(left_pa, abs=400.0)
+    assert lacking[speed < 2.0] == pytest.approx(whole[speed < 2.0])
+    demanded = [Pressure(electric=each).measure(RIDE, TIMES, _rng()).values for each in (0.0, part)]
+    assert np.array_equal(*demanded)
+
+
 def test_an_unknown_pressure_is_refused() -> None:
     with pytest.raises(ValueError, match="pressure of = 'pipe': choose one of demanded, cylinder, mean"):
         Pressure("pipe")
