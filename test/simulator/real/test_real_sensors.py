@@ -128,8 +128,8 @@ def test_beside_an_electric_brake_cylinders_are_pressed_with_what_is_lacking(par
     left_pa = np.mean([max(each - less_pa, 0.0) for each in (300e3, 300e3, 300e3, 150e3)])
     assert lacking[BRAKED & (speed > 6.0)].mean() - 101_325.0 == pytest.approx(left_pa, abs=400.0)
     assert lacking[speed < 2.0] == pytest.approx(whole[speed < 2.0])
-    demanded = [Pressure(electric=each).measure(RIDE, TIMES, _rng()).values for each in (0.0, part)]
-    assert np.array_equal(*demanded)
+    demanded, same = (Pressure(electric=each).measure(RIDE, TIMES, _rng()).values for each in (0.0, part))
+    assert np.array_equal(demanded, same)
 
 
 def test_an_unknown_pressure_is_refused() -> None:
