@@ -53,6 +53,8 @@ def _value(element: str, numbers: Iterator[int]) -> Any:
         return filled(element, numbers)
     if element == "string":
         return f"text {number}"
+    if element == "boolean":
+        return True
     if element == "octet":
         return bytes([number % 100])
     return number + 0.5 if element in ("double", "float") else number % 100

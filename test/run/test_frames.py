@@ -37,7 +37,8 @@ def measured() -> pd.DataFrame:
 
 def with_everything() -> pd.DataFrame:
     """Return the same with other sensors beside it, each with gaps."""
-    frame = measured().assign(speed=80.0, speed_std=20.0, acceleration=0.0, brake_demand=measured()["brake_pressure"])
+    frame = measured().assign(speed_std=20.0, acceleration=0.0, brake_demand=measured()["brake_pressure"])
+    frame["speed"] = np.linspace(80.0, 75.0, len(frame))
     frame["wheel_speed_1"] = frame["wheel_speed_2"] = 80.0 / 0.46
     frame.loc[frame.index % 3 > 0, ["speed", "speed_std", "wheel_speed_2"]] = np.nan
     frame.loc[frame.index % 5 > 0, "position"] = np.nan
