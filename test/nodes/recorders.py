@@ -13,6 +13,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -111,10 +112,15 @@ def recording_process(
             process.kill()
 
 
-def has_messages(bag: Path) -> bool:
-    """Tell whether a recording in progress has messages on the disk."""
+def recorded(bag: Path) -> Counter[str]:
+    """Count the messages by topic that a recording in progress has on the disk."""
     try:
         with BagReader(bag) as reader:
-            return bool(reader.counts)
+            return Counter(reader.counts)
     except ValueError:
-        return False
+        return Counter()
+
+
+def has_messages(bag: Path) -> bool:
+    """Tell whether a recording in progress has messages on the disk."""
+    return bool(recorded(bag))
