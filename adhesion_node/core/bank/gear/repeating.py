@@ -19,6 +19,9 @@ COARSEST_MPS = 0.5
 STEPS = 4.0
 """Steps of the sensor that a train has lost, beside the sensor's error, whose speed cannot be the same any more."""
 
+BY_CHANCE = 1
+"""How often a speed comes again by chance: one of many that err by few steps does so now and then."""
+
 
 class Repeating(NamedTuple):
     """A speed as it was measured last, and by how much the train had slowed when it was first measured so."""
@@ -27,15 +30,20 @@ class Repeating(NamedTuple):
     slowed_mps: float = 0.0
     step_mps: float = COARSEST_MPS
     """Smallest step that the sensor has ever made: a coarse one repeats itself while it works."""
+    again: int = 0
+    """How often it has come again."""
 
     def after(self, speed_mps: float, slowed_mps: float) -> Repeating:
         """Note the next speed, NaN if it is not known, and by how much the train has slowed under the brake in all."""
-        if speed_mps == self.speed_mps or math.isnan(speed_mps):
+        if math.isnan(speed_mps):
             return self
+        if speed_mps == self.speed_mps:
+            return self._replace(again=self.again + 1)
         step_mps = abs(speed_mps - self.speed_mps)
         return Repeating(speed_mps, slowed_mps, step_mps if step_mps < self.step_mps else self.step_mps)  # not if NaN
 
     def is_stuck(self, slowed_mps: float, variance: float) -> bool:
         """Whether the train cannot have this speed any more, which has such a variance; at 0 it stands."""
         lost_mps = slowed_mps - self.slowed_mps
-        return self.speed_mps != 0.0 and lost_mps > STEPS * self.step_mps + math.sqrt(variance)
+        lost = lost_mps > STEPS * self.step_mps + math.sqrt(variance)
+        return lost and self.again > BY_CHANCE and self.speed_mps != 0.0
