@@ -130,8 +130,9 @@ def test_every_node_speaks_without_being_spoken_to(
     """No sensor ever, a /clock that is not there; the silence of the sensors alone would be told once an hour."""
     own = {"sensor_timeout_s": 3600.0} if "estimator" in entry else {}
     make = beside.get(NODES[entry], NODES[entry])
-    line = make_line(make, use_sim_time=use_sim_time, diagnostics_period_s=0.1, namespace="/train1", **own)
-    line.wait(lambda: len(line.told) > 5, 2.0)
+    line = make_line(make, use_sim_time=use_sim_time, diagnostics_period_s=0.11, namespace="/train1", **own)
+    assert 110_000_000 in {timer.timer_period_ns for timer in line.node.timers}, "no other timer has this period"
+    line.wait(lambda: len(line.told) > 5)
     assert (line.last.name, line.last.hardware_id) == (f"train1/{entry}", "train1")
     assert line.last.message
 
@@ -153,10 +154,9 @@ def test_stamps_are_the_clock_of_the_node_and_those_of_the_data_are_values(make_
     assert line.values["stamp_ns"] == "none"
     for step in range(20):
         position.publish(messages.position(7 * S + step * S // 10, 3.0 * step, 0.5))
-    line.wait(lambda: line.node.latest is not None)
+    line.wait(lambda: line.node.heard[topics.POSITION] == 20)  # from here on the newest estimate stays the same
     line.told.clear()
-    line.wait(lambda: line.told)
-    assert line.values["stamp_ns"] == str(line.node.latest.t_ns)
+    line.wait_for_values(stamp_ns=str(line.node.latest.t_ns))
     assert 7 * S < line.node.latest.t_ns < 10 * S
     assert all(1000 * S <= stamp_ns(array.header) < 1000 * S + 1000 for array in line.told)
 
