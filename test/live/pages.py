@@ -6,10 +6,11 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The live page in a real browser, with a clock that the test sets."""
+"""The live page in a real browser, with clocks that the test sets: the line's, and the page's own, which stands."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -27,13 +28,29 @@ server = pytest.importorskip("adhesion_node.live.server", reason="the extra `liv
 
 SHOWN = (STATE, MU, BRAKING_CURVE, ATP_STATUS, POSITION)
 
+STANDS = "window.passed_ms = 0; performance.now = () => window.passed_ms"
+"""A busy machine may send nothing for a second: the page would rightly say that there are no data."""
+
+STEP_MS = 500
+TIMEOUT_S = 20.0
+
 
 class Line:
-    """A view whose clock the test sets, and its page."""
+    """A view whose clock the test sets, and its page.
 
-    def __init__(self, page: Any, served: Any, view: View) -> None:
-        self.page, self.view, self.served = page, view, served
-        self.now_s = 0.0
+    What the view has taken is served all at once when the test waits: the server, which looks every 50 ms, would else
+    come between two of its parts.
+    """
+
+    def __init__(self) -> None:
+        self.view, self.now_s = View(), 0.0
+        self.tell()
+        self.served = server.Server("127.0.0.1", 0, lambda: dict(self._told), 0.05)
+        self.page: Any = None
+
+    def tell(self) -> None:
+        """Serve from now on what the view shows now."""
+        self._told = self.view.parts(self.now_s)
 
     def hear(self, *topics: Topic) -> None:
         for topic in topics or SHOWN:
@@ -43,7 +60,15 @@ class Line:
         return str(self.page.locator(where).text_content())
 
     def wait(self, text: str, **options: Any) -> None:
+        self.tell()
         self.page.get_by_text(text, **options).first.wait_for()
+
+    def pass_until(self, text: str) -> None:
+        """Let the page's own time go on, step by step, until the page says so; messages may still be on their way."""
+        deadline = time.monotonic() + TIMEOUT_S
+        step = "([step, text]) => { passed_ms += step; draw(); return document.body.innerText.includes(text) }"
+        while not self.page.evaluate(step, [STEP_MS, text]):
+            assert time.monotonic() < deadline, text
 
     def level(self, level: str, **values: float) -> None:
         said = STATUS | {"level": level} | {name: str(value) for name, value in values.items()}
@@ -54,15 +79,14 @@ class Line:
 @contextmanager
 def line(**context: Any) -> Iterator[Line]:
     """Serve a view and open it; nothing may go wrong in the page but that the server has gone."""
-    view = View()
-    made: list[Line] = []
-    served = server.Server("127.0.0.1", 0, lambda: view.parts(made[0].now_s if made else 0.0), 0.05)
+    made = Line()
     try:
         with browser.open_page(**context) as (page, troubles):
-            made.append(Line(page, served, view))
-            page.goto(served.url)
+            made.page = page
+            page.add_init_script(STANDS)
+            page.goto(made.served.url)
             page.get_by_text("waiting for the estimator").wait_for()
-            yield made[0]
+            yield made
             assert [trouble for trouble in troubles if "ERR_CONNECTION_REFUSED" not in trouble] == []
     finally:
-        served.close()
+        made.served.close()

@@ -43,7 +43,7 @@ def test_the_page_can_be_used_by_everybody(look: str) -> None:
         shown.wait("WARNING: warning")
         if look == "no data":
             shown.served.close()
-            shown.wait("NO DATA since")
+            shown.pass_until("NO DATA since")
         browser.turn(shown.page, look)
         browser.assert_accessible(shown.page)
         assert shown.page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "columns are cut off"

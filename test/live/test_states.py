@@ -155,7 +155,7 @@ def test_what_is_old_is_not_in_the_picture(watched: Watched) -> None:
 def test_no_data_is_large_and_without_a_colour(watched: Watched) -> None:
     watched.run(LEVELS[5])
     watched.shown.served.close()
-    watched.shown.wait("NO DATA since")
+    watched.shown.pass_until("NO DATA since")
     picture = watched.look()
     (banner,) = [each for each in picture.texts if each.text.startswith("NO DATA since")][:1]
     assert banner.px >= 20.0
