@@ -15,6 +15,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
+from itertools import pairwise
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -317,14 +318,12 @@ def test_a_second_viewer_costs_no_second_comparison() -> None:
     served = server.Server("127.0.0.1", 0, parts, 0.05)
     try:
         with viewer.watching(served.url) as first, viewer.watching(served.url) as second:
-            second.receive()
-            before = len(looks)
-            for _ in range(5):
-                first.receive()
-                second.receive()
-            assert len(looks) - before < 5 * server.BEAT_S / 0.05 + 8
+            told = [[watcher.receive()["now"] for _ in range(6)] for watcher in (first, second)]
     finally:
         served.close()
+    most = server.BEAT_S / 0.05 + 1  # a viewer is sent a sign of life after so many looks, however slow the server is
+    for nows in told:
+        assert all(later - earlier <= most for earlier, later in pairwise(nows[1:]))
 
 
 def test_a_page_for_everybody_is_warned_of(context: Context, capfd: pytest.CaptureFixture[str]) -> None:

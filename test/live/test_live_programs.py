@@ -11,14 +11,15 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, suppress
 from pathlib import Path
+from threading import Timer
 from typing import Any
 from urllib.request import urlopen
 
@@ -35,38 +36,31 @@ FOREIGN = {"_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH"}
 """Marks of this process that a new one must not inherit."""
 
 
-def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
-
-
 def start(code: str, **options: Any) -> subprocess.Popen[str]:
     environment = {name: value for name, value in os.environ.items() if name not in FOREIGN}
     return subprocess.Popen([sys.executable, "-c", code], env=environment, stderr=subprocess.PIPE, text=True, **options)
 
 
-@contextmanager
-def wait_for(url: str, process: subprocess.Popen[str]) -> Iterator[Any]:
-    """Watch the page as soon as the program serves it."""
-    deadline = time.monotonic() + START_S
-    while True:
-        with suppress(OSError), socket.create_connection(("127.0.0.1", int(url.rsplit(":", 1)[1].strip("/")))):
-            break
-        assert time.monotonic() < deadline, "nothing is served"
-        with suppress(subprocess.TimeoutExpired):  # its start gets the time that asking again and again would take
-            pytest.fail(f"the program ended at its start with {process.wait(0.05)}")
-    with viewer.watching(url) as watcher:
-        yield watcher
+def served_at(process: subprocess.Popen[str]) -> str:
+    """Return the address of the page, as the program says it; it chooses a port that no other program has."""
+    assert process.stderr is not None
+    late = Timer(START_S, process.kill)
+    late.start()
+    said = []
+    try:
+        for line in process.stderr:
+            said.append(line)
+            if found := re.search(r"open (http://127\.0\.0\.1:\d+/)", line):
+                return found[1]
+    finally:
+        late.cancel()
+    pytest.fail(f"nothing is served: {''.join(said)}")
 
 
 def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
-    port = free_port()
-    process = start(
-        f"import sys; from adhesion_node.main import live; sys.argv[1:] = ['--port', '{port}']; sys.exit(live())"
-    )
+    process = start("import sys; from adhesion_node.main import live; sys.argv[1:] = ['--port', '0']; sys.exit(live())")
     try:
-        with wait_for(f"http://127.0.0.1:{port}/", process) as watcher:
+        with viewer.watching(served_at(process)) as watcher:
             watcher.receive()
             process.send_signal(signal.SIGINT)
             assert process.wait(TIMEOUT_S) == 0
@@ -85,16 +79,16 @@ from sim_node.train import scenario
 from sim_node.train.scenario import SCENARIOS, Brake
 cut = replace(SCENARIOS["tunnel_entry"], brake=Brake(1.0), track=LEVEL, end_s=3.0)
 scenario.SCENARIOS = demo.SCENARIOS = {**SCENARIOS, "tunnel_entry": cut}
-raise SystemExit(demo.main(["--live", "--port", "PORT"]))
+raise SystemExit(demo.main(["--live", "--port", "0"]))
 """
 
 
 def test_the_live_demo_waits_for_a_viewer_runs_at_real_time_and_ends_by_ctrl_c(tmp_path: Path) -> None:
-    port = free_port()
-    process = start(DEMO.replace("PORT", str(port)), cwd=tmp_path, stdout=subprocess.DEVNULL)
+    process = start(DEMO, cwd=tmp_path, stdout=subprocess.DEVNULL)
     try:
-        with wait_for(f"http://127.0.0.1:{port}/", process) as watcher:
-            begun = time.monotonic()
+        url = served_at(process)
+        begun = time.monotonic()
+        with viewer.watching(url) as watcher:
             seen = watcher.until(lambda parts: parts.get("ended"))
             assert time.monotonic() - begun > 0.9 * seen["train"]["t"], "faster than real time"
         assert 1.9 < seen["train"]["t"] <= 3.0  # from the first estimate to the end at 3 s
