@@ -75,31 +75,34 @@ def test_a_second_clock_is_told(make_line: MakeLine) -> None:
     assert "2 publishers of /clock" in last(line).message
 
 
+AT_ONCE = {"diagnostics_period_s": 3600.0}
+"""What is told is told for itself, not because it is time again to tell something."""
+
 RELIABLE = {"qos_overrides./position.subscription.reliability": "reliable"}
 
 
 def test_a_publisher_that_offers_too_little_is_told_with_the_remedy(make_line: MakeLine) -> None:
-    line = make_line(**RELIABLE)
+    line = make_line(**RELIABLE, **AT_ONCE)
     line.driver.create_publisher(
         messages.message_class(topics.POSITION),
         "position",
         QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT),
     )
     told = said(line, "less reliability", "-p qos_overrides./position.subscription.reliability:=best_effort")
-    line.spin_until(line.executor, told, 1.0)
+    line.spin_until(line.executor, told)
 
 
 def test_a_subscriber_that_asks_too_much_is_told(make_line: MakeLine) -> None:
-    line = make_line()
+    line = make_line(**AT_ONCE)
     line.driver.create_subscription(messages.message_class(topics.MU), topics.MU.name, print, qos.LATCHED)
-    line.spin_until(line.executor, said(line, "/adhesion/mu: a subscriber asks for more durability"), 1.0)
+    line.spin_until(line.executor, said(line, "/adhesion/mu: a subscriber asks for more durability"))
 
 
 def test_a_missed_deadline_is_told(make_line: MakeLine) -> None:
     deadline = {f"qos_overrides./position.{end}.deadline": S // 10 for end in ("subscription", "publisher")}
-    line = make_line(**deadline)
+    line = make_line(**deadline, **AT_ONCE)
     line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
-    line.spin_until(line.executor, said(line, "/position: deadline missed"), 1.0)
+    line.spin_until(line.executor, said(line, "/position: deadline missed"))
 
 
 def test_a_publisher_that_shows_no_life_is_told(make_line: MakeLine) -> None:
@@ -108,22 +111,23 @@ def test_a_publisher_that_shows_no_life_is_told(make_line: MakeLine) -> None:
     for end in ("subscription", "publisher"):
         promise[f"qos_overrides./position.{end}.liveliness"] = "manual_by_topic"
         promise[f"qos_overrides./position.{end}.liveliness_lease_duration"] = S // 10
-    line = make_line(**promise)
+    line = make_line(**promise, **AT_ONCE)
     line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
-    line.spin_until(line.executor, said(line, "/position: a publisher shows no life, 0 left"), 1.0)
+    line.spin_until(line.executor, said(line, "/position: a publisher shows no life, 0 left"))
 
 
 def test_a_publisher_that_goes_is_told_and_stands_for_as_long_as_the_silence(make_line: MakeLine) -> None:
-    line = make_line(sensor_timeout_s=0.1)
+    line = make_line(sensor_timeout_s=0.1, **AT_ONCE)
     line.send(topics.POSITION, messages.position(S, 1.0, 0.5))
     line.driver.destroy_publisher(line.outputs[topics.POSITION])
-    line.spin_until(line.executor, said(line, "/position: a publisher has gone, 0 left"), 1.0)
+    line.spin_until(line.executor, said(line, "/position: a publisher has gone, 0 left"))
     line.spin_until(line.executor, said(line, "/position: nothing for 0.1 s", "/position: a publisher has gone"))
 
 
 def test_who_comes_late_gets_no_old_curve(make_line: MakeLine) -> None:
-    """The safe curve lives for 0.1 s here and the nominal one, the control, for its 5 s."""
-    line = make_line(**{"qos_overrides./adhesion/braking_curve.publisher.lifespan": S // 10})
+    """The safe curve lives for 0.1 s here and the nominal one, the control, for an hour."""
+    lives = {topics.BRAKING_CURVE: S // 10, topics.BRAKING_CURVE_NOMINAL: 3600 * S}
+    line = make_line(**{f"qos_overrides./{topic.name}.publisher.lifespan": ns for topic, ns in lives.items()})
     play(line, ticks("none", end_s=22.0))
     line.hear_all()
     expired = time.monotonic() + 0.2
