@@ -186,7 +186,7 @@ def test_a_line_of_100_000_points_is_searched_in_less_than_a_millisecond() -> No
     points = [beside(lat, lon, index, 0.5, 1.0) for index in range(500, 99_500, 500)]
     spent = []
     for point in points:
-        started = time.perf_counter()
+        started = time.thread_time()
         placed(line, *point)
-        spent.append(time.perf_counter() - started)
+        spent.append(time.thread_time() - started)
     assert np.median(spent) < 1e-3

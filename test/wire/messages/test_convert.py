@@ -255,8 +255,8 @@ def test_a_curve_that_cannot_be_braked_along_is_refused(spoil: Callable[[Any], N
 
 def test_a_curve_is_built_and_read_well_within_its_budget() -> None:
     def cost_s() -> float:
-        start = time.perf_counter()
+        start = time.thread_time()
         topics.BRAKING_CURVE.read(messages.curve_message(T_NS, CURVE, 2000.0))
-        return time.perf_counter() - start
+        return time.thread_time() - start
 
     assert min(cost_s() for _ in range(20)) < 6e-3
