@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import time
 from pathlib import Path
@@ -61,8 +62,13 @@ def test_a_machine_that_is_held_up_is_given_more_time_for_its_discovery(
 
 
 def test_it_waits_for_a_subscriber_and_then_misses_nothing(
-    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(player, "SUBSCRIBERS_S", math.inf)  # however slow the machine is
     written = write_steps(tmp_path / "bag", 5)
     with BagReader(tmp_path / "bag") as reader:
         node = Replay(reader, select(reader.topics), 0.0, context=context)
@@ -102,9 +108,9 @@ def test_at_full_speed_a_slow_subscriber_in_another_process_slows_it_down(
     listener = Listener(context, POSITION, profile=UNLIMITED)
     executor.add_node(listener)
     with replay_process(str(tmp_path / "bag"), "--rate", "0", "--topics", "position", "--json", "-") as process:
-        spin_until(executor, lambda: len(listener.heard) > 10, 20.0)
+        spin_until(executor, lambda: len(listener.heard) > 10)
         time.sleep(0.5)  # not to synchronise: meanwhile the replay publishes several queues full
-        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == steps, 60.0)
+        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == steps)
         out, err = process.communicate()
     assert process.returncode == 0, err
     assert json.loads(out) == {"messages": {"/position": steps}, "complete": True}
@@ -129,7 +135,7 @@ def test_a_subscriber_that_hangs_is_waited_for_once(
     with BagReader(tmp_path / "bag") as reader:
         node = Replay(reader, select(reader.topics), 0.0, subscribers=2, context=context)
         executor.add_node(node)
-        spin_until(executor, lambda: node.finished, 60.0)
+        spin_until(executor, lambda: node.finished)
         spin_until(executor, lambda: len(listener.heard) == len(written))
     executor.add_node(hung)  # which is destroyed with it
     assert listener.of(POSITION) == of(written, "/position")
@@ -144,12 +150,13 @@ def test_a_subscriber_that_hangs_is_waited_for_once(
 def test_a_best_effort_subscriber_at_full_speed_is_named(
     tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
 ) -> None:
-    write_steps(tmp_path / "bag", 5)
+    written = write_steps(tmp_path / "bag", 5)
     listener = Listener(context, POSITION)
     executor.add_node(listener)
     with replay_process(str(tmp_path / "bag"), "--rate", "0") as process:
-        spin_until(executor, lambda: process.poll() is not None and len(listener.heard) == 5, 20.0)
+        spin_until(executor, lambda: process.poll() is not None)
         out, err = process.communicate()
     assert process.returncode == 0
+    assert set(listener.of(POSITION)) <= set(of(written, "/position")), "as it says: it may have lost some"
     assert out.split() == ["5", "/brake_pressure", "5", "/position"]
     assert "listener subscribes /position best effort and may lose messages: start it with -p qos_overrides./pos" in err
