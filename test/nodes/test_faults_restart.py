@@ -14,7 +14,7 @@ import signal
 from functools import partial
 
 import messages
-from conftest import SpinUntil
+from conftest import PATIENCE_S, SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
@@ -22,7 +22,7 @@ from rclpy.node import Node
 from start_stop import start
 from test_faults_estimator import flat, offline_digest, ticks
 from test_offline import FAST
-from test_two_processes import PATIENCE_S, QUICK, Operator, Program
+from test_two_processes import LOSSLESS, QUICK, START_S, Operator, Program
 
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.ros import qos
@@ -41,7 +41,7 @@ def test_a_sensor_whose_process_is_killed_is_stale(
     executor.add_node(estimator)
     simulator = start("simulator", "--ros-args", "-p", "rate_hz:=50", "-p", "scenario:=cruise", "-p", "wait_for:=1")
     started.append(simulator)
-    spin_until(executor, lambda: estimator.heard[topics.POSITION] > 50, PATIENCE_S)
+    spin_until(executor, lambda: estimator.heard[topics.POSITION] > 50, START_S)
     spin_until(executor, lambda: operator.levels[-1] != DiagnosticStatus.STALE)
     simulator.send_signal(signal.SIGKILL)
     spin_until(executor, lambda: operator.levels[-1] == DiagnosticStatus.STALE)
@@ -63,9 +63,9 @@ def test_a_killed_estimator_is_replaced_by_one_that_inherits_nothing(
 
     def run_one(run: list[Tick]) -> Program:
         operator.heard.clear()
-        program = start("estimator", "--ros-args", *QUICK)
+        program = start("estimator", "--ros-args", *QUICK, *LOSSLESS)
         started.append(program)
-        spin_until(executor, lambda: all(o.get_subscription_count() == 1 for o in outputs.values()), PATIENCE_S)
+        spin_until(executor, lambda: all(o.get_subscription_count() == 1 for o in outputs.values()), START_S)
         spin_until(executor, lambda: operator.heard, PATIENCE_S)  # it says that it waits: both sides know each other
         for index, sent in enumerate(flat(run)):
             outputs[sent.topic].publish(messages.message_of(sent))
