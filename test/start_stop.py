@@ -33,7 +33,7 @@ PRIVATE = ("_ROS_WHEELS_BOOTSTRAP_COMPLETE", "LD_LIBRARY_PATH")
 """What the wheels' bootstrap leaves behind; a child would take itself for set up already."""
 
 LATEST_S = 4.0
-END_S = 30.0
+END_S = 90.0
 
 BURSTS = ((signal.SIGINT,), (signal.SIGTERM,), (signal.SIGINT, signal.SIGINT), (signal.SIGTERM, signal.SIGINT))
 NODES = ("estimator", "recorder", "atp_monitor", "simulator", "creep_estimator", "live")

@@ -60,7 +60,7 @@ def test_a_signal_ends_the_recording_properly(
 ) -> None:
     _, sent = talking
     with recording_process(tmp_path / "bag") as process:
-        spin_until(executor, lambda: len(sent) >= 50 and has_messages(tmp_path / "bag"), 20.0)
+        spin_until(executor, lambda: len(sent) >= 50 and has_messages(tmp_path / "bag"))
         process.send_signal(number)
         spin_until(executor, lambda: process.poll() is not None)
         out, err = process.communicate()
@@ -97,7 +97,7 @@ def test_what_a_stopped_recorder_has_lost_is_told(
     subscribe(talker, DIAGNOSTICS, lambda message: told.append(message.status[0]))
     executor.add_node(talker)
     with recording_process(tmp_path / "bag", silent=("-p", "diagnostics_period_s:=0.1")) as process:
-        spin_until(executor, lambda: end.get_subscription_count() > 0 and bool(told), 20.0)
+        spin_until(executor, lambda: end.get_subscription_count() > 0 and bool(told))
         end.publish(stamped(STATE, S))
         spin_until(executor, lambda: has_messages(tmp_path / "bag"))
         process.send_signal(signal.SIGSTOP)

@@ -44,7 +44,7 @@ def test_every_byte_arrives_and_the_clock_rises(
     with BagReader(tmp_path / "bag") as reader:
         node = Replay(reader, select(reader.topics), rate, context=context)
         executor.add_node(node)
-        spin_until(executor, lambda: len(listener.heard) == len(written) and len(listener.clock) == 400, 30.0)
+        spin_until(executor, lambda: len(listener.heard) == len(written) and len(listener.clock) == 400)
         spin_until(executor, lambda: node.finished)
     assert node.failure is None
     assert listener.of(POSITION) == of(written, "/position")

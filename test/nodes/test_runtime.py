@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import IO
 
 import pytest
-from conftest import SpinUntil
+from conftest import PATIENCE_S, SpinUntil
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
@@ -120,7 +120,7 @@ def wait_for(program: Program, word: str) -> None:
 
 def end(program: Program) -> tuple[int, list[str]]:
     """Wait for the end; return the exit code and what it complained about, log lines aside."""
-    _, errors = program.communicate("go on\n" if program.poll() is None else None, timeout=30.0)
+    _, errors = program.communicate("go on\n" if program.poll() is None else None, timeout=PATIENCE_S)
     return program.returncode, [line for line in errors.splitlines() if not line.startswith("[INFO]")]
 
 
@@ -171,7 +171,7 @@ def test_what_is_queued_at_the_signal_is_still_taken(
     words = speaker.create_publisher(Float64, "first_word", 1000)
     program = start(TASK="stumble")
     wait_for(program, "stumbling")
-    spin_until(executor, words.get_subscription_count, timeout_s=30.0)
+    spin_until(executor, words.get_subscription_count)
     for number in range(200):
         words.publish(Float64(data=float(number)))
     assert words.wait_for_all_acked(Duration(seconds=10.0))  # they are in the program's queue
@@ -201,9 +201,9 @@ def test_the_last_messages_arrive(
 
     listener.create_subscription(Float64, "last_word", hear, 100)
     program = start(TASK="call")
-    spin_until(executor, lambda: heard, timeout_s=30.0)  # both sides know each other
+    spin_until(executor, lambda: heard)  # both sides know each other
     program.send_signal(signal.SIGTERM)
-    spin_until(executor, lambda: heard[-50:] == [float(number) for number in range(50)], timeout_s=30.0)
+    spin_until(executor, lambda: heard[-50:] == [float(number) for number in range(50)])
     assert end(program) == (0, [])
 
 
@@ -238,7 +238,7 @@ def test_a_parameter_file_for_another_node_is_told(start: Start, tmp_path: Path,
     file = tmp_path / "parameters.yaml"
     file.write_text(f"{section}:\n  ros__parameters:\n    gain: 0.25\n")
     program = start("--ros-args", "--params-file", str(file), TASK="finish")
-    _, errors = program.communicate(timeout=30.0)
+    _, errors = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 0
     assert (f"has sections for {section.strip('/')}, none for /probe: name one 'probe' or '/**'" in errors) == told
     assert ("gain = 0.25" in errors) != told
@@ -262,7 +262,7 @@ def test_arguments_without_ros_args_are_refused(start: Start) -> None:
 
 def test_help_shows_the_parameters(start: Start) -> None:
     program = start("--help")
-    shown, errors = program.communicate(timeout=30.0)
+    shown, errors = program.communicate(timeout=PATIENCE_S)
     assert (program.returncode, errors) == (0, "")
     assert "A node that says what it does." in shown
     assert "gain (default: 0.5): a gain; a value from 0 to 1 dB" in shown
