@@ -14,6 +14,7 @@ import time
 from copy import copy
 from pathlib import Path
 
+import pytest
 from conftest import SpinUntil
 from messages import message_class
 from rclpy.context import Context
@@ -21,9 +22,11 @@ from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import LivelinessPolicy, QoSProfile
+from rclpy.serialization import serialize_message
 from recorders import stamped
 from rosbags.interfaces import ConnectionExtRosbag2, QosDurability, QosLiveliness, QosReliability, QosTime
 from rosbags.rosbag2 import Reader
+from test_replay_waits import turned_by_hand
 
 from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.bag.qos import FOREVER
@@ -99,35 +102,42 @@ def test_a_publisher_that_has_gone_counts_as_one_of_ours(context: Context, execu
     assert (curve.durability, curve.lifespan) == (QosDurability.TRANSIENT_LOCAL, QosTime(5, 0))
 
 
+@pytest.mark.parametrize(("lifespan_s", "waits"), [(3600.0, True), (0.2, False)])
 def test_a_played_curve_waits_for_who_comes_late_until_it_is_too_old(
-    tmp_path: Path, context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+    tmp_path: Path,
+    context: Context,
+    executor: SingleThreadedExecutor,
+    spin_until: SpinUntil,
+    monkeypatch: pytest.MonkeyPatch,
+    lifespan_s: float,
+    waits: bool,
 ) -> None:
-    short = copy(EXPIRING)
-    short.lifespan = Duration(seconds=1.0)
-    with record(tmp_path / "live", BRAKING_CURVE, [short], executor, spin_until) as reader:
+    """The test turns the player's clock, which stands until the first curve is too old or has been heard."""
+    expiring = copy(EXPIRING)
+    expiring.lifespan = Duration(seconds=lifespan_s)
+    with record(tmp_path / "live", BRAKING_CURVE, [expiring], executor, spin_until) as reader:
         (only,) = reader.messages()
-        with BagWriter(tmp_path / "bag") as writer:  # the same topic with two curves, 4 s apart
+        with BagWriter(tmp_path / "bag") as writer:  # the same topic with a curve a second
             writer.add_topic(only.topic, only.type, offered=reader.infos[only.topic].offered)
-            for second in (1, 5):
-                writer.write(only.topic, only.type, only.cdr, second * S)
-    heard: dict[str, int] = {"soon": 0, "late": 0}
-    nodes = {name: Node(name, context=context) for name in heard}
-    for node in nodes.values():
-        executor.add_node(node)
+            for second in range(1, 61):
+                cdr = serialize_message(stamped(BRAKING_CURVE, second * S))
+                writer.write(only.topic, only.type, cdr, second * S)
+    now_ms, heard = turned_by_hand(monkeypatch), list[int]()
+    late = Node("late", context=context)
+    executor.add_node(late)
     with BagReader(tmp_path / "bag") as played:
         player = Replay(played, select_from(played, [], ["/elsewhere"]), subscribers=0, context=context)
         executor.add_node(player)
         spin_until(executor, lambda: player.published["/elsewhere"] == 1)
-        published_s = time.monotonic()
+        expired_s = time.monotonic() + lifespan_s + 1.0
+        spin_until(executor, lambda: waits or time.monotonic() > expired_s)
+        topic = BRAKING_CURVE._replace(name="elsewhere")
+        joined = subscribe(late, topic, lambda curve: heard.append(curve.header.stamp.sec), LATCHED)
+        spin_until(executor, lambda: joined.get_publisher_count() and (heard or not waits))
 
-        def join(name: str) -> None:
-            topic = BRAKING_CURVE._replace(name="elsewhere")
-            subscribe(nodes[name], topic, lambda _: heard.update({name: heard[name] + 1}), LATCHED)
+        def heard_of_later() -> bool:
+            now_ms[0] += 1000
+            return bool(heard) and heard[-1] > 1
 
-        join("soon")
-        spin_until(executor, lambda: heard["soon"] == 1)
-        spin_until(executor, lambda: time.monotonic() > published_s + 1.3)
-        assert player.published["/elsewhere"] == 1
-        join("late")
-        spin_until(executor, lambda: player.finished and heard["soon"] == 2 and heard["late"])
-    assert heard == {"soon": 2, "late": 1}
+        spin_until(executor, heard_of_later)
+    assert (heard[0] == 1) is waits
