@@ -194,7 +194,7 @@ def test_a_file_for_all_nodes_may_set_nothing_of_the_estimators(tmp_path: Path, 
 def test_help_lists_every_parameter_with_its_default() -> None:
     code = "import sys; from adhesion_node.nodes.estimator import main; sys.exit(main(['--help']))"
     shown = subprocess.run(
-        [sys.executable, "-c", code], env=os.environ, capture_output=True, text=True, check=True, timeout=30.0
+        [sys.executable, "-c", code], env=os.environ, capture_output=True, text=True, check=True, timeout=60.0
     ).stdout
     for name, value in sections()["estimator"].items():
         assert f"  {name} (default: {value}): " in shown
