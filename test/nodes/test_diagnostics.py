@@ -247,7 +247,9 @@ def test_the_recorder_tells_what_it_has_written(
 ) -> None:
     line = make_line(beside[Recorder], diagnostics_period_s=0.1)
     line.outlet(topics.MU).publish(messages.mu_message(0.08))
-    line.wait(lambda: line.told and int(line.values["bytes"]) > 0 and line.node.counts.get("/adhesion/mu") == 1)
+    line.wait(lambda: line.node.counts.get("/adhesion/mu") == 1)
+    line.wait(lambda: line.told and int(line.values["written"]) > 0)
+    assert int(line.values["bytes"]) > 0
     assert line.last.level == DiagnosticStatus.OK
     assert Path(line.values["file"]).parent == tmp_path / "bag"
     assert Path(line.values["file"]).exists()
@@ -269,8 +271,8 @@ def test_the_player_tells_how_much_is_left(
     make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
 ) -> None:
     line = make_line(beside[Replay], diagnostics_period_s=0.1)
-    line.wait_for_values(published="80", left="0", next_ns="none")
-    assert line.last.message == "the end of the recording"
+    line.wait_until_said("the end of the recording")
+    assert (line.values["published"], line.values["left"], line.values["next_ns"]) == ("80", "0", "none")
 
 
 def test_a_player_that_waits_tells_for_whom(make_line: Callable[..., Line], tmp_path: Path) -> None:
