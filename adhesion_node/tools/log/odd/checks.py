@@ -23,6 +23,7 @@ from ....wire.line import ATMOSPHERE_PA
 from ..cell.clock import has_dates
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
 from ..whole import MOVES_MPS, Log, moment
+from .dropouts import dropouts
 from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .sensors import felt, rolling
@@ -54,7 +55,7 @@ def odd(log: Log) -> list[str]:
     """Say what is odd, with the cure."""
     t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
     stand_ins = [*sentinels(log)]
-    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *_pressures(log)]
+    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *dropouts(log), *_pressures(log)]
     if of_time or stand_ins or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *(of_time or _too_far(log, t_s)), *texts]
     of_way = [*leaps(log, t_s), *radians(log)]
