@@ -123,7 +123,8 @@ def _without_fix(columns: "Mapping[str, pd.Series[Any]]", decimal: str) -> "dict
 
 def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any]", form: Format) -> None:
     if form.time_format is not None:
-        how = f"it is not written as {form.time_format!r}: say how with --time-format"
+        known = "in a way that is known" if form.time_format == "ISO8601" else f"as {form.time_format!r}"
+        how = f"it is not written {known}: say how with --time-format, such as '%d.%m.%Y %H:%M:%S.%f'"
         refuse(bad, "not_a_time", "time", lambda _: how)
         return
     outside = bad & np.isfinite(numbers(cells, form.decimal or "."))

@@ -24,6 +24,7 @@ from .format import PRESSURE_UNITS, Format
 from .held import without_held
 from .opened import open_log
 from .rows import measured
+from .shared import together
 from .steps import DEGREE_M, stds_of
 from .text import Refusal
 from .wraps import unwrapped
@@ -71,12 +72,13 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
             tell(each)
     rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
     rows, notes = in_zone(over_midnight(rows, timed), timed)
-    rows, refused = _rising(rows.sort_values("t_ns", kind="stable") if form.sort else rows, str(path), has_dates(timed))
+    rows, shared = together(rows.sort_values("t_ns", kind="stable") if form.sort else rows)
+    rows, refused = _rising(rows, str(path), has_dates(timed))
     for each in refused:
         tell(each)
     rows, held = without_held(rows)
     rows, wrapped = unwrapped(rows, form)
-    notes += source.notes + digits + held + wrapped
+    notes += source.notes + digits + shared + held + wrapped
     notes += [f"{name}: {said}" for name, said in read_as.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]

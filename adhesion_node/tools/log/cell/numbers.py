@@ -32,11 +32,18 @@ END_OF_STAMPS_NS = 2**31 * 10**9
 CLOCK = "%H:%M:%S.%f"
 """The time of the day alone."""
 
+_DAYS = (
+    *("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%Y/%m/%d", "%Y%m%d"),
+    *("%d/%m/%y", "%m/%d/%y", "%d-%m-%y", "%y-%m-%d", "%y/%m/%d", "%y.%m.%d", "%m-%d-%Y"),
+    *("%d-%b-%Y", "%d-%b-%y", "%d %b %Y", "%d %b %y", "%d/%b/%Y", "%b %d %Y", "%b %d, %Y"),
+)
+
 FORMATS = (
     "ISO8601",
-    *("%d.%m.%Y %H:%M:%S.%f", "%d.%m.%y %H:%M:%S.%f", "%d/%m/%Y %H:%M:%S.%f", "%m/%d/%Y %H:%M:%S.%f"),
-    *("%d-%m-%Y %H:%M:%S.%f", "%Y/%m/%d %H:%M:%S.%f", "%Y%m%d %H:%M:%S.%f", CLOCK),
-    *("%m/%d/%Y %I:%M:%S.%f %p", "%d/%m/%Y %I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
+    *(f"{day} {CLOCK}" for day in _DAYS),
+    CLOCK,
+    *(f"{day} %I:%M:%S.%f %p" for day in ("%m/%d/%Y", "%d/%m/%Y", "%m/%d/%y", "%d/%m/%y", "%d-%b-%y", "%Y-%m-%d")),
+    *("%b %d, %Y %I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
 )
 """Formats of dates that are tried, in this order; a fraction of the second may be missing, its sign be a comma."""
 

@@ -38,7 +38,8 @@ def frozen(log: Log, t_s: Array) -> Iterator[str]:
     place = next((columns for columns in (["position"], ["lat", "lon"]) if set(columns) <= set(rows)), [])
     known = rows[place].notna().all(axis=1).to_numpy() & bool(place)
     at_m = np.column_stack([np.interp(t_s, t_s[known], x[known]) for x in metres(rows, place)]) if known.any() else None
-    speed = rows["speed"].abs().ffill().fillna(0.0).to_numpy() if "speed" in rows else None
+    has_speed = "speed" in rows and rows["speed"].notna().any()
+    speed = rows["speed"].abs().ffill().fillna(0.0).to_numpy() if has_speed else None
     if at_m is not None:
         names, span = place, _place_froze(_runs(rows[place]), at_m, speed, t_s)
     if span and speed is not None and np.ptp(speed[slice(*span)]) == 0.0:
