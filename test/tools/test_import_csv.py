@@ -242,7 +242,7 @@ def test_a_wrong_iso_time_is_named(importing: Import) -> None:
     text = "time,position\n2024-01-01T00:00:00Z,1\nyesterday,1\n2024-02-30T00:00:00Z,1\n"
     assert importing(text, "--time-unit", "iso") == 1
     assert importing.errors[0].startswith(
-        "import_csv: FILE:3: time = 'yesterday': it is not written as 'ISO8601': say how with"
+        "import_csv: FILE:3: time = 'yesterday': it is not written in a way that is known: say how with"
     )
     assert importing.summary["refused"] == {"not_a_time": 2}
 

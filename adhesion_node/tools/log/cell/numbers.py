@@ -35,7 +35,7 @@ CLOCK = "%H:%M:%S.%f"
 _DAYS = (
     *("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%Y/%m/%d", "%Y%m%d"),
     *("%d/%m/%y", "%m/%d/%y", "%d-%m-%y", "%y-%m-%d", "%y/%m/%d", "%y.%m.%d", "%m-%d-%Y"),
-    *("%d-%b-%Y", "%d-%b-%y", "%d %b %Y", "%d %b %y", "%d/%b/%Y", "%b %d %Y", "%b %d, %Y"),
+    *("%d-%b-%Y", "%d-%b-%y", "%d %b %Y", "%d %b %y", "%d/%b/%Y", "%b %d %Y"),
 )
 
 FORMATS = (
@@ -43,9 +43,12 @@ FORMATS = (
     *(f"{day} {CLOCK}" for day in _DAYS),
     CLOCK,
     *(f"{day} %I:%M:%S.%f %p" for day in ("%m/%d/%Y", "%d/%m/%Y", "%m/%d/%y", "%d/%m/%y", "%d-%b-%y", "%Y-%m-%d")),
-    *("%b %d, %Y %I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
+    *("%b %d %Y %I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
 )
 """Formats of dates that are tried, in this order; a fraction of the second may be missing, its sign be a comma."""
+
+_LIKE = ((r",\s+", " "), (",", "."), (r"(:[0-9]{2}:[0-9]{2}):(?=[0-9]{3}(?![0-9]))", r"\g<1>."))
+"""What a date may have otherwise: a comma before the next part or the fraction, and a colon before milliseconds."""
 
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """Times from this number on are counted in such units since 1970."""
@@ -147,7 +150,8 @@ def is_clock(form: str | None) -> bool:
 def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
     """The dates of a format; a clock's are those of the day on which the epoch begins."""
     if form in FORMATS:
-        text = text.str.replace(",", ".", regex=False)
+        for written, meant in _LIKE:
+            text = text.str.replace(written, meant, regex=True)
     if form in FORMATS[1:]:
         text = text.str.replace(r"^(.*:[0-9]+)(?=$| *[AaPp][Mm]$)", r"\g<1>.0", regex=True)
     if is_clock(form):
