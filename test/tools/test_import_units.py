@@ -15,6 +15,7 @@ import pytest
 from test_import_csv import Import, importing
 from test_import_log import ride, text
 
+from adhesion_node.core.physics.train import KMH
 from adhesion_node.tools import import_csv
 from adhesion_node.wire.topics import BRAKE_PRESSURE, SPEED, WHEEL_SPEED
 
@@ -162,3 +163,44 @@ def test_knots_are_read(importing: Import, header: str) -> None:
     rows = ride()
     assert importing(text(rows.assign(speed=rows.speed * 3600.0 / 1852.0).rename(columns={"speed": header}))) == 0
     assert importing.messages("speed")[0].twist.twist.linear.x == pytest.approx(rows.speed.iloc[0])
+
+
+IN_CELLS: list[tuple[str, str, float]] = [
+    ("speed", "{:.3f} m/s", 1.0),
+    ("speed", "{:.3f}km/h", 1.0 / KMH),
+    ("brake_pressure", "{:.2f} bar", 1e-5),
+    ("brake_pressure", "{:.2f} bar(g)", 1e-5),
+    ("position", "{:.6f} km", 1e-3),
+    ("time", "{:.1f} s", 1.0),
+]
+
+
+@pytest.mark.parametrize("decimal", [".", ","])
+@pytest.mark.parametrize(("column", "written", "scale"), IN_CELLS)
+def test_a_unit_behind_every_number_of_a_column_is_read(
+    importing: Import, column: str, written: str, scale: float, decimal: str
+) -> None:
+    rows = ride().astype(str)
+    rows[column] = [written.format(scale * each) for each in ride()[column]]
+    for name in rows:
+        rows[name] = rows[name].str.replace(".", decimal, regex=False)
+    assert importing(text(rows, ";")) == 0, importing.errors
+    assert [sample.position_m for sample in importing.positions()] == ride().position.tolist()
+    pressures = [BRAKE_PRESSURE.read(each).pressure_pa for each in importing.messages("brake_pressure")]
+    assert pressures == pytest.approx(ride().brake_pressure)
+    speeds = [SPEED.read(each).speed_mps for each in importing.messages("speed")]
+    assert speeds == pytest.approx(ride().speed, abs=1e-3)
+
+
+def test_cells_of_several_units_or_another_than_the_header_says_are_refused(importing: Import) -> None:
+    cells = [f"{each / KMH:.3f} km/h" for each in ride().speed]
+    rows = ride().assign(speed=[*cells[:-1], "30 m/s"])
+    assert importing(text(rows)) == 2
+    assert "'180.000 km/h': write a finite number with a decimal point, without its unit" in importing.errors[0]
+    assert importing(text(ride().assign(speed=cells).rename(columns={"speed": "speed [m/s]"}))) == 2
+
+
+def test_cells_of_another_unit_than_the_option_says_are_odd(importing: Import) -> None:
+    rows = ride().assign(speed=[f"{each / KMH:.3f} km/h" for each in ride().speed])
+    assert importing(text(rows), "--speed-unit", "mph") == 1
+    assert importing.summary["odd"][0].startswith("speed is said to be in 'km/h', and by --speed-unit in mph")

@@ -19,6 +19,7 @@ import pandas as pd
 
 from ...command.checks import refuse
 from .cell.numbers import FORMATS, NO_TIME, time_formats, time_unit, times_ns
+from .cell.suffixed import unit_in, without_units
 from .cell.units import kind_of, known
 from .columns import Columns, columns_of, in_doubt, units_told
 from .format import Format
@@ -52,10 +53,12 @@ def open_log(path: Path, form: Format) -> Source:
         rows = blocks(path, form, names)
     columns = columns_of(names, str(path), form)
     told = units_told(columns, names, form)
+    first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
+    behind = dict(_behind_numbers(first.cells, columns, told))
+    first, rows = _bare(first, behind), (_bare(block, behind) for block in rows)
     absolute = frozenset(ours for ours, text in told.items() if kind_of(text, ours) == "absolute")
     units = {ours: unit for ours, text in told.items() if (unit := known(text, ours))}
     form = replace(form, told=units, absolute=absolute)
-    first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
     timed = _timed(form, first.cells[columns.names["time"]])
     if timed.time_format is not None:
         told.pop("time", None)  # [UTC] or [hh:mm:ss]: dates are in no unit
@@ -63,6 +66,20 @@ def open_log(path: Path, form: Format) -> Source:
     columns = columns._replace(doubts=tuple(in_doubt(told, form)))
     notes = [] if form.time_format else list(_read_otherwise(first.cells[columns.names["time"]], timed))
     return Source(timed, columns, _again(first, rows), notes)
+
+
+def _behind_numbers(cells: pd.DataFrame, columns: Columns, told: dict[str, str]) -> Iterator[tuple[str, str]]:
+    """Yield columns whose cells all have one unit, as they write it, and note it; not where the header has another."""
+    theirs = {ours: (name,) for ours, name in columns.names.items()} | {"wheel_speed": columns.axles}
+    for ours, names in theirs.items():
+        units = {unit_in(cells[name], ours) for name in names}
+        unit = units.pop() if len(units) == 1 else None
+        if unit and known(told.setdefault(ours, unit), ours) == known(unit, ours):
+            yield from ((name, unit) for name in names)
+
+
+def _bare(block: Block, units: dict[str, str]) -> Block:
+    return block._replace(cells=without_units(block.cells, units)) if units else block
 
 
 def _timed(form: Format, cells: "pd.Series[Any]") -> Format:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 import pandas as pd
 
 from .cell.decimals import decimal_sign
+from .cell.suffixed import number_in
 from .cell.units import meant
 from .format import PLACES, Format
 
@@ -74,7 +75,7 @@ def understood(path: Path, form: Format) -> Format:
     delimiter, header = _header(lines, form)
     rows = [cells for text in lines[header + 1 :] if (cells := _cells(text, delimiter))]
     first = rows[0] if len(rows) > 1 else []
-    decimal, is_sure = decimal_sign(cell for cells in rows for cell in cells)
+    decimal, is_sure = decimal_sign(number_in(cell) for cells in rows for cell in cells)
     return replace(
         form,
         delimiter=delimiter,
