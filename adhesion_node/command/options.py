@@ -9,6 +9,7 @@
 """What the command line tools share: --help, --json, completion, exit codes, errors in one line, progress."""
 
 import argparse
+import errno
 import io
 import json
 import os
@@ -18,11 +19,11 @@ import textwrap
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from pathlib import Path
 from typing import Any, TypeVar
 
 from .signals import interrupted
 from .streams import open_closed_streams
+from .written import write_text
 
 Item = TypeVar("Item")
 
@@ -37,6 +38,8 @@ REMEDIES: Mapping[type[OSError], str] = {
     PermissionError: ": name one that you may write, or read",
 }
 """What to do where the system refuses."""
+
+NO_ROOM = ": make room, or name a place on another disk"
 
 ESCAPED = "backslashreplace"
 """What becomes of letters that a terminal's encoding has not, and of bytes in a file's name that are none."""
@@ -207,7 +210,7 @@ def report(destination: str | None, result: Mapping[str, Any] | Sequence[Any], t
     if destination == "-":
         sys.stdout.write(document)
     else:
-        Path(destination).write_text(document, encoding="utf-8")
+        write_text(destination, document)
 
 
 def progress(items: Iterable[Item], noun: str, total: int | None = None) -> Iterator[Item]:
@@ -225,6 +228,8 @@ def complain(program: str, error: Exception, code: int) -> int:
     """Say in one line under the program's name what is wrong, and return the exit code."""
     message = str(error)
     if isinstance(error, OSError):
-        message = f"{error.filename or 'input/output'}: {error.strerror or error}{REMEDIES.get(type(error), '')}"
+        is_full = bool(error.filename) and error.strerror == os.strerror(errno.ENOSPC)
+        remedy = NO_ROOM if is_full else REMEDIES.get(type(error), "")
+        message = f"{error.filename or 'input/output'}: {error.strerror or error}{remedy}"
     print(f"{program}: {' '.join(message.split())}", file=sys.stderr)
     return code

@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from ..command.options import DONE, help_texts, run_tool
+from ..command.written import write_text
 from . import NAMES, layout
 
 EXAMPLES = ("python -m adhesion_node.layouts --namespace /train1 --output my_layouts",)
@@ -31,7 +32,7 @@ def _work(options: argparse.Namespace) -> int:
     options.output.mkdir(parents=True, exist_ok=True)
     for name, text in texts.items():
         path = options.output / name
-        path.write_text(text, encoding="utf-8")
+        write_text(path, text)
         print(path)
     return DONE
 

@@ -33,6 +33,7 @@ from ..command.options import (
     run_tool,
     setting_options,
 )
+from ..command.written import write_text
 from ..core.physics.train import KMH, Train
 from ..core.setting import settings_of
 from ..run.offline import parameters_of
@@ -128,7 +129,7 @@ def _page(output: Path, subjects: Sequence[Subject], options: argparse.Namespace
     html = report_page(", ".join(subject.name for subject in subjects), subjects, options.target, given)
     output.mkdir(parents=True, exist_ok=True)
     page = output / "report.html"
-    page.write_text(html, encoding="utf-8")
+    write_text(page, html)
     return page
 
 

@@ -39,6 +39,7 @@ from ..command.options import (
     setting_options,
 )
 from ..command.running import Arrays, add_running_options, run_all, running
+from ..command.written import naming
 from ..run import offline
 from ..run.pipeline import Pipeline
 from ..run.results.brakings import BRAKING, CELL, CELL_M, brakings
@@ -237,9 +238,11 @@ def _summary(table: pd.DataFrame) -> dict[str, Any]:
 
 def _write(frame: pd.DataFrame, path: str) -> None:
     if Path(path).suffix == ".csv":
-        frame.to_csv(path, index=False)
+        with naming(path):
+            frame.to_csv(path, index=False)
         return
     try:
-        frame.to_parquet(path, index=False)
+        with naming(path):
+            frame.to_parquet(path, index=False)
     except ImportError as error:
         raise ValueError(f"output = {path}: needs pyarrow, pip install '.[parquet]', or write a .csv") from error

@@ -16,6 +16,7 @@ from sim_node.real.sensors import centre_line
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.scenario import SCENARIOS
 
+from ..command.written import write_text
 from ..core.physics.train import KMH
 from ..wire.files.parameters import text_of
 from .line import Task
@@ -36,7 +37,7 @@ NEARER_M = {"approach": 6300.0}
 def task_of(scenario: str, sensors: str, seed: int, folder: Path) -> Task:
     """What the nodes are to do; the files are written into the folder."""
     task = _real(scenario, sensors, seed, folder) if scenario in REAL else _of_paper(scenario, seed)
-    (folder / PARAMS).write_text(text_of("estimator", {**task.estimator, "seed": seed}), encoding="utf-8")
+    write_text(folder / PARAMS, text_of("estimator", {**task.estimator, "seed": seed}))
     return task
 
 
@@ -54,7 +55,7 @@ def _real(scenario: str, sensors: str, seed: int, folder: Path) -> Task:
     estimator = known.parameters(real, FITTED[sensors])
     if "fix" in FITTED[sensors].sensors:
         line = folder.resolve() / TRACK_LINE  # so that it is found from everywhere
-        line.write_text(centre_line.geojson(), encoding="utf-8")
+        write_text(line, centre_line.geojson())
         estimator |= {"track_line": str(line), "track_start_m": centre_line.BEGINS_M}
     simulator, monitor = {"scenario": scenario, "sensors": sensors}, {"target_position_m": target_m}
     return Task(seed, simulator, {**monitor, "target_speed_kmh": 0.0}, estimator)

@@ -33,6 +33,7 @@ from ..command.options import (
     run_tool,
     setting_options,
 )
+from ..command.written import write_text
 from ..core.physics import braking
 from ..core.physics.adhesion import DRY
 from ..core.physics.train import KMH
@@ -170,7 +171,7 @@ def _estimate(options: argparse.Namespace) -> int:
         found = train_found.find(setup.config, train_found.read(recorded, setup.line))
     text = [f"believed: {setup.train}", *found.told()]
     if options.output and found.says_anything:
-        Path(options.output).write_text(train_found.file_of(found, Path(options.estimate).name), encoding="utf-8")
+        write_text(options.output, train_found.file_of(found, Path(options.estimate).name))
         text.append(f"{options.output} holds the proposal: train --check {options.output}")
     report(options.json, found.result(), "\n".join(text))
     return DONE if found.says_anything else FAILED

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from adhesion_node.command.options import DONE, FAILED, run_tool
+from adhesion_node.command.written import write_text
 
 
 def interrupted_in_a_kernel(_: argparse.Namespace) -> int:
@@ -84,3 +85,13 @@ def test_what_a_terminal_cannot_show_is_escaped(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("sys.stdout", io.TextIOWrapper(written, encoding="ascii", write_through=True))
     assert run_tool(parser, shouting, [os.fsdecode(b"t\xff")]) == DONE
     assert written.getvalue() == b"\\u03bc of t\\udcff\n"
+
+
+def test_a_full_disk_names_the_file_and_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
+    def work(_: argparse.Namespace) -> int:
+        write_text("/dev/full", "text")
+        return DONE
+
+    assert run_tool(argparse.ArgumentParser("tool"), work, []) == FAILED
+    told = "tool: /dev/full: No space left on device: make room, or name a place on another disk\n"
+    assert capsys.readouterr().err == told

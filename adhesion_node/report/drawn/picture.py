@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.legend_handler import HandlerTuple
 from matplotlib.patches import Patch
 
+from ...command.written import naming
 from ...core.physics.train import CRH3, KMH, Train
 from ..found.regimes import IN_WORDS, Band, bands
 from ..read.run import Run
@@ -90,7 +91,8 @@ def draw(
     )
     foot.legend(patches, names, loc="center", ncols=len(names), title=meaning, handler_map={tuple: HandlerTuple(None)})
     for path in paths:
-        figure.savefig(path, dpi=110)
+        with naming(path):
+            figure.savefig(path, dpi=110)
         figure.set_layout_engine("none")  # the places are found once for all files
 
 

@@ -16,6 +16,7 @@ from typing import Any
 
 from ...command.checks import refuse
 from ...command.options import DONE, FAILED, report
+from ...command.written import write_text
 from ..found.distances import FIXED_MU
 from . import is_table
 from .page import fleet_page
@@ -39,7 +40,7 @@ def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
     output = Path(options.output)
     output.mkdir(parents=True, exist_ok=True)
     page = output / "report.html"
-    page.write_text(html, encoding="utf-8")
+    write_text(page, html)
     limited = int(fleet.brakings["mu"].notna().sum())
     result: dict[str, Any] = {"page": str(page), "brakings": len(fleet.brakings), "limited": limited}
     result["low_spots"] = [spot._asdict() for spot in spots]

@@ -14,6 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ...command.written import naming
 from ...core import Prediction
 from ...core.bank.findings.learnt import KIND, QUANTITIES, learnt
 from ...core.bank.labels.kinds import KINDS
@@ -78,10 +79,15 @@ def rows_to(path: str | None) -> Iterator[Write]:
 
 @contextmanager
 def _csv(path: str) -> Iterator[Write]:
-    with Path(path).open("w", encoding="utf-8", newline="") as file:
+    with _closed(Path(path).open("w", encoding="utf-8", newline=""), path) as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        yield writer.writerow
+        writer.writeheader()  # waits in the file's buffer
+
+        def write(row: Row) -> None:
+            with naming(path):
+                writer.writerow(row)
+
+        yield write
 
 
 @contextmanager
@@ -94,10 +100,13 @@ def _parquet(path: str) -> Iterator[Write]:
     kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.dictionary(pyarrow.int32(), pyarrow.string())}
     schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
     waiting: list[Row] = []
-    with parquet.ParquetWriter(path, schema) as writer:
+    with naming(path):
+        opened = parquet.ParquetWriter(path, schema)
+    with _closed(opened, path) as writer:
 
         def flush() -> None:
-            writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+            with naming(path):
+                writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
             waiting.clear()
 
         def write(row: Row) -> None:
@@ -107,6 +116,16 @@ def _parquet(path: str) -> Iterator[Write]:
 
         yield write
         flush()
+
+
+@contextmanager
+def _closed(file: Any, path: str) -> Iterator[Any]:
+    """Close what was opened; on a full disk it is then that the last rows do not fit."""
+    try:
+        yield file
+    finally:
+        with naming(path):
+            file.close()
 
 
 def length_m(curve: BrakingCurve | None) -> float | None:

@@ -17,6 +17,7 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
+from ...command.written import naming
 from ...core.physics.train import Array
 from ...report.drawn.picture import BLACK, BLUE, GREY, ORANGE
 from .figures import Place
@@ -54,7 +55,8 @@ def panels(place: Place, title: str, count: int, height: float = 3.2) -> Iterato
         for axis in axes:
             axis.grid(alpha=0.3)
         yield axes
-        figure.savefig(place.path, dpi=DOTS_PER_INCH)
+        with naming(place.path):
+            figure.savefig(place.path, dpi=DOTS_PER_INCH)
 
 
 @contextmanager

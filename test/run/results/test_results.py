@@ -27,7 +27,7 @@ from adhesion_node.nodes import replay
 from adhesion_node.run import offline
 from adhesion_node.run.offline import Recorded
 from adhesion_node.run.pipeline import Pipeline
-from adhesion_node.run.results.rows import COLUMNS, LEARNT
+from adhesion_node.run.results.rows import COLUMNS, LEARNT, rows_to
 from adhesion_node.wire.line import NOMINAL
 
 
@@ -126,3 +126,15 @@ def test_without_offline_there_are_no_rows(tmp_path: Path, capfd: pytest.Capture
     write_steps(tmp_path / "run", 3)
     assert replay.main([str(tmp_path / "run"), "--out", "results.csv"]) == 2
     assert "--out results.csv: is for --offline" in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+@pytest.mark.parametrize("rows", [0, 1, 10_000])
+def test_a_full_disk_names_the_file(tmp_path: Path, ending: str, rows: int) -> None:
+    """Whenever it shows: the last rows wait until the file is closed."""
+    path = tmp_path / f"results.{ending}"
+    path.symlink_to("/dev/full")
+    with pytest.raises(OSError, match="No space left") as raised, rows_to(str(path)) as write:
+        for row in range(rows):
+            write({"t_ns": row, "regime": "COASTING"})
+    assert raised.value.filename == str(path)
