@@ -31,7 +31,9 @@ _BOOK = b"\xd0\xcf\x11\xe0"
 ARCHIVES = ((b"PK\x03\x04", "a zip file or a workbook"), (b"\x1f\x8b", "compressed"), (_BOOK, "a workbook"))
 """How files begin that are no text, and what they are."""
 
-MISSING = frozenset(("nan", "null", "n/a", "na", "none", "-"))
+MISSING = frozenset(
+    (*("nan", "null", "n/a", "na", "none", "n.a.", "#n/a", "#nv", "<null>", "(null)", "\\n"), *("-", "--", "---"))
+)
 """What stands in a cell without a value, however it is written."""
 
 UTF_16 = ((slice(1, 4, 2), "utf-16-le"), (slice(0, 4, 2), "utf-16-be"))
@@ -113,7 +115,11 @@ def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple
             continue
         if not any(cells[len(names) :]):  # a delimiter at the end of the line, none in the header
             cells = cells[: len(names)]
-        if len(cells) == len(names):
+        if _is_header(cells, names):
+            _require_same(cells, names, f"{path}:{line}")
+            why = "the header once more: it is left out"
+            refused.append(Refusal(line, "header", f"{path}:{line}: row = {_shown(text)}: {why}"))
+        elif len(cells) == len(names):
             at.append(line)
             rows.append(["" if cell.lower() in MISSING else cell for cell in cells])
         elif text.strip():
@@ -122,6 +128,17 @@ def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple
             why = f"{len(cells)} cells under {len(names)} columns: {cure}"
             refused.append(Refusal(line, "cell_count", f"{path}:{line}: row = {_shown(text)}: {why}"))
     return Block(pd.DataFrame(rows, index=at, columns=list(names), dtype=object), refused)
+
+
+def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
+    """Whether a row names columns again, as where a recorder was started anew, or logs were joined."""
+    return bool(cells) and cells[0][:1].isalpha() and 2 * len({*cells} & {*filter(None, names)}) >= len({*names})
+
+
+def _require_same(cells: Sequence[str], names: Sequence[str], where: str) -> None:
+    """Raise ValueError where another header begins: what is below would be read as the columns of the first."""
+    if list(cells) != list(names):
+        raise ValueError(f"{where}: another header, {list(cells)} after {list(names)}: cut the log there")
 
 
 def split(text: str, delimiter: str) -> list[str]:

@@ -134,7 +134,12 @@ def test_a_full_disk_names_the_file(tmp_path: Path, ending: str, rows: int) -> N
     """Whenever it shows: the last rows wait until the file is closed."""
     path = tmp_path / f"results.{ending}"
     path.symlink_to("/dev/full")
-    with pytest.raises(OSError, match="No space left") as raised, rows_to(str(path)) as write:
-        for row in range(rows):
-            write({"t_ns": row, "regime": "COASTING"})
+
+    def write_all() -> None:
+        with rows_to(str(path)) as write:
+            for row in range(rows):
+                write({"t_ns": row, "regime": "COASTING"})
+
+    with pytest.raises(OSError, match="No space left") as raised:
+        write_all()
     assert raised.value.filename == str(path)

@@ -1,0 +1,51 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""A header in the midst of a log, as of logs that were joined: what is below is never read as other columns."""
+
+from __future__ import annotations
+
+import pandas as pd
+import pytest
+from test_import_csv import Import, importing
+from test_import_log import ride, text
+
+__all__ = ["importing"]
+
+
+def test_the_same_header_once_more_is_left_out_and_said(importing: Import) -> None:
+    header, *rows = text(ride()).splitlines(keepends=True)
+    assert importing("".join([header, *rows[:100], header, *rows[100:]])) == 1
+    told = "import_csv: FILE:102: row = 'time,position,speed,brake_pressure': the header once more: it is left out"
+    assert importing.errors == [told]
+    assert importing.summary["refused"] == {"header": 1}
+    assert importing.summary["written"] == len(rows)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        ride()[["time", "speed", "position", "brake_pressure"]],
+        ride().assign(speed_std=0.1),
+        ride().drop(columns="speed"),
+        ride().assign(speed=3.6 * ride().speed).rename(columns={"speed": "speed [km/h]"}),
+    ],
+    ids=["another order", "a further column", "a column less", "another unit"],
+)
+def test_another_header_is_refused(importing: Import, other: pd.DataFrame) -> None:
+    log = text(ride()[:300]) + text(other[300:])
+    assert importing(log) == 2
+    (said,) = importing.errors
+    assert said.startswith(f"import_csv: FILE:302: another header, {list(other)} after {list(ride())}: cut the log")
+
+
+@pytest.mark.parametrize("mark", ["#N/A", "--", "---", "<null>", "\\N", "n.a.", "(null)"])
+def test_what_is_written_for_no_value_is_an_empty_cell(importing: Import, mark: str) -> None:
+    rows = ride().astype(str)
+    assert importing(text(rows.assign(speed=rows.speed.mask(rows.index % 7 == 3, mark)))) == 0, importing.errors
+    assert importing.summary["empty"] == {"speed": 86}
