@@ -364,3 +364,19 @@ def test_numbers_that_many_rows_have_are_values(
 ) -> None:
     importing(text(change(ride())))
     assert "no value" not in str(importing.summary["odd"])
+
+
+def test_speeds_of_two_trains_are_none_of_one(importing: Import) -> None:
+    rows = ride().drop(columns="position")
+    other = rows.assign(time=rows.time + 0.05, speed=rows.speed / 2.0)
+    assert importing(text(pd.concat([rows, other]).sort_values("time"))) == 1
+    (odd,) = importing.summary["odd"]
+    assert odd == "the speeds leap there and back row by row: are several quantities in one column? Give each its own"
+
+
+@pytest.mark.parametrize("by_fix", [False, True])
+def test_a_speed_below_0_without_a_chainage_is_said(importing: Import, by_fix: bool) -> None:
+    rows = ride().assign(speed=-ride().speed)
+    fixes = rows.assign(lat=47.0 + rows.position / 111_181.0, lon=8.0) if by_fix else rows
+    assert importing(text(fixes.drop(columns="position"))) == 1
+    assert importing.summary["odd"] == ["the speed is below 0: change its sign, it counts forward along the run"]

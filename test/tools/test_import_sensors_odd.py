@@ -106,3 +106,22 @@ def test_a_demand_that_is_a_share_is_said(importing: Import) -> None:
     log = text(rows.assign(brake_pressure=pressed, brake_demand=(pressed > 0.1) * 1.0))
     assert importing(log, "--pressure-unit", "bar") == 1
     assert any("a share of a full brake is not read" in odd for odd in importing.summary["odd"])
+
+
+@pytest.mark.parametrize("name", ["brake_pressure", "brake_demand", "brake_pipe"])
+def test_a_pressure_that_is_written_where_it_changes_alone_is_told(importing: Import, name: str) -> None:
+    """In between it is no older than it was, but counts as unknown."""
+    pressure = 5e5 - ride().brake_pressure / 2.0 if name == "brake_pipe" else ride().brake_pressure
+    rows = ride().drop(columns="brake_pressure").assign(**{name: pressure})
+    assert importing(text(rows)) == 0, importing.errors
+    importing.output = importing.output.with_name("on change")
+    assert importing(text(rows.assign(**{name: pressure.where(pressure.diff() != 0.0)}))) == 1
+    (odd,) = importing.summary["odd"]
+    assert odd.startswith(f"{name} has a value in 2 of 600 rows, each another than before, and none for 39.9 s: is it ")
+
+
+@pytest.mark.parametrize("every", [10, 100])
+def test_a_slow_pressure_is_not_written_on_a_change(importing: Import, every: int) -> None:
+    rows = ride()
+    importing(text(rows.assign(brake_pressure=rows.brake_pressure.where(rows.index % every == 0))))
+    assert "changes alone" not in str(importing.summary["odd"])

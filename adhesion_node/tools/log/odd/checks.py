@@ -26,9 +26,10 @@ from ..whole import MOVES_MPS, Log, moment
 from .dropouts import dropouts
 from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
+from .seldom import seldom
 from .sensors import felt, rolling
 from .sentinels import sentinels
-from .ways import leaps, radians, slow_or_falling, speed_against_positions
+from .ways import backwards, leaps, radians, slow_or_falling, speed_against_positions
 
 HARDEST_MPS2, HARD_S = 3.0, 3
 """No train brakes harder for so many seconds: trams with track brakes reach 2.8 m/s^2."""
@@ -55,7 +56,8 @@ def odd(log: Log) -> list[str]:
     """Say what is odd, with the cure."""
     t_s = (log.rows["t_ns"].to_numpy() - log.rows["t_ns"].iloc[0]) / 1e9
     stand_ins = [*sentinels(log)]
-    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *dropouts(log), *_pressures(log)]
+    of_time, texts = [*_rows_too_far(t_s, log.form)], [*_empty(log), *stand_ins, *dropouts(log)]
+    texts += [*seldom(log, t_s), *_pressures(log)]
     if of_time or stand_ins or t_s[-1] < LEAST_S:
         return [*log.columns.doubts, *(of_time or _too_far(log, t_s)), *texts]
     of_way = [*leaps(log, t_s), *radians(log)]
@@ -64,6 +66,7 @@ def odd(log: Log) -> list[str]:
     motion = motion_of(log, t_s)
     alone = () if motion.by_fixes else slow_or_falling(motion)
     of_way = of_way or [*(speed_against_positions(motion, log.form) if motion.is_compared else alone)]
+    of_way = of_way or ([*backwards(motion)] if motion.by_fixes or not motion.is_compared else [])
     of_way = of_way or [*_too_fast(motion, log.form)] or [*_hard(motion, log.form)]
     return [
         *log.columns.doubts,

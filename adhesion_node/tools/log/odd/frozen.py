@@ -95,7 +95,7 @@ def _speed_froze(log: Log, at_m: Array | None, speed: Array, t_s: Array) -> tupl
         step_m = max(step_of(axis, NOISE_M) for axis in at_m.T)
         slows = abs(behind - before) > CHANGES_MPS + 2.0 * max(NOISE_M, step_m) / third_s
     if "brake_pressure" in log.rows and long_s[i] > UNUSUAL * usual_s:
-        pressure = log.rows["brake_pressure"].to_numpy() - log.form.ambient_pressure_pa
+        pressure = log.rows["brake_pressure"].ffill().to_numpy() - log.form.ambient_pressure_pa
         was_released = bool(np.nanmin(pressure[speed > MOVES_MPS], initial=BRAKED_PA) < BRAKED_PA)
         slows = slows or (was_released and np.nanmean(pressure[first[i] : last[i] + 1]) > BRAKED_PA)
     return (int(first[i]), int(last[i])) if slows else None

@@ -19,6 +19,7 @@ from ....run.results.seen import FASTEST_MPS
 from ..format import POSITION_UNITS, SPEED_UNITS, Format
 from ..whole import MOVES_MPS, Log, moment
 from .motion import LEAST_M, LEAST_S, SAME, Motion
+from .sentinels import LEAPS
 
 ONE_WAY = 0.9
 """Where a train moves its positions rise, or fall, for so much of its way."""
@@ -26,6 +27,7 @@ ONE_WAY = 0.9
 
 def leaps(log: Log, t_s: Array) -> Iterator[str]:
     """Positions that leap faster than any train: single falls that are not made good again are those of an odometer."""
+    yield from _speeds_leap(log, t_s)
     known = log.rows["position"].notna().to_numpy() if "position" in log.rows else np.zeros(len(t_s), dtype=bool)
     place, t_ns, steps_s = log.rows.get("position", t_s)[known], log.rows["t_ns"][known], np.diff(t_s[known])
     steps = np.diff(place)
@@ -40,6 +42,17 @@ def leaps(log: Log, t_s: Array) -> Iterator[str]:
             f"the positions fall at once from {before:.6g} to {behind:.6g} m at {when}{times}: an odometer that "
             "begins anew: cut the log there, or add to what is behind what it fell by"
         )
+
+
+def _speeds_leap(log: Log, t_s: Array) -> Iterator[str]:
+    """Speeds that no train changes by so fast, up and down nearly as often: of two trains, or of two quantities."""
+    known = log.rows["speed"].notna().to_numpy() if "speed" in log.rows else np.zeros(len(t_s), dtype=bool)
+    steps, steps_s = np.diff(log.rows.get("speed", t_s)[known]), np.diff(t_s[known])
+    least, per_s = LEAPS["speed"]
+    leapt = np.abs(steps) > least + per_s * steps_s
+    fallen = np.count_nonzero(leapt & (steps < 0.0))
+    if 4 * min(fallen, leapt.sum() - fallen) > len(steps) > LEAST_S:
+        yield "the speeds leap there and back row by row: are several quantities in one column? Give each its own"
 
 
 def radians(log: Log) -> Iterator[str]:
@@ -79,6 +92,13 @@ def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
         yield f"{told}: are they degrees? --lat COL --lon COL"
     else:
         yield f"{told}: are both units right, is the speed that of a wheel which slid?"
+
+
+def backwards(motion: Motion) -> Iterator[str]:
+    """A speed below 0 of which no positions along the track tell."""
+    speed = motion.speed_mps[np.isfinite(motion.speed_mps)]
+    if -speed.sum() > max(ONE_WAY * np.abs(speed).sum(), LEAST_M):
+        yield "the speed is below 0: change its sign, it counts forward along the run"
 
 
 def slow_or_falling(motion: Motion) -> Iterator[str]:
