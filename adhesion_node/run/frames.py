@@ -32,6 +32,7 @@ from ..core import (
 )
 from ..core.physics.train import Array
 from .pipeline import BACK_M, Pipeline
+from .results.gone import LEAST_PA, LEAST_RADPS, gone
 from .results.rows import COLUMNS, Row, row_of
 from .results.seen import Seen, heading_of, pressure_of
 
@@ -68,7 +69,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     The result has `time` as the frame has it, and the columns of `replay --offline --out`; its `attrs` hold
     `measurements`, `accepted`, `dropped` by reason, the `digest`, and `why` nothing is identified, or None. Raises
     ValueError naming what is wrong with the frame, the configuration or the seed, and what to do. Warns where many of
-    the measurements were not used, or where the positions fall along the run.
+    the measurements were not used, where the positions fall along the run, or where a 0 seems to stand for no value.
     """
     config = Config() if config is None else config
     if not isinstance(config, Config):
@@ -97,7 +98,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if pipeline.back_m > BACK_M:
         text = "positions fall while the train runs: change their sign, and turn the track"
         warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
-    for odd in (far, pipeline.off_track, seen.too_fast):
+    for odd in (far, *_stand_ins(t_ns, columns), pipeline.off_track, seen.too_fast):
         if odd is not None:
             warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
@@ -151,6 +152,14 @@ def _too_far(t_ns: NDArray[np.int64]) -> str | None:
     """Say that no recorder has rows so far apart."""
     step_s = float(np.median(np.diff(t_ns))) * 1e-9 if t_ns.size > 2 else 0.0
     return f"a row every {step_s:.3g} s: are the times in ms? give seconds" if step_s > FAR_S else None
+
+
+def _stand_ins(t_ns: NDArray[np.int64], columns: dict[str, Array]) -> Iterator[str]:
+    """Say in which columns a 0 seems to stand for no value."""
+    for name, values in columns.items():
+        least = LEAST_PA if name in ("brake_pressure", "brake_demand") else LEAST_RADPS
+        if (least == LEAST_PA or _AXLE.fullmatch(name)) and (rows := gone(t_ns / 1e9, values, least)):
+            yield f"frame column {name!r} is 0 in {rows} rows between others of the same value: no value? Make them NaN"
 
 
 def _nanoseconds(time: "pd.Series[Any]") -> NDArray[np.int64]:

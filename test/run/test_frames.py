@@ -188,6 +188,15 @@ def test_units_that_cannot_be_are_warned_of(changes: dict[str, Any], message: st
         estimate(measured().assign(**changes))
 
 
+@pytest.mark.parametrize("name", ["brake_pressure", "brake_demand", "wheel_speed_1"])
+def test_a_zero_that_stands_for_no_value_is_warned_of(name: str) -> None:
+    frame = with_everything()
+    gaps = (frame.index % 10 == 7) & (frame["time"] - frame["time"].iloc[0] > 10.0)
+    match = f"frame column '{name}' is 0 in {gaps.sum()} rows between others of the same value: no value. Make them NaN"
+    with pytest.warns(UserWarning, match=match):
+        estimate(frame.assign(**{name: frame[name].mask(gaps, 0.0)}))
+
+
 def test_a_track_elsewhere_is_warned_of() -> None:
     elsewhere = Config(track=Track((Grade(1e5, 1.2e5, 10.0),)))
     with pytest.warns(UserWarning, match="no section of the track is where the train ran: the nearest is 9.* m ahead"):
