@@ -9,7 +9,6 @@
 """From a pandas frame of what was measured to a frame of what is estimated, as an imported log and its replay do."""
 
 import math
-import re
 import warnings
 from collections.abc import Iterable, Iterator
 from difflib import get_close_matches
@@ -32,14 +31,12 @@ from ..core import (
 )
 from ..core.physics.train import Array
 from .pipeline import BACK_M, Pipeline
-from .results.gone import LEAST_PA, LEAST_RADPS, gone
+from .results.doubts import AXLE, doubts
 from .results.rows import COLUMNS, Row, row_of
 from .results.seen import Seen, heading_of, pressure_of
 
 MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "brake_demand", "acceleration")
 """Columns beside `time` and those of the axles; m, m^2, m/s, Pa above the atmosphere, m/s^2."""
-
-_AXLE = re.compile(r"wheel_speed_[1-9]\d*")
 
 NO_NUMBERS = (
     pd.api.types.is_bool_dtype,
@@ -98,7 +95,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if pipeline.back_m > BACK_M:
         text = "positions fall while the train runs: change their sign, and turn the track"
         warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
-    for odd in (far, *_stand_ins(t_ns, columns), pipeline.off_track, seen.too_fast):
+    for odd in (far, *doubts(t_ns, columns, std_m), pipeline.off_track, seen.too_fast):
         if odd is not None:
             warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
@@ -119,7 +116,7 @@ def _checked(frame: pd.DataFrame) -> dict[str, Array]:
         raise ValueError(f"frame = {type(frame).__name__}: give a pandas DataFrame, pandas.DataFrame(...) makes one")
     known = ("time", *MEASURED)
     for name in frame.columns:
-        if name not in known and not _AXLE.fullmatch(str(name)):
+        if name not in known and not AXLE.fullmatch(str(name)):
             close = get_close_matches(str(name), known, n=1, cutoff=0.5)
             hint = f"did you mean {close[0]!r}? " if close else ""
             raise ValueError(
@@ -152,14 +149,6 @@ def _too_far(t_ns: NDArray[np.int64]) -> str | None:
     """Say that no recorder has rows so far apart."""
     step_s = float(np.median(np.diff(t_ns))) * 1e-9 if t_ns.size > 2 else 0.0
     return f"a row every {step_s:.3g} s: are the times in ms? give seconds" if step_s > FAR_S else None
-
-
-def _stand_ins(t_ns: NDArray[np.int64], columns: dict[str, Array]) -> Iterator[str]:
-    """Say in which columns a 0 seems to stand for no value."""
-    for name, values in columns.items():
-        least = LEAST_PA if name in ("brake_pressure", "brake_demand") else LEAST_RADPS
-        if (least == LEAST_PA or _AXLE.fullmatch(name)) and (rows := gone(t_ns / 1e9, values, least)):
-            yield f"frame column {name!r} is 0 in {rows} rows between others of the same value: no value? Make them NaN"
 
 
 def _nanoseconds(time: "pd.Series[Any]") -> NDArray[np.int64]:
@@ -200,7 +189,7 @@ def _samples(t_ns: NDArray[np.int64], columns: dict[str, Array], std_m: float) -
     """The samples of every row, the position last, as in a recording."""
     nothing = np.full(t_ns.size, math.nan)
     given = [columns.get(name, nothing).tolist() for name in MEASURED]
-    axles = sorted((name for name in columns if _AXLE.fullmatch(name)), key=lambda name: int(name.rpartition("_")[2]))
+    axles = sorted((name for name in columns if AXLE.fullmatch(name)), key=lambda name: int(name.rpartition("_")[2]))
     wheels = np.array([columns[name] for name in axles]).T.tolist() if axles else [()] * t_ns.size
     for t, position, variance, speed, speed_std, pressure, demand, felt, turning in zip(
         t_ns.tolist(), *given, wheels, strict=True

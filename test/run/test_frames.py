@@ -197,6 +197,13 @@ def test_a_zero_that_stands_for_no_value_is_warned_of(name: str) -> None:
         estimate(frame.assign(**{name: frame[name].mask(gaps, 0.0)}))
 
 
+def test_positions_too_coarse_for_their_deviation_are_warned_of() -> None:
+    frame = measured()
+    coarse = frame.assign(position=75.0 * (frame["position"] / 75.0).round())
+    with pytest.warns(UserWarning, match="positions come in steps of 75 m, std_m = 0.5: give 21.7 or more"):
+        estimate(coarse)
+
+
 def test_a_track_elsewhere_is_warned_of() -> None:
     elsewhere = Config(track=Track((Grade(1e5, 1.2e5, 10.0),)))
     with pytest.warns(UserWarning, match="no section of the track is where the train ran: the nearest is 9.* m ahead"):

@@ -12,11 +12,11 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-import numpy as np
 import pandas as pd
 
 from ...core.config import Config
 from ...core.physics.train import Array
+from ...run.results.steps import step_of
 from ...wire.line import Line
 from .format import Format
 
@@ -28,9 +28,6 @@ ALONG_M = 0.5
 
 SHOWS = 0.25
 """Of the assumed standard deviation: what a step makes less of is not said."""
-
-LEAST_VALUES = 10
-"""Fewer are multiples of something by chance."""
 
 
 class Coarse(NamedTuple):
@@ -69,28 +66,6 @@ def stds_of(rows: pd.DataFrame, form: Format) -> tuple[dict[str, float], list[st
                     f"at least: {max(least, known.std):.3g} is taken; {known.cure} says otherwise"
                 )
     return stds, notes
-
-
-def step_of(values: Array, least: float) -> float:
-    """Return the step of which all changes are multiples, but for 5 % of `least`; 0 for less than that, or none.
-
-    >>> speeds = np.array([0, 5, 5, 10, 15, 20, 25, 30, 35, 40, 45, 55]) / 3.6
-    >>> round(step_of(speeds, 0.25), 4), step_of(speeds + 0.1 * np.arange(12) ** 2, 0.25)
-    (1.3889, 0.0)
-    """
-    known, tolerance = values[np.isfinite(values)], 0.05 * least
-    moved, distinct = np.abs(np.diff(known)), np.unique(known)
-    if len(distinct) < LEAST_VALUES or np.ptp(moved) < least:  # a constant speed moves by equal ways, however fine
-        return 0.0
-    step, gaps = 0.0, np.diff(distinct)
-    gaps = gaps[gaps > 1e-6 * least]  # what the conversion of units leaves
-    for gap in gaps.tolist():
-        rest = gap
-        while rest > tolerance:  # Euclid, of numbers that are not exact
-            step, rest = rest, abs(step - rest * round(step / rest))
-        if step < least:
-            return 0.0
-    return step if (np.abs(gaps - step * np.round(gaps / step)) < tolerance).all() else 0.0
 
 
 def metres(rows: pd.DataFrame, columns: Sequence[str]) -> Iterator[Array]:

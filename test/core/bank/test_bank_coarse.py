@@ -28,7 +28,7 @@ def seen(positions: list[float]) -> Coarse:
     return coarse
 
 
-@pytest.mark.parametrize("step_m", [0.25, 1.0, 2.0, 10.0])
+@pytest.mark.parametrize("step_m", [0.25, 0.3048, 1.0, 2.0, 3.048, 7.0, 10.0, 100.58])
 @pytest.mark.parametrize("origin_m", [0.0, 12345.678])
 def test_the_coarsest_step_that_all_fit_is_found(step_m: float, origin_m: float) -> None:
     positions = origin_m + step_m * np.cumsum(np.random.default_rng(2).integers(1, 8, 100))
@@ -44,8 +44,14 @@ def test_fine_positions_are_not_coarse(step_m: float) -> None:
     assert seen(positions.tolist()).std_m == 0.0
 
 
+@pytest.mark.parametrize(("way_m", "std_m"), [(4.73, 0.0), (5.0, 2.5), (4.5, 0.25)])
+def test_a_steady_train_moves_by_one_length_which_is_no_step_of_its_positions(way_m: float, std_m: float) -> None:
+    """But where it is a usual one."""
+    assert seen([way_m * index for index in range(2 * SURE)]).std_m == std_m
+
+
 @pytest.mark.parametrize("speed", [20.0, 50.0, 50.3])
-@pytest.mark.parametrize("step_m", [1.0, 5.0])
+@pytest.mark.parametrize("step_m", [1.0, 3.048, 5.0])
 @pytest.mark.parametrize("whole", [np.round, np.floor])
 def test_a_train_is_followed_by_an_odometer_of_whole_metres(step_m: float, speed: float, whole: np.ufunc) -> None:
     """60 s at a steady speed and a dry stop; it declares half a metre."""

@@ -14,7 +14,7 @@ import math
 from typing import NamedTuple
 
 STEPS_M = (100.0, 50.0, 25.0, 20.0, 10.0, 5.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.2)
-"""Steps that positions may come in, the coarsest first; finer ones are within what any receiver errs by."""
+"""Steps that positions mostly come in, the coarsest first; finer ones are within what any receiver errs by."""
 
 EXACT_M, SURE = 1e-4, 20
 """How far from a step none lies, and so many positions that lie on steps do so by no chance."""
@@ -30,19 +30,42 @@ class Coarse(NamedTuple):
     last_m: float = math.nan
     moves: int = 0
     """How many differed from the one before."""
-    steps_m: tuple[float, ...] = STEPS_M
-    """Steps that all of them fit."""
+    step_m: float = math.inf
+    """The greatest that all of them fit; 0 where it is finer than any that counts."""
+    move_m: float = math.nan
+    """How far the first one moved; infinite once another moved by more or less."""
 
     def after(self, position_m: float) -> Coarse:
         """Note the next position; where none of the steps fits there is none any more."""
-        if not self.steps_m or position_m == self.last_m:
+        if self.step_m == 0.0:
             return self
-        first_m = position_m if math.isnan(self.first_m) else self.first_m
-        way_m = position_m - first_m
-        steps_m = tuple(each for each in self.steps_m if abs(way_m - each * round(way_m / each)) < EXACT_M)
-        return Coarse(first_m, position_m, self.moves + 1, steps_m)
+        if position_m == self.last_m:
+            return self if math.isinf(self.move_m) else self._replace(move_m=math.inf)
+        if math.isnan(self.first_m):
+            return Coarse(position_m, position_m, 1)
+        step_m = _common(self.step_m, abs(position_m - self.first_m))
+        moved_m = abs(position_m - self.last_m)
+        is_first = math.isnan(self.move_m)
+        move_m = moved_m if is_first or abs(moved_m - self.move_m) < EXACT_M else math.inf
+        return Coarse(self.first_m, position_m, self.moves + 1, step_m, move_m)
 
     @property
     def std_m(self) -> float:
-        """Least standard deviation of a position."""
-        return ROUNDED * self.steps_m[0] if self.steps_m and self.moves > SURE else 0.0
+        """Least standard deviation of a position; where a train ever moves by one length, by the usual step."""
+        if self.moves <= SURE or self.step_m == 0.0:
+            return 0.0
+        if math.isinf(self.move_m):
+            return ROUNDED * self.step_m
+        return ROUNDED * next((each for each in STEPS_M if _common(self.step_m, each) == each), 0.0)
+
+
+def _common(step_m: float, way_m: float) -> float:
+    """The greatest length of which both are multiples, by Euclid; 0 where it is finer than any that counts.
+
+    >>> _common(math.inf, 12.0), _common(12.0, 30.0), round(_common(12.192, 21.336), 6), _common(12.0, 30.37)
+    (12.0, 6.0, 3.048, 0.0)
+    """
+    length, rest = (way_m, 0.0) if math.isinf(step_m) else (max(step_m, way_m), min(step_m, way_m))
+    while rest > EXACT_M:
+        length, rest = rest, abs(length - rest * round(length / rest))
+    return length if length > STEPS_M[-1] - EXACT_M else 0.0

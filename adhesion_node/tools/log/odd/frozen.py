@@ -14,9 +14,10 @@ import numpy as np
 import pandas as pd
 
 from ....core.physics.train import Array
+from ....run.results.steps import step_of
 from ..cell.numbers import Flags, Rows
 from ..held import changes
-from ..steps import metres, step_of
+from ..steps import metres
 from ..whole import MOVES_MPS, Log, moment
 from .motion import OVER_S
 
