@@ -265,7 +265,7 @@ def test_all_faults_together_are_told_five_of_a_kind_then_counted(importing: Imp
     [
         ("", [], "FILE: has no header line: begin with the names of the columns"),
         ("\n1,2\n", [], "FILE: has no header line"),
-        ('time,"position\n1,2\n', [], "FILE: has no header line: begin with the names of the columns, their quotes"),
+        ('time,"position\n1,2\n', [], "FILE:1: quotes are not closed in this line: close them, or take the line"),
         ("t,position\n1,2\n", [], "FILE: column 'time' is missing: it has ['t', 'position']; name one with --time COL"),
         (
             "time,position\n1,2\n",

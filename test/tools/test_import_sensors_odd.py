@@ -125,3 +125,23 @@ def test_a_slow_pressure_is_not_written_on_a_change(importing: Import, every: in
     rows = ride()
     importing(text(rows.assign(brake_pressure=rows.brake_pressure.where(rows.index % every == 0))))
     assert "changes alone" not in str(importing.summary["odd"])
+
+
+@pytest.mark.parametrize(("pa", "told"), [(6894.757, "43.51 bar at most: is it in psi"), (1e4, "30 bar")])
+def test_a_pressure_of_no_brake_is_told(importing: Import, pa: float, told: str) -> None:
+    """Taken as measured it makes every rail slippery."""
+    rows = ride().assign(brake_pressure=(ride().brake_pressure / pa).round(2))
+    assert importing(text(rows.rename(columns={"brake_pressure": "brake_pressure [bar]"}))) == 1
+    (odd,) = importing.summary["odd"]
+    assert odd.startswith(f"brake_pressure is {told}")
+    assert odd.endswith("or are they counts, of tenths? Divide them")
+
+
+@pytest.mark.parametrize("off", [-0.6, 0.5])
+def test_an_accelerometer_that_is_off_by_more_than_a_grade_is_told(importing: Import, off: float) -> None:
+    felt = -0.8 * (ride().time >= 20.0)
+    assert importing(text(ride().assign(acceleration=felt + 0.3))) == 0, importing.errors
+    importing.output = importing.output.with_name("off")
+    assert importing(text(ride().assign(acceleration=felt + off))) == 1
+    (odd,) = importing.summary["odd"]
+    assert odd.startswith(f"the acceleration is {off:+.2g} m/s^2 beside what the speed changes by, more than any grade")

@@ -19,6 +19,10 @@ AXLE = re.compile(r"wheel_speed_\d+", re.IGNORECASE)
 """What the columns of the axles are called where none is named."""
 
 
+VALUES = frozenset(("value", "values", "wert", "valeur", "valor"))
+"""What the column is called that holds all signals."""
+
+
 class Columns(NamedTuple):
     """Names in the header by ours, those of the axles, those that mean nothing, and units that are in doubt."""
 
@@ -54,7 +58,9 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
         used = {ours: name for ours, name in used.items() if ours not in ("lat", "lon")}
     if not (axles or any(set(group) <= set(used) for group in PLACES)):
         lacks = "has neither position, lat and lon, speed nor wheels"
-        remedy = "name one with --position COL, or --lat COL and --lon COL, or --speed COL, or --wheel-speeds COL"
+        by_signal = any(name.casefold() in VALUES for name in header)
+        remedy = "a signal to a row is not read, give each a column of its own; else " if by_signal else ""
+        remedy += "name one with --position COL, or --lat COL and --lon COL, or --speed COL, or --wheel-speeds COL"
         raise ValueError(f"{source}: columns {_listed(header)}: {lacks}: {remedy}")
     if {"brake_pipe", "brake_demand"} <= set(used):
         raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")

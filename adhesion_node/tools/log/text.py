@@ -24,6 +24,7 @@ from .cell.decimals import decimal_sign
 from .cell.suffixed import number_in
 from .cell.units import meant
 from .format import PLACES, Format
+from .headers import is_header, require_same
 
 DELIMITERS = (",", ";", "\t", "|")
 
@@ -49,6 +50,8 @@ BLOCK = 2_000
 """Lines that are read together."""
 
 NO_HEADER = "has no header line: begin with the names of the columns, their quotes closed; or is --skip-rows another?"
+
+BROKEN = "quotes are not closed in this line: close them, or take the line break out of a name of the header"
 
 _NUMBERED = re.compile("[+-]?[.,]?[0-9](?!/[a-z])")  # 1/min is a unit
 
@@ -92,7 +95,8 @@ def names_of(path: Path, form: Format) -> list[str]:
     """Return the names in the header of a log whose format is understood."""
     names = _cells(next(islice(_lines(path, form), form.skip_rows or 0, None), ""), form.delimiter or ",")
     if not any(re.search(r"[^\W\d]", name) for name in names):
-        raise ValueError(f"{path}: {NO_HEADER}")
+        broken = next((n for n, text in enumerate(islice(_lines(path, form), SAMPLE), 1) if text.count('"') % 2), None)
+        raise ValueError(f"{path}: {NO_HEADER}" if broken is None else f"{path}:{broken}: {BROKEN}")
     return names
 
 
@@ -115,8 +119,8 @@ def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple
             continue
         if not any(cells[len(names) :]):  # a delimiter at the end of the line, none in the header
             cells = cells[: len(names)]
-        if _is_header(cells, names):
-            _require_same(cells, names, f"{path}:{line}")
+        if is_header(cells, names):
+            require_same(cells, names, f"{path}:{line}")
             why = "the header once more: it is left out"
             refused.append(Refusal(line, "header", f"{path}:{line}: row = {_shown(text)}: {why}"))
         elif len(cells) == len(names):
@@ -128,17 +132,6 @@ def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple
             why = f"{len(cells)} cells under {len(names)} columns: {cure}"
             refused.append(Refusal(line, "cell_count", f"{path}:{line}: row = {_shown(text)}: {why}"))
     return Block(pd.DataFrame(rows, index=at, columns=list(names), dtype=object), refused)
-
-
-def _is_header(cells: Sequence[str], names: Sequence[str]) -> bool:
-    """Whether a row names columns again, as where a recorder was started anew, or logs were joined."""
-    return bool(cells) and cells[0][:1].isalpha() and 2 * len({*cells} & {*filter(None, names)}) >= len({*names})
-
-
-def _require_same(cells: Sequence[str], names: Sequence[str], where: str) -> None:
-    """Raise ValueError where another header begins: what is below would be read as the columns of the first."""
-    if list(cells) != list(names):
-        raise ValueError(f"{where}: another header, {list(cells)} after {list(names)}: cut the log there")
 
 
 def split(text: str, delimiter: str) -> list[str]:

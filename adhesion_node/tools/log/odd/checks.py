@@ -27,7 +27,7 @@ from .dropouts import dropouts
 from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .seldom import seldom
-from .sensors import felt, rolling
+from .sensors import felt, rolling, shifted
 from .sentinels import sentinels
 from .ways import backwards, leaps, radians, slow_or_falling, speed_against_positions
 
@@ -41,7 +41,7 @@ SLOWEST_ROWS_S, FASTEST_ROWS_S, USUAL_ROWS_S = 10.0, 5e-4, 0.3
 """Between two rows of a recorder."""
 
 SILENT, WEAKEST_PA, FULL_PA = 0.1, 15e3, (5e4, 1.5e6)
-"""Up to the first nothing is measured; no brake's greatest pressure is below the second; mostly it is in the third."""
+"""Up to the first nothing is measured; no brake's greatest pressure is below the second, or above the third."""
 
 HHMMSS = "--time-format %H%M%S where the times are hhmmss, %H%M%S.%f with a fraction"
 
@@ -73,7 +73,7 @@ def odd(log: Log) -> list[str]:
         *texts,
         *of_way,
         *_pipe(motion),
-        *felt(motion, log.form),
+        *([*felt(motion, log.form)] or shifted(motion)),
         *rolling(motion, log.form),
         *_clock(log, t_s),
         *_last(t_s),
@@ -123,14 +123,15 @@ def _is_share(log: Log, most_pa: float) -> bool:
 
 def _other_unit(name: str, most_pa: float, form: Format) -> Iterator[str]:
     """A greatest pressure that no brake has: each unit in which it were one, with what it would be."""
-    if SILENT < most_pa < WEAKEST_PA:
+    if SILENT < most_pa < WEAKEST_PA or most_pa > FULL_PA[1]:
         read_in = form.unit(name)
         most = most_pa / PRESSURE_UNITS[read_in]
         would_be = {unit: most * pa for unit, pa in PRESSURE_UNITS.items() if FULL_PA[0] < most * pa <= FULL_PA[1]}
         cures = "; ".join(f"--pressure-unit {unit}: {pa / 1e5:.2g} bar" for unit, pa in would_be.items())
         share = "per cent of a full brake are" if PERCENT[0] < most < PERCENT[1] else "a share of a full brake is"
-        is_share = PERCENT[0] < most < PERCENT[1] or most <= 1.0
+        is_share = most_pa < WEAKEST_PA and (PERCENT[0] < most < PERCENT[1] or most <= 1.0)
         cure = f"; {share} not read: give its pressure" if is_share else ""
+        cure += "; or are they counts, of tenths? Divide them" if most_pa > FULL_PA[1] else ""
         units = " or ".join(would_be) or "another unit"
         yield f"{name} is {most:.6g} {read_in} at most: is it in {units}? {cures}{cure}"
 

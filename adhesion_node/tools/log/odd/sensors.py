@@ -19,6 +19,9 @@ from .motion import BRAKES_MPS2, LEAST_S, OVER_S, RUNS_MPS2, SAME, Motion
 SIMILAR = 3.0
 """An accelerometer feels so many times what the speed changes by at most, and a part as small: grades are not felt."""
 
+STEEPEST_MPS2 = 0.45
+"""Of a grade of 45 in 1000; most railways have less."""
+
 RUNS_MPS = 5.0
 """Slower wheels tell nothing of their radius."""
 
@@ -47,6 +50,18 @@ def felt(motion: Motion, form: Format) -> Iterator[str]:
         yield f"{told}: change its sign, it counts forward along the run"
     elif not 1.0 / SIMILAR < ratio < SIMILAR:
         yield f"{told}: in another unit, or along another axis than the track?"
+
+
+def shifted(motion: Motion) -> Iterator[str]:
+    """What an accelerometer feels beside the change of the speed is a grade, or an error."""
+    felt_mps2 = np.convolve(motion.felt_mps2, np.full(OVER_S, 1.0 / OVER_S))[: motion.felt_mps2.size]
+    beside = felt_mps2 - motion.slows_mps2
+    known = beside[np.isfinite(beside) & (motion.fastest_mps > RUNS_MPS)]
+    if known.size > LEAST_S and abs(off := float(np.median(known))) > STEEPEST_MPS2:
+        yield (
+            f"the acceleration is {off:+.2g} m/s^2 beside what the speed changes by, more than any grade makes: is it "
+            "that of another axis, or off? Subtract it"
+        )
 
 
 def rolling(motion: Motion, form: Format) -> Iterator[str]:
