@@ -158,11 +158,11 @@ def draw(rng: Rng) -> Case:
         position_margin_m=5.0 if margins else 0.0,
         margin_sigma=rng.uniform(1.0, 4.0),
         valid_for_s=rng.uniform(0.5, 3.0),
-        max_ahead_s=rng.choice([0.0, 0.1, 0.3]),
+        max_ahead_s=float(rng.choice([0.0, 0.1, 0.3])),
     )
     least = allowed(config.target_speed_mps) + LEAST_MPS
     speed_mps = rng.uniform(max(least, 12.0), 97.0) if often(rng) else rng.uniform(least, least + 12.0)
-    standing_mps2, fading_mps = rng.uniform(0.2, 1.6), rng.choice([20.0, 60.0, 1e9, -300.0])
+    standing_mps2, fading_mps = rng.uniform(0.2, 1.6), float(rng.choice([20.0, 60.0, 1e9, -300.0]))
     knee_mps = speed_mps * rng.choice([rng.uniform(0.0, 1.0), rng.uniform(0.94, 1.02)])
     most_mps2 = 10.0 if rng.integers(2) else standing_mps2 / (1.0 + knee_mps / fading_mps)
     train = Train(

@@ -64,8 +64,9 @@ def _read_curves(message: Any, line: Line) -> StampedCurve:
     curve = _along(rows, sign)
     fine = ~np.any([wrong.any(axis=1) for _, wrong, _ in _faults(curve)], axis=0)
     kept = BrakingCurve(*(getattr(curve, field.name)[fine] for field in fields(BrakingCurve)))
-    place: Any = line.sign * rows[fine, :1, 0]
-    return StampedCurve(stamps[fine], place, kept, line.sign * sign[fine])
+    places: Any = line.sign * rows[fine, :1, 0]
+    signs: Any = line.sign * sign[fine]
+    return StampedCurve(stamps[fine], places, kept, signs)
 
 
 def _check_form(joints: Sequence[str], points: int) -> None:

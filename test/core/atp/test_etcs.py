@@ -52,7 +52,7 @@ def random_configs(count: int) -> Iterator[SupervisionConfig]:
     for _ in range(count):
         warning_s = generator.uniform(0, 4)
         yield SupervisionConfig(
-            target_speed_kmh=generator.choice([0.0, generator.uniform(1, 200)]),
+            target_speed_kmh=float(generator.choice([0.0, generator.uniform(1, 200)])),
             line_speed_kmh=generator.uniform(200, 400),
             emergency_build_up_s=generator.uniform(0, 6),
             service_build_up_s=generator.uniform(0, 8),

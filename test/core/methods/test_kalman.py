@@ -44,7 +44,7 @@ def _uneven(window: Window, rng: np.random.Generator) -> Window:
     return replace(
         window,
         dt_s=rng.uniform(0.05, 0.4, k),
-        brake=rng.choice([0.03, 0.0952], k),
+        brake=rng.choice(np.array([0.03, 0.0952]), k),
         variance_m2=rng.uniform(0.1, 2.0, k),
         speed_mps=80.0 + rng.standard_normal(k),
         speed_variance=speed_variance,
