@@ -58,7 +58,7 @@ def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
     local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
     try:
         utc = local.tz_localize(zone, ambiguous="infer", nonexistent="shift_forward")
-    except ValueError:
+    except Exception:  # an hour that is there twice; of pandas before 3 no ValueError. What else is wrong fails again
         either = (np.full(len(local), summer) for summer in (True, False))
         both = [local.tz_localize(zone, ambiguous=summer, nonexistent="shift_forward") for summer in either]
         utc = min(both, key=lambda each: np.max(np.abs(np.diff(each.asi8)), initial=0))
