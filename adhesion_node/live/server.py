@@ -18,7 +18,7 @@ import threading
 from collections.abc import Awaitable, Callable
 from concurrent.futures import Future
 
-from aiohttp import WSCloseCode, web
+from aiohttp import HttpVersion11, WSCloseCode, web
 
 from ..web import POLICY, page
 from .feed import Feed, Parts
@@ -130,6 +130,8 @@ class Server:
     async def _checked(self, request: web.Request, handler: Handler) -> web.StreamResponse:
         """Answer those alone who ask for this server by a name of its own, and no other site's script."""
         self._guard.asked(request)
+        if "Host" not in request.headers and request.version >= HttpVersion11:  # aiohttp before 3.14 lets it pass
+            raise web.HTTPBadRequest(text="no Host\n")
         own = {None, f"http://{request.host}", f"https://{request.host}"}
         if not allowed(request.host, self._host) or request.headers.get("Origin") not in own:
             raise web.HTTPForbidden(text=f"Host = {request.host!r}: ask for {self.url} or by an address\n")
