@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from oracles import ride
 
@@ -153,8 +153,8 @@ class Watched:
     def _note(self) -> None:
         """Count the positions among what was not used."""
         for event in self.pipeline.events:
-            stuck = event.outcome is Outcome.STUCK and event.detail.startswith("position")
-            of_positions = stuck or event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.SLIDING)
+            same = event.outcome in (Outcome.STUCK, Outcome.HELD) and event.detail.startswith("position")
+            of_positions = same or event.outcome in (Outcome.LATE, Outcome.OUTLIER, Outcome.SLIDING)
             self.refused_positions += of_positions or event.detail.startswith("PositionSample")
 
     def _check(self, predictions: list[Prediction]) -> None:
@@ -192,6 +192,7 @@ def check_curve(curve: BrakingCurve | None) -> None:
 
 
 @given(config=CONFIGS, pieces=st.lists(PIECES, max_size=12))
+@example(config=Config(), pieces=[("again", 1), ("jump", 1), ("good", 1)])  # a position that is said twice
 def test_any_stream_of_samples(config: Config, pieces: list[tuple[str, Any]]) -> None:
     watched = Watched(config)
     for sample in samples_of(pieces):
