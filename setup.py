@@ -75,7 +75,8 @@ setup(
     data_files=shared_files(),
     zip_safe=False,
     python_requires=">=3.11",
-    # numba: compiles the inner loops where they run, so that no compiler is needed to install.
+    # numba: compiles the inner loops where they run, so that no compiler is needed to install. 0.58 is that of Ubuntu
+    # 24.04, mended there for its Python 3.12; from PyPI 3.12 needs 0.59, 3.13 needs 0.61, which pip finds by itself.
     # pyyaml: parameter files; rclpy itself has it from the distribution.
     install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "numba>=0.58,<1", "pyyaml>=6,<7"],
     extras_require={
@@ -100,7 +101,7 @@ setup(
         # How well the tests hold: mutants and branches. Cosmic Ray, not mutmut: it changes constants of modules, too.
         "mutation": ["cosmic-ray>=8.4,<9", "pytest-cov>=5,<8"],
         "docs": ["rosdoc2>=0.2.1,<0.3"],
-        # What `bench` measures against; particles wants numpy below 2.
+        # What `bench` measures against; particles wants numpy below 2, which has wheels up to Python 3.12.
         "bench": ["filterpy>=1.4.5,<3", "particles>=0.4,<0.5", "threadpoolctl>=3.2,<4", "gtsam>=4.2,<5"],
         # colcon drives `setup.py develop`, which setuptools 80 removed.
         "build": ["colcon-ros>=0.5,<1", "colcon-bash>=0.5,<1", "setuptools<80"],
