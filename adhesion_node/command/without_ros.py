@@ -20,7 +20,7 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
-REMEDY = "source /opt/ros/jazzy/setup.bash (apt install ros-jazzy-ros-base), or pip install '.[ros]' for wheels"
+REMEDY = "source /opt/ros/jazzy/setup.bash (apt install ros-jazzy-ros-base), or pip install '.[ros]' on x86-64"
 
 _OF_ROS = re.compile(r"rclpy|\w+_(msgs|srvs|interfaces)")
 

@@ -286,3 +286,13 @@ def test_the_quick_start_is_two_commands() -> None:
     assert len(blocks) == 2
     for block, last in zip(blocks, ("demo", "python -m pytest -n auto"), strict=True):
         assert re.fullmatch(rf"python3 -m venv \.venv && .* && \.venv/bin/{last}\n", block), "not one command line"
+
+
+def test_the_pages_name_the_same_pythons() -> None:
+    readme, install = ((ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "doc/install.md"))
+    of_readme = re.search(r"^Needs git, python3 \((\S+) to (\S+)\) .* x86-64", readme, re.MULTILINE)
+    of_install = re.search(r"x86-64, Python (\S+) to\s(\S+),", install)
+    assert of_readme is not None
+    assert of_install is not None
+    assert of_readme.groups() == of_install.groups()
+    assert setup_arguments()["python_requires"] == f">={of_readme[1]}"
