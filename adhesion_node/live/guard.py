@@ -60,7 +60,7 @@ class Guard:
         """Tell what goes wrong in the loop; in a line where no connection can be taken, which is tried every second."""
         error = context.get("exception")
         if isinstance(error, ValueError) and "protocol" in context:
-            return  # bytes that aiohttp before 3.14 cannot read: an address that is none; the connection is closed
+            return  # bytes that aiohttp before 3.14.4 cannot read: an address that is none; the connection is closed
         if not isinstance(error, OSError) or error.errno not in (errno.EMFILE, errno.ENFILE):
             loop.default_exception_handler(context)
         elif loop.time() - self._told_s > TELL_S:

@@ -140,7 +140,7 @@ class Server:
 
 def _refused(error: OSError, host: str, port: int) -> str:
     """Why nothing can be served at the address, and what to do."""
-    number = error.errno or 0
+    number = error.errno or errno.EADDRNOTAVAIL  # Python 3.13 leaves it out where no address is of this machine
     why = os.strerror(number) if number > 0 else error.strerror
     if number in (errno.EADDRINUSE, errno.EACCES):
         return f"port = {port}: {host}:{port}: {why}: give another --port, or --port 0 for any that is free"
