@@ -76,7 +76,7 @@ setup(
     zip_safe=False,
     python_requires=">=3.11",
     # numba: compiles the inner loops where they run, so that no compiler is needed to install. 0.58 is that of Ubuntu
-    # 24.04, mended there for its Python 3.12; from PyPI 3.12 needs 0.59, 3.13 needs 0.61, which pip finds by itself.
+    # 24.04, mended there for its Python 3.12; PyPI has 0.59 and later for 3.12, 0.61 and later for 3.13.
     # pyyaml: parameter files; rclpy itself has it from the distribution.
     install_requires=["numpy>=1.26,<3", "scipy>=1.11,<2", "numba>=0.58,<1", "pyyaml>=6,<7"],
     extras_require={
