@@ -19,7 +19,7 @@ import numpy as np
 from ..belief.rail import Rail
 from ..intake.outcome import Event, Outcome
 from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSample, SpeedSample
-from ..physics.train import Array
+from ..physics.train import GRAVITY, Array
 from .free import either
 from .gear.brake import BrakeSeen
 from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
@@ -40,8 +40,8 @@ if TYPE_CHECKING:
 SPEED_ERROR_MPS = 0.03
 """Of any measured speed, beside what its message tells; it lasts, so that no filter makes it less."""
 
-PITCH_MEAN, PITCH_STD, BIAS_STD = 0.09, 0.04, 0.005
-"""Of an accelerometer: 0.3 to 1 degree under a full brake, 0.05 m/s^2."""
+PITCH_MEAN, PITCH_STD, BIAS_STD = 0.09, 0.04, 0.012
+"""Of an accelerometer: 0.3 to 1 degree under a full brake; mounted by hand, to within 0.7 degrees."""
 
 
 def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen | None) -> Memory:
@@ -189,7 +189,10 @@ def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Br
     memory, variance = memory._replace(shaking=shaking), shaking.variance_of(told, elapsed_s)
     shown, before = felt[-1].acceleration_mps2, memory.pointing
     braked = memory.braked or memory.misled
-    pointing = before.after(shown, mean, variance, elapsed_s) if braked else before.resting(shown, elapsed_s)
+    if braked:
+        pointing = before.after(shown, mean, variance, elapsed_s)
+    else:
+        pointing = before.resting(shown, elapsed_s, GRAVITY * memory.bank.mean_of(BIAS))
     memory = memory._replace(pointing=pointing)
     if pointing.forward is False:
         outcome = Outcome.STUCK if pointing.is_still else Outcome.TURNED

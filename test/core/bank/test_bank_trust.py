@@ -53,6 +53,7 @@ def run(
     speed: tuple[float, float, float] | None = None,
     place: tuple[float, float] = (0.0, 0.0),
     imu: tuple[float, float] | None = None,
+    bias_mps2: float = 0.0,
     coarse_mps: float = 0.0,
     speed_mps: float = 70.0,
     held_mps: float | None = None,
@@ -77,7 +78,7 @@ def run(
         ]
     if imu is not None:
         factor, noise = imu
-        felt = factor * np.gradient(truth[:, 1], H) + noise * rng.standard_normal(times.size)
+        felt = factor * np.gradient(truth[:, 1], H) + bias_mps2 + noise * rng.standard_normal(times.size)
         felt = felt if died[0] > seconds else held(felt, times, died[0], math.inf, died[1])
         measured = [
             each._replace(imu=(ImuSample(each.t_ns, float(a), (noise or 0.05) ** 2),))
@@ -194,6 +195,15 @@ def test_an_accelerometer_that_dies_under_the_brake_is_left_out(mu: float, shown
 def test_an_accelerometer_that_points_forward_is_used(mu: float, noise: float) -> None:
     found = run(mu, 2, imu=(1.0, noise))
     assert found.state.counts[Outcome.TURNED] == 0
+
+
+@pytest.mark.parametrize("bias_mps2", [-0.34, 0.34, 0.6])
+@pytest.mark.parametrize("mu", [DRY, WET, 0.03])
+def test_an_accelerometer_mounted_by_eye_is_used(mu: float, bias_mps2: float) -> None:
+    """By 2 degrees nose down or up; by 4 it feels the brake push the train forward on a film of leaves."""
+    found = run(mu, 1, imu=(1.0, 0.05), bias_mps2=bias_mps2)
+    assert found.state.counts[Outcome.TURNED] == found.state.counts[Outcome.SLIDING] == 0
+    assert_known(found, mu, 9.0, 25.0)
 
 
 def test_other_sensors_go_on_where_a_position_is_stuck() -> None:

@@ -26,7 +26,7 @@ class Pointing(NamedTuple):
     """Where an accelerometer points, by what it feels under the brake in the mean of the last second."""
 
     mean_mps2: float = 0.0
-    """Forward positive."""
+    """Forward positive, without its bias."""
     forward: bool | None = None
     """Whether it points forward as it should, and shows anything; None: no braking has shown it yet."""
     shown_mps2: float = math.nan
@@ -39,12 +39,14 @@ class Pointing(NamedTuple):
     """... that at its longest, ..."""
     watched_s: float = 0.0
     """... of so long a time."""
+    bias_mps2: float = 0.0
+    """What it is known to show too much, from before the brake."""
 
-    def resting(self, shown_mps2: float, elapsed_s: float) -> Pointing:
-        """Note what it shows while no brake is applied."""
+    def resting(self, shown_mps2: float, elapsed_s: float, bias_mps2: float) -> Pointing:
+        """Note what it shows while no brake is applied, and how much of that is too much."""
         rested_s = self.rested_s + elapsed_s if shown_mps2 == self.shown_mps2 else 0.0
-        longest_s = max(self.longest_s, rested_s)
-        return Pointing(self.mean_mps2, self.forward, shown_mps2, 0.0, rested_s, longest_s, self.watched_s + elapsed_s)
+        longest_s, watched_s = max(self.longest_s, rested_s), self.watched_s + elapsed_s
+        return Pointing(self.mean_mps2, self.forward, shown_mps2, 0.0, rested_s, longest_s, watched_s, bias_mps2)
 
     @property
     def repeats(self) -> bool:
@@ -63,7 +65,7 @@ class Pointing(NamedTuple):
         if shown.is_still:
             return shown._replace(forward=False)
         part = -math.expm1(-elapsed_s / MEAN_S)
-        mean = self.mean_mps2 + part * (felt_mps2 - self.mean_mps2)
+        mean = self.mean_mps2 + part * (felt_mps2 - self.bias_mps2 - self.mean_mps2)
         noise = MEAN_SIGMA * math.sqrt(0.5 * part * variance)
         forward = False if mean > FORWARD_MPS2 + noise else True if mean < -BACKWARD_MPS2 - noise else self.forward
         return shown._replace(mean_mps2=mean, forward=forward)
