@@ -89,7 +89,7 @@ WHEEL_SPEED = _sensor(
     "sensor_msgs/msg/JointState",
     sensors.WHEEL_SPEED,
     "**in**, optional: rad/s, one velocity per axle, NaN where it has none. Sliding wheels show that adhesion limits, "
-    "three rolling ones or more that the brake does. **In** of `creep_estimator`: the driven axles",
+    "rolling ones that the brake does. **In** of `creep_estimator`: the driven axles",
 )
 TRACTION_FORCE = _sensor(
     "traction_force",

@@ -113,13 +113,6 @@ def test_a_train_held_slower_than_it_is_claims_no_rolling(creep: float) -> None:
     assert wheels.fastest(wheels.rims(CONFIG, sample(NOW, 40.0, slips, EVEN))) == pytest.approx(39.92, rel=3e-3)
 
 
-@pytest.mark.parametrize(("axles", "rolling"), [(1, None), (2, None), (3, 0.0), (4, 0.0)])
-def test_few_axles_tell_that_they_slide_but_not_that_none_does(axles: int, rolling: float | None) -> None:
-    radius = EVEN[:axles]
-    assert braked(coasted(radius), np.full(axles, 0.003), radius).share(NOW) == rolling
-    assert braked(coasted(radius), np.full(axles, 0.1), radius).share(NOW) == 1.0
-
-
 def test_an_unsure_speed_claims_neither() -> None:
     wheels = braked(coasted(EVEN), np.full(4, 0.05), EVEN, std=4.0)
     assert wheels.share(NOW) is None

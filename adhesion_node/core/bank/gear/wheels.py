@@ -64,8 +64,7 @@ train, by so many standard deviations of its noise, all axles slide. They count 
 tells of a brake, for the last one."""
 
 AGREE_NS, FEWEST = 2 * S, 3
-"""Rims, so many or more, that are as fast as each other and as the train for so long roll: those that slide are not.
-Fewer do not tell that no axle slides."""
+"""Rims, so many or more, that are as fast as each other and as the train for so long roll: those that slide are not."""
 
 DEEPER = 1.3
 """Times as fast as ever in a braking it must fall to tell anything anew: else it errs as it did before."""
@@ -193,17 +192,13 @@ class WheelsSeen(NamedTuple):
         return self._replace(agree_ns=since_ns, fell_ns=self.fell_ns if t_ns - since_ns < AGREE_NS else None)
 
     def share(self, now_ns: int) -> float | None:
-        """Share of the axles that have slid of late, of those of which it is known; None where it is of too few.
-
-        Of fewer than `FEWEST` that roll nothing is said: others of the train may slide.
-        """
+        """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
         if not self.slid_ns:
             return None
         slid = [each is not None and now_ns - each < SLID_NS for each in self.slid_ns]
         rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
         known = sum(one or other for one, other in zip(slid, rolled, strict=True))
-        tells = 2 * known >= len(slid) and (known >= FEWEST or any(slid))
-        return sum(slid) / known if tells else None
+        return sum(slid) / known if known and 2 * known >= len(slid) else None
 
 
 def told(share: float | None, dumping: bool, fell: bool = False) -> float:
