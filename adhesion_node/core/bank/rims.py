@@ -43,6 +43,9 @@ SLIDES, HIDDEN = 0.2, 1e-6
 """Density of what it shows where it slides, times that error: slides last, so the next sample tells nothing new. And
 while every axle is seen to roll: all of them hardly slide alike, but a brake may change that no gauge shows."""
 
+FEW = 6
+"""Rims heard; of fewer the fastest slides the likelier, the fewer they are, and where it creeps no other shows it."""
+
 MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
 
@@ -74,7 +77,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     wheels = wheels.agreeing(known, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
-        return _beside_fastest(config, memory, wheels.fastest(known), newest.t_ns) if known else memory
+        return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
     memory, middle = _unbraked(config, memory, rims, newest.t_ns), median(rims) if rims else math.nan
     if middle > LEARNING_MPS:
         return _rolling(memory, middle, pressed)
@@ -123,11 +126,11 @@ def _telling(memory: Memory) -> Memory:
     return memory.leaving_out(Event(Outcome.STUCK, f"wheel_speed of axle {names}")) if lying else memory
 
 
-def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -> Memory:
+def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
     """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
     bank, resisting = memory.bank, resistance(config, memory.bank)
     slowing = GRAVITY * float(bank.weight @ (use(config, bank, memory.braking, resisting).value + resisting))
-    rim_mps -= slowing * (memory.t_ns - t_ns) / S
+    rim_mps = memory.wheels.fastest(rims) - slowing * (memory.t_ns - t_ns) / S
     if rim_mps <= config.slowest_mps:
         return memory
     bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
@@ -137,10 +140,14 @@ def _beside_fastest(config: Config, memory: Memory, rim_mps: float, t_ns: int) -
         wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
-        slides = HIDDEN if memory.braking.told < 0.0 else SLIDES
-        bank = as_fast(bank, rim_mps, errors.quick * rim_mps, slides)
+        bank = as_fast(bank, rim_mps, errors.quick * rim_mps, _slides(memory.braking.told, len(rims)))
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
+
+
+def _slides(told: float, count: int) -> float:
+    """Density of what the fastest of so many rims shows where it slides, by what is told of all that are heard."""
+    return HIDDEN if told < 0.0 and count >= FEW else SLIDES * max(FEW / count, 1.0)
 
 
 def rim_speed(bank: Bank) -> tuple[float, float]:

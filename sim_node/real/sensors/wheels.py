@@ -6,12 +6,13 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The wheel speeds of every axle group, of which one bogie's may be missing for a while."""
+"""The wheel speeds of every axle group, or of some; one bogie's may be missing for a while."""
 
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from adhesion_node.core.setting import check_settings, setting
 from adhesion_node.wire.topic import Topic
@@ -31,9 +32,16 @@ class Wheels:
     resolution_radps: float = setting(0.02, "Step of the numbers", "rad/s", 1e-6, 10.0)
     dropouts: Spells = NEVER
     """In which one group, another every time, shows nothing."""
+    heard: tuple[float, float] = (0.0, 1.0)
+    """Part of the train, from its front on, whose groups have a tacho."""
 
     def __post_init__(self) -> None:
         check_settings(self, "wheels ")
+
+    def groups(self, count: int) -> NDArray[np.intp]:
+        """Return which of so many groups have one, counted from 0."""
+        middle = (np.arange(count) + 0.5) / count
+        return np.flatnonzero((middle >= self.heard[0]) & (middle < self.heard[1]))
 
     def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
         """Measure the angular speeds, rad/s."""
@@ -43,4 +51,4 @@ class Wheels:
         spells = self.dropouts.draw(float(ride.journey.time_s[-1]), rng)
         missing = np.append(rng.integers(true.shape[1], size=len(spells)), -1)[within(time_s, spells)]
         shown[missing[:, np.newaxis] == np.arange(true.shape[1])] = np.nan
-        return Measured(shown, np.zeros(time_s.size))
+        return Measured(shown[:, self.groups(true.shape[1])], np.zeros(time_s.size))

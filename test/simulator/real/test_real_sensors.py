@@ -157,6 +157,16 @@ def test_one_group_at_a_time_drops_out_and_another_the_next_time() -> None:
     assert (Wheels(dropouts=spells).measure(RIDE, TIMES, _rng()).values == complete)[~missing].all()
 
 
+def test_some_groups_alone_may_have_a_tacho() -> None:
+    """They show what they show where all of them have one."""
+    every, rear = (Wheels(heard=heard).measure(RIDE, TIMES, _rng()).values for heard in ((0.0, 1.0), (0.5, 1.0)))
+    assert np.array_equal(rear, every[:, -rear.shape[1] :])
+    assert [Wheels(heard=(0.5, 0.55)).groups(16).tolist(), Wheels(heard=(0.75, 1.0)).groups(12).tolist()] == [
+        [8],
+        [9, 10, 11],
+    ]
+
+
 def test_an_accelerometer_feels_the_brake_the_nose_that_dips_and_not_the_grade() -> None:
     exact = Imu(0.0, 0.0, 0.0, 0.0).measure(RIDE, TIMES, _rng()).values[:, 0]
     uphill = GRAVITY * np.sin(np.arctan(GRADE))  # steady at speed: traction holds what the grade takes
