@@ -71,8 +71,9 @@ _AXLE = {"speed axle": Mounted(TachoSpeed(), _BUS, "tacho")}
 _IMU = {"imu": Mounted(Imu(), Timing(rate_hz=50.0), "imu")}
 _WHEELS = {"wheels": Mounted(Wheels(), _BUS, "slide protection")}
 _PATCHY_WHEELS = {"wheels": Mounted(Wheels(dropouts=Spells(15.0, 5.0, 70.0)), _BUS, "slide protection")}
-_ONE_AXLE = {"wheels": Mounted(Wheels(heard=(0.5, 0.55)), _BUS, "slide protection")}
+_ONE_AXLE = {"wheels": Mounted(Wheels(heard=(0.5, 0.5)), _BUS, "slide protection")}
 _REAR_WHEELS = {"wheels": Mounted(Wheels(heard=(0.75, 1.0)), _BUS, "slide protection")}
+_WHEELS_1HZ = {"wheels": Mounted(Wheels(), Timing(rate_hz=1.0), "slide protection")}
 _HANDLE = {"handle": Mounted(Pressure(DEMANDED, topic=BRAKE_DEMAND), _BUS, "handle")}
 _DEMANDED, _CYLINDER, _MEAN = map(_pressure, (DEMANDED, CYLINDER, MEAN))
 _BLENDED = {"pressure blended mean": Mounted(Pressure(MEAN, electric=0.7), _BUS, "brake")}
@@ -98,6 +99,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("gnss_wheels", "satellites and the wheels", _gnss(), _DEMANDED, _WHEELS),
             ("one_axle", "satellites and one axle in the middle of the train", _gnss(), _DEMANDED, _ONE_AXLE),
             ("rear_wheels", "satellites and the axles of its last quarter", _gnss(), _DEMANDED, _REAR_WHEELS),
+            ("wheels_1hz", "satellites, and the wheels once a second", _gnss(), _DEMANDED, _WHEELS_1HZ),
             ("gnss_doppler", "satellites with the receiver's speed", _gnss(), _DEMANDED, _DOPPLER),
             ("gnss_smoothed", "satellites with a speed that the receiver smooths", _gnss(), _DEMANDED, _SMOOTHED),
             ("gnss_imu", "satellites and an accelerometer", _gnss(), _DEMANDED, _IMU),

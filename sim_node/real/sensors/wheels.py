@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from adhesion_node.core.setting import check_settings, setting
 from adhesion_node.wire.topic import Topic
@@ -33,15 +32,15 @@ class Wheels:
     dropouts: Spells = NEVER
     """In which one group, another every time, shows nothing."""
     heard: tuple[float, float] = (0.0, 1.0)
-    """Part of the train, from its front on, whose groups have a tacho."""
+    """Part of the train, from its front on, whose groups have a tacho; of no length: the one group there."""
 
     def __post_init__(self) -> None:
         check_settings(self, "wheels ")
 
-    def groups(self, count: int) -> NDArray[np.intp]:
-        """Return which of so many groups have one, counted from 0."""
-        middle = (np.arange(count) + 0.5) / count
-        return np.flatnonzero((middle >= self.heard[0]) & (middle < self.heard[1]))
+    def groups(self, count: int) -> range:
+        """Return which of so many groups have one, counted from 0: one at least."""
+        first, end = (int(part * count) for part in self.heard)
+        return range(first, max(end, first + 1))
 
     def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
         """Measure the angular speeds, rad/s."""

@@ -18,7 +18,7 @@ import pytest
 from banks import FULL_PA, S
 
 from adhesion_node.core.bank.following import followed, met
-from adhesion_node.core.bank.gear.wheels import FALLS, LEAST_LEARNT, UNISON_S, WheelsSeen
+from adhesion_node.core.bank.gear.wheels import FALLS, LEAST_LEARNT, LEAST_M, UNISON_S, WheelsSeen
 from adhesion_node.core.bank.layout import MU, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail
@@ -137,7 +137,7 @@ def test_how_fast_all_axles_fall_tells_how_little_the_rail_gives() -> None:
 
 def rims(speeds: list[float], noise: float = 1e-6) -> WheelsSeen:
     """The fastest rim at 10 Hz."""
-    wheels = WheelsSeen(learnt=LEAST_LEARNT, noise=noise, trusted_ns=10**6 * S)
+    wheels = WheelsSeen(learnt=LEAST_LEARNT, way_m=LEAST_M, noise=noise, trusted_ns=10**6 * S)
     for tick, speed in enumerate(speeds):
         wheels = wheels.beside(speed, S + tick * S // 10)
     return wheels

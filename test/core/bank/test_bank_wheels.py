@@ -67,6 +67,18 @@ def test_radii_are_learnt_while_coasting() -> None:
     assert wheels.fastest(rims) == pytest.approx(35.0 / np.median(WORN), rel=4e-3)
 
 
+@pytest.mark.parametrize(("rate_hz", "speed", "seconds"), [(10.0, 40.0, 0.7), (1.0, 40.0, 6.5), (10.0, 6.0, 2.2)])
+def test_radii_are_soon_learnt(rate_hz: float, speed: float, seconds: float) -> None:
+    """By six samples, however seldom they come, and by a way of 12 m; not before."""
+    wheels, learnt_s = WheelsSeen(), math.inf
+    for index in range(100):
+        wheels = wheels.after(
+            CONFIG, sample(S + round(index * S / rate_hz), speed, np.zeros(4), WORN), speed, 0.1, False
+        )
+        learnt_s = min(learnt_s, index / rate_hz) if wheels.is_learnt else learnt_s
+    assert max(5.0 / rate_hz, 12.0 / speed) <= learnt_s < seconds
+
+
 def test_nothing_is_learnt_slowly() -> None:
     wheels = coasted(WORN, speed=4.0)
     assert wheels.radius == (1.0,) * 4
@@ -162,6 +174,15 @@ def test_an_axle_counts_as_sliding_between_its_slides() -> None:
         stamp = 100 * S + index * 100 * MS
         wheels = wheels.after(CONFIG, sample(stamp, 40.0, creep, EVEN), 40.0, 0.1, True)
         assert wheels.share(stamp) == 0.25
+
+
+def test_an_axle_whose_slides_fall_between_samples_counts_as_sliding() -> None:
+    """Heard once a second it is seen to slide every fifth time."""
+    wheels = coasted(EVEN)
+    for index in range(40):
+        creep = np.where(index % 5 == 0, np.array([0.2, 0.0, 0.0, 0.0]), 0.003)
+        wheels = wheels.after(CONFIG, sample((100 + index) * S, 40.0, creep, EVEN), 40.0, 0.1, True)
+        assert wheels.share((100 + index) * S) == 0.25
 
 
 def test_standing_wheels_are_no_judges() -> None:

@@ -26,11 +26,14 @@ S = 1_000_000_000
 SLID_NS, FRESH_NS = 3 * S, S
 """An axle counts as sliding so long, as its protection lets it roll in between; so long may wheels not be heard."""
 
+SLID_SAMPLES, SELDOM_NS = 16, 2 * S
+"""And for so many samples where they are seldom, as slides fall between them; apart they count as so far at most."""
+
 LEARNT = 0.05
 """Share of a new sample in what is learnt of a radius."""
 
-LEAST_LEARNT = 20
-"""Samples from which a radius is good for a speed."""
+LEAST_LEARNT, LEAST_M = 6, 12.0
+"""Samples from which a radius is good for a speed, and way: of less positions that stand still tell nothing."""
 
 UNEQUAL = 0.01
 """By how much wheels of unknown wear may differ, beside creep."""
@@ -89,6 +92,12 @@ class WheelsSeen(NamedTuple):
     """When each was last seen to slide."""
     rolled_ns: tuple[int | None, ...] = ()
     """When each was last seen to roll."""
+    heard_ns: int | None = None
+    """When they were last heard, ..."""
+    every_ns: int = 0
+    """... and how long behind the sample before."""
+    way_m: float = 0.0
+    """Way that was rolled while radii were learnt."""
     trusted_ns: int = 0
     """From when on the fastest rim may be taken for the train's speed."""
     lowest_mps: float = math.inf
@@ -115,10 +124,12 @@ class WheelsSeen(NamedTuple):
         count, nothing = len(sample.speeds_radps), (None,) * len(sample.speeds_radps)
         wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, slid_ns=nothing, rolled_ns=nothing)
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
+        if braked and speed_mps < LEARNING_MPS:
+            return wheels
+        every_ns = 0 if wheels.heard_ns is None else min(sample.t_ns - wheels.heard_ns, SELDOM_NS)
+        wheels = wheels._replace(heard_ns=sample.t_ns, every_ns=every_ns)
         if not braked:
             return wheels._learning(rims)
-        if speed_mps < LEARNING_MPS:
-            return wheels
         rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
         fastest = max((rim for rim in rims if not math.isnan(rim)), default=0.0)
         unsure = UNSURE * std_mps / speed_mps
@@ -144,12 +155,13 @@ class WheelsSeen(NamedTuple):
         turned = (own * rim / middle - 1.0 for own, rim in zip(self.radius, rims, strict=True) if rim > 0.0)
         off = [min(each**2, UNEQUAL**2) for each in turned]  # more is no noise: an axle slides
         noise = self.noise + max(LEARNT, 1.0 / self.learnt) * (sum(off) / len(off) - self.noise) if self.learnt else 0.0
-        return self._replace(radius=radius, learnt=self.learnt + 1, noise=noise)
+        way_m = self.way_m + middle * self.every_ns / S
+        return self._replace(radius=radius, learnt=self.learnt + 1, noise=noise, way_m=way_m)
 
     @property
     def is_learnt(self) -> bool:
         """Whether the radii are learnt."""
-        return self.learnt >= LEAST_LEARNT
+        return self.learnt >= LEAST_LEARNT and self.way_m >= LEAST_M
 
     def rims(self, config: Config, sample: WheelSample) -> list[float]:
         """Speeds of the rims that are heard, of the middle radius all, as far as that is learnt, m/s."""
@@ -195,7 +207,8 @@ class WheelsSeen(NamedTuple):
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
         if not self.slid_ns:
             return None
-        slid = [each is not None and now_ns - each < SLID_NS for each in self.slid_ns]
+        counts_ns = max(SLID_NS, SLID_SAMPLES * self.every_ns)
+        slid = [each is not None and now_ns - each < counts_ns for each in self.slid_ns]
         rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
         known = sum(one or other for one, other in zip(slid, rolled, strict=True))
         return sum(slid) / known if known and 2 * known >= len(slid) else None

@@ -126,7 +126,7 @@ def _seen(mounted: Mounted, course: Course, now: int, end: int) -> tuple[Array, 
         errors = sensor.white_std_mps2**2 / together * np.eye(at.size) + steady + np.outer(pitched, pitched)
         return -GRAVITY * np.eye(now + 1, end)[at], 0.0 * first, errors
     if isinstance(sensor, Wheels):
-        noise, worn = (sensor.noise * speed) ** 2 / (sensor.groups(course.axles).size * together), WORN_STD * speed
+        noise, worn = (sensor.noise * speed) ** 2 / (len(sensor.groups(course.axles)) * together), WORN_STD * speed
         return slower[at], first, np.diag(noise) + np.outer(worn, worn)
     assert isinstance(sensor, Gnss | Speedometer)  # the last that are honest
     lasting = np.exp(-np.abs(time_s[:, np.newaxis] - time_s) / sensor.correlation_s)
