@@ -118,6 +118,36 @@ def test_cycles_of_one_cylinder_are_no_release(period_s: float, least_pa: float,
             assert brake.demanded_pa == pytest.approx(applying(time))
 
 
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+@pytest.mark.parametrize("period_s", [2.7, 3.4, 4.3])
+def test_cycles_that_are_heard_once_a_second_are_no_release(config: Config, period_s: float) -> None:
+    """Dumps fall between samples; the first seconds behind the first one may still look like a brake that is eased."""
+    samples = sampled(cycling(period_s, 40e3), 60.0, 1000)
+    for sample, brake in zip(samples, seen(config, samples), strict=True):
+        assert brake.demanded_pa > 0.9 * FULL_PA or (sample.t_ns - S) / S < 4.0 + 2.0 * period_s
+
+
+@pytest.mark.parametrize("every_ms", [100, 1000])
+def test_a_brake_that_is_eased_is_eased_however_seldom_it_is_heard(every_ms: int) -> None:
+    samples = sampled(
+        lambda time: applying(time) if time < 8.0 else max(FULL_PA * (1.0 - 0.15 * (time - 8.0)), 0.0), 20.0, every_ms
+    )
+    brakes = seen(CYLINDER, samples)
+    assert all(brake.demanded_pa == sample.pressure_pa for sample, brake in zip(samples, brakes, strict=True))
+
+
+def test_a_cylinder_that_is_held_low_while_axles_slide_is_not_eased() -> None:
+    """No further dump is seen; what axles that roll tell, or an empty cylinder, ends it."""
+    samples, brake = sampled(lambda time: applying(time) if time < 4.0 else 0.2 * FULL_PA, 30.0), BrakeSeen()
+    for sample in samples:
+        brake = brake.after(CYLINDER, [sample], None, rolls=False)
+    assert brake.demanded_pa == FULL_PA
+    assert brake.after(CYLINDER, [PressureSample(31 * S, 0.2 * FULL_PA)], None, rolls=True).demanded_pa == 0.2 * FULL_PA
+    for index in range(20):
+        brake = brake.after(CYLINDER, [PressureSample(31 * S + index * 100 * MS, 0.0)], None, rolls=False)
+    assert brake.demanded_pa < FULL_PA
+
+
 @pytest.mark.parametrize("least_pa", [200e3, 300e3])
 def test_a_mean_pressure_swings_but_the_demand_is_held(least_pa: float) -> None:
     samples = sampled(cycling(2.0, least_pa), 24.0)
