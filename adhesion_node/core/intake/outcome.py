@@ -56,6 +56,10 @@ class Outcome(Enum):
         "the accelerometer feels the brake push the train forward: left out until a braking says otherwise; "
         "x is to point forward along the track, level"
     )
+    ASKEW = (
+        "the accelerometer shows too much for one that is level: left out until the train is met anew; x is to point "
+        "forward along the track, level, in m/s^2"
+    )
     OUTLIER = "further from the prediction than gate_sigma: dropped"
     UNPAIRED = "no speed or force of its time: dropped; is that sensor alive, its clock right?"
     SLOW = "slower than min_speed_mps: the creep is not formed"
