@@ -35,7 +35,7 @@ class Outcome(Enum):
     ACCEPTED = "accepted"
     TICK = "no position at its time: the other sensors are used without one"
     LATE = "older than the newest one by more than max_lag_s: dropped; raise it, or is there a second publisher?"
-    DUPLICATE = "a second measurement with the same stamp: dropped; does the publisher's clock stand still?"
+    DUPLICATE = "a second measurement with the same stamp: dropped; does its clock stand still, or header.stamp stay 0?"
     REPEATED = "a second sample of another sensor with the same stamp: dropped"
     OVERTAKEN = "came when all of its time had been used: dropped; is its clock right? Else raise pressure_wait_s"
     STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
@@ -68,7 +68,7 @@ class Outcome(Enum):
     IDLE = "creep below min_creep: says nothing of the curve, nothing is forgotten"
     CHANGED = "the newest samples lie on one side of the curve: the surface changed, what was known is forgotten"
     FAILED = "the numbers of a window failed, nothing is identified by it: is a setting far from what any train has?"
-    RESET = "stamp or position jumped: the estimation starts anew"
+    RESET = "stamp or position jumped, or a sensor had deceived: the estimation starts anew"
 
 
 DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "TICK", "SHIFTED", "CHANGED", "RESET"))
