@@ -121,7 +121,7 @@ def _unbelieved(
 def _anew(state: State, event: Event) -> State:
     """Nothing is known of train and rail any more."""
     kept = state.forgotten()._replace(
-        seen=state.seen, repeated=state.repeated, pace=state.pace, standing=state.standing
+        seen=state.seen, repeated=state.repeated, pace=state.pace, standing=state.standing, turning=state.turning
     )
     return kept.told(event)
 

@@ -48,9 +48,13 @@ class Outcome(Enum):
     )
     HELD = "the same to the bit as before: taken for a value that is held until the next one; publish each only once"
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
+    WHEEL_UNIT = (
+        "left out until they agree while no brake is applied; wheel_speed is in rad/s: multiply rpm by 0.1047, divide "
+        "m/s by the radius; or is train.wheel_radius_m another?"
+    )
     SLIDING = (
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
-        "take them from an axle without a brake, or from satellites"
+        "take them from an axle without a brake, or from satellites; or is a speed beside them not in m/s?"
     )
     TURNED = (
         "the accelerometer feels the brake push the train forward: left out until a braking says otherwise; "
