@@ -30,12 +30,13 @@ SURE_SIGMA = 3.0
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
-    seen, placed = state.seen, measurement.has_position
+    seen = state.seen
     turning = state.turning.after(measurement, _rims_mps(config, measurement), _may_brake(config, measurement))
-    measurement, belied_wheels = turning.believed(measurement)
+    measurement, other_unit = turning.believed(measurement)
+    placed = measurement.has_position
     measurement, standing, silent = moving(measurement, state.standing, state.pace)
-    deceived = turning.lies and not state.turning.lies
-    state = state._replace(standing=standing, turning=turning).told(*silent, *belied_wheels)
+    deceived = (turning.lies, turning.crawls) > (state.turning.lies, state.turning.crawls)
+    state = state._replace(standing=standing, turning=turning).told(*silent, *other_unit)
     if placed:
         repeated = state.repeated.after(measurement, state.sure, _running_mps(config, measurement))
         if repeated.is_stuck(measurement):

@@ -50,7 +50,11 @@ class Outcome(Enum):
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
     WHEEL_UNIT = (
         "left out until they agree while no brake is applied; wheel_speed is in rad/s: multiply rpm by 0.1047, divide "
-        "m/s by the radius; or is train.wheel_radius_m another?"
+        "m/s by the radius; or is train.wheel_radius_m another, or are positions not in m?"
+    )
+    POSITION_UNIT = (
+        "positions hardly run while all wheels turn: left out until they do; are they in km, not in m, or does the "
+        "receiver hang?"
     )
     SLIDING = (
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
