@@ -28,17 +28,27 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Protocol
 
-import hypothesis
 import pytest
-import rclpy
-from hypothesis.configuration import set_hypothesis_home_dir
-from rclpy.context import Context
-from rclpy.executors import Executor, SingleThreadedExecutor
 
-from adhesion_node.core import Config
-from adhesion_node.core.bank import BANK
-from adhesion_node.core.estimator import warm_up
-from adhesion_node.core.methods import METHODS
+from adhesion_node.command.without_ros import REMEDY, is_of_ros
+
+try:
+    import hypothesis
+    import rclpy
+    from hypothesis.configuration import set_hypothesis_home_dir
+    from rclpy.context import Context
+    from rclpy.executors import Executor, SingleThreadedExecutor
+
+    from adhesion_node.core import Config
+    from adhesion_node.core.bank import BANK
+    from adhesion_node.core.estimator import warm_up
+    from adhesion_node.core.methods import METHODS
+except ModuleNotFoundError as error:
+    missing = error.name or ""
+    if missing.startswith(("adhesion_node", "sim_node")):
+        raise
+else:
+    missing = ""
 
 DOMAINS = range(1, 101)
 ROOT = Path(__file__).resolve().parent.parent
@@ -56,14 +66,15 @@ class SpinUntil(Protocol):
     def __call__(self, executor: Executor, predicate: Callable[[], object], timeout_s: float = PATIENCE_S) -> None: ...
 
 
-# The same examples in every run: what passes once, passes always. HYPOTHESIS_PROFILE=search looks for new ones.
-hypothesis.settings.register_profile("same", derandomize=True, deadline=None, max_examples=60)
-hypothesis.settings.register_profile("search", deadline=None, max_examples=3000, print_blob=True)
-hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
-
-
 def pytest_configure(config: pytest.Config) -> None:
     """Set the environment of this process and of those it starts, before the first context is made."""
+    if missing:
+        remedy = REMEDY if is_of_ros(missing) else "pip install '.[live,test]'"
+        raise pytest.UsageError(f"{missing} is missing, without which no test runs: {remedy}")
+    # The same examples in every run: what passes once, passes always. HYPOTHESIS_PROFILE=search looks for new ones.
+    hypothesis.settings.register_profile("same", derandomize=True, deadline=None, max_examples=60)
+    hypothesis.settings.register_profile("search", deadline=None, max_examples=3000, print_blob=True)
+    hypothesis.settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
     home = config.stash[_ros_home] = tempfile.mkdtemp(prefix="adhesion_node_test_")
     for name in ("ROS_LOCALHOST_ONLY", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"):
         os.environ.pop(name, None)
@@ -107,7 +118,8 @@ def pytest_collection(session: pytest.Session) -> Generator[None, object, object
 
 def pytest_unconfigure(config: pytest.Config) -> None:
     """Remove the logs and give the domain back."""
-    shutil.rmtree(config.stash[_ros_home], ignore_errors=True)
+    if _ros_home in config.stash:
+        shutil.rmtree(config.stash[_ros_home], ignore_errors=True)
     _give_domain_back()
 
 

@@ -8,9 +8,10 @@
 
 """Which topics of a recording stand for which of ours: whose train, remapping, and clear words when they do not fit."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from ..wire import topics
+from ..wire.topic import Topic
 from .read.reader import BagReader
 from .types import same_name
 
@@ -18,6 +19,9 @@ _OURS = {topic.name: topic.type for topic in (*topics.SENSORS, *topics.TRUTH)}
 
 _ENOUGH = (*topics.POSITIONS, topics.SPEED, topics.WHEEL_SPEED)
 """Without any of these a recording has nothing to replay."""
+
+_TELLING = (topics.BRAKE_PRESSURE, topics.SPEED, topics.IMU, topics.WHEEL_SPEED)
+"""What is missed, beside a position, where a recording has it under another name."""
 
 _FORCES = (topics.BRAKE_PRESSURE, topics.BRAKE_DEMAND, topics.TRACTION_FORCE)
 
@@ -92,6 +96,8 @@ def select(
             selection[source] = own if own in _OURS else name
             if (kind := recorded[source]) != (needed := _OURS.get(own, kind)):
                 what = _what_there_is(name, recorded)
+                if needed not in recorded.values():
+                    what = f"Convert it, or leave it out: --remap {source}:=unused"
                 raise ValueError(f"topic {source}: type = {kind}: {name} needs {needed}. {what}")
         elif names is not None or (same_name(name, topics.POSITION.name) and not has_any):
             raise ValueError(f"topic {name}: not in the recording. {_what_there_is(name, recorded)}")
@@ -111,6 +117,27 @@ def select_from(
         return select(reader.topics, [parse_remap(text) for text in remaps], names, reader.namespace)
     except ValueError as error:
         raise ValueError(f"bag = {reader.path}: {error}") from error
+
+
+def overlooked(recorded: Mapping[str, str], selection: Mapping[str, str], namespace: str = "") -> Iterator[str]:
+    """Say which topics under other names could be sensors that a selection lacks, each with its remapping."""
+    own = {f"{space}/{topic.name}".lstrip("/") for topic in topics.TOPICS for space in ("", namespace)}
+    trains = tuple(f"{space}/" for space in _trains(recorded) if space not in ("", namespace))
+    free = {
+        name: kind
+        for name, kind in sorted(recorded.items())
+        if name not in selection and name.lstrip("/") not in own and not f"/{name.lstrip('/')}".startswith(trains)
+    }
+    read = set(selection.values())
+    lacking: list[tuple[str, tuple[Topic, ...]]] = [
+        (topic.name, (topic,)) for topic in _TELLING if topic.name not in read
+    ]
+    if not any(topic.name in read for topic in topics.POSITIONS):
+        lacking.insert(0, (topics.POSITION.name, topics.POSITIONS))
+    for what, wanted in lacking:
+        if found := [(name, topic.name) for name, kind in free.items() for topic in wanted if topic.type == kind]:
+            listed = ", ".join(f"{name} ({recorded[name]})" for name, _ in found)
+            yield f"no {what} is read; could it be {listed}? --remap {':='.join(found[0])}"
 
 
 def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]], namespace: str) -> dict[str, str]:

@@ -78,7 +78,19 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     if measurement.imu or state.proving.since:
         followed, proving = state.proving.after(config, memory, followed, measurement, rail)
         state = state._replace(proving=proving)
+    if followed.pointing.askew and not memory.pointing.askew and (measurement.has_position or not memory.is_placed):
+        return _undeceived(config, state, measurement, followed)
     return _accepted(config, state, measurement, followed, stepping)
+
+
+def _undeceived(
+    config: Config, state: State, measurement: Measurement, memory: Memory
+) -> tuple[State, Estimate | None]:
+    """An accelerometer turns out to be askew: what was believed with it is given up, and the train is met without."""
+    anew = _anew(state, Event(Outcome.RESET, "the accelerometer is left out"))
+    met = bank.met(config, measurement._replace(imu=()))
+    met = met._replace(pointing=memory.pointing, places=memory.places, left_out=memory.left_out)
+    return _accepted(config, anew, measurement, met)
 
 
 def _unbelieved(
@@ -109,7 +121,7 @@ def _unbelieved(
 def _anew(state: State, event: Event) -> State:
     """Nothing is known of train and rail any more."""
     kept = state.forgotten()._replace(
-        seen=state.seen, repeated=state.repeated, pace=state.pace, standing=state.standing
+        seen=state.seen, repeated=state.repeated, pace=state.pace, standing=state.standing, turning=state.turning
     )
     return kept.told(event)
 

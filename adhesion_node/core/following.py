@@ -30,9 +30,13 @@ SURE_SIGMA = 3.0
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
-    seen, placed = state.seen, measurement.has_position
+    seen = state.seen
+    turning = state.turning.after(measurement, _rims_mps(config, measurement), _may_brake(config, measurement))
+    measurement, other_unit = turning.believed(measurement)
+    placed = measurement.has_position
     measurement, standing, silent = moving(measurement, state.standing, state.pace)
-    state = state._replace(standing=standing).told(*silent)
+    deceived = (turning.lies, turning.crawls) > (state.turning.lies, state.turning.crawls)
+    state = state._replace(standing=standing, turning=turning).told(*silent, *other_unit)
     if placed:
         repeated = state.repeated.after(measurement, state.sure, _running_mps(config, measurement))
         if repeated.is_stuck(measurement):
@@ -52,9 +56,10 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
         measurement, refused = in_mps(measurement, (pace.speed_mps, _surely(seen)))
     is_other = (pace.belies and not state.pace.belies) or (refused and is_kmh(state.followed_mps, pace.speed_mps))
     state = state._replace(repeated=repeated, unseen=0 if placed else state.unseen, pace=pace).told(*belied, *refused)
-    if is_other:
+    if is_other or deceived:
         detail = f"speed x = {state.followed_mps:.3g}, positions at {pace.speed_mps:.3g} m/s"
-        state = state.forgotten()._replace(pace=pace, standing=standing).told(Event(Outcome.RESET, detail))
+        state = state.forgotten()._replace(pace=pace, standing=standing, turning=turning)
+        state = state.told(Event(Outcome.RESET, detail))
     if state.method is None:
         return follow_banked(config, state, measurement)
     return follow_windowed(config, state, measurement)
@@ -76,6 +81,18 @@ def _shown(config: Config, measurement: Measurement) -> tuple[float, ...]:
     if config.speed_source == "axle":
         return ()
     return tuple(each.speed_mps for each in measurement.all_speeds)
+
+
+def _rims_mps(config: Config, measurement: Measurement) -> tuple[float, ...]:
+    """How fast the rims of wheels that turn are in the middle, at each time."""
+    turning = ([abs(each) for each in sample.known_radps if each != 0.0] for sample in measurement.wheels)
+    return tuple(median(each) * config.train.wheel_radius_m for each in turning if each)
+
+
+def _may_brake(config: Config, measurement: Measurement) -> bool:
+    """Whether wheels may slide, as a brake is applied or nothing tells of one."""
+    told = [each for each in (measurement.brake_pressure_pa, measurement.demand_pa) if each is not None]
+    return not told or any(map(config.is_braked, told))
 
 
 def _running_mps(config: Config, measurement: Measurement) -> float:

@@ -26,6 +26,7 @@ from .intake.pairing import Gate, Inbox
 from .intake.plausibility import Pace, Repeated
 from .intake.samples import Measurement
 from .intake.standing import Standing
+from .intake.turning import Turning
 from .methods.protocol import AnyMethod, MethodWindow
 from .quick import quick
 
@@ -89,6 +90,7 @@ class State(NamedTuple):
     repeated: Repeated[Sure] = Repeated(math.nan, 0, None)
     pace: Pace = Pace()
     standing: Standing = Standing()
+    turning: Turning = Turning()
     unseen: int = 0
     """Measurements in a row of a position sensor that is stuck."""
 

@@ -41,7 +41,8 @@ def follow_windowed(config: Config, state: State, measurement: Measurement) -> t
         detail = f"position x = {measurement.position_m:.12g}, innovation {innovation:.3g} standard deviations"
         if state.outliers + 1 < config.max_outliers:
             return state._replace(outliers=state.outliers + 1).told(Event(Outcome.OUTLIER, detail)), None
-        state = state.forgotten()._replace(seen=state.seen, repeated=state.repeated, pace=state.pace)
+        anew = state.forgotten()._replace(seen=state.seen, repeated=state.repeated)
+        state = anew._replace(pace=state.pace, turning=state.turning)
         state = state.told(Event(Outcome.RESET, detail))
         return _accept(config, state, measurement, _met(config, measurement), 0.0)
     belief = tracker.correct(belief, measurement, _speed_variance(config, measurement))

@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 
-from ..bag import BagReader, select_from
+from ..bag import BagReader, overlooked, select_from
 from ..command.checks import at_least, refuse
 from ..command.options import (
     DONE,
@@ -98,10 +98,13 @@ def _offline(options: argparse.Namespace) -> int:
 
 
 def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]:
-    """Return the topics to replay and say what the recording lacks."""
+    """Return the topics to replay and say what the recording lacks, or has under other names."""
     for loss in reader.damage:
         print(f"replay: {loss}", file=sys.stderr)
-    return select_from(reader, options.remap, options.topics, options.namespace)
+    selection = select_from(reader, options.remap, options.topics, options.namespace)
+    for hint in overlooked(reader.topics, selection, reader.namespace) if options.topics is None else ():
+        print(f"replay: {hint}", file=sys.stderr)
+    return selection
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..bag import BagReader, choose_train, select_from
+from ..bag import BagReader, choose_train, overlooked, select_from
 from ..command.checks import refuse
 from ..command.options import (
     DONE,
@@ -149,6 +149,8 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
                 write(row)
         else:
             selection = select_from(reader, options.remap, namespace=options.namespace)
+            for hint in overlooked(reader.topics, selection, reader.namespace):
+                print(f"report: {name}: {hint}", file=sys.stderr)
             run, lost = estimate_run(reader, selection, setup, write, targets)
             source = "estimated from the recorded sensors"
             if (off := off_track(setup.config.track, run.position.values.min(), run.position.values.max())) is not None:

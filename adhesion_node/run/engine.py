@@ -65,6 +65,8 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
         self.measurements = 0
         """Messages of the anchor received, whatever became of them."""
         self.last: E | None = None
+        self.refused: dict[str, str] = {}
+        """What was said of the first message that was refused, by reason."""
         self._before: Counter[str] = Counter()
         self._digest = hashlib.sha256()
 
@@ -92,8 +94,9 @@ class EstimatorPipeline(ABC, Generic[S, E, Output]):
         """Go on with what another one is configured with; what is known stays."""
         self._verbs, self.config = other._verbs, other.config
 
-    def refuse(self, topic: str, reason: str) -> None:
-        """Count a message of a topic that never became a sample."""
+    def refuse(self, topic: str, reason: str, said: str = "") -> None:
+        """Count a message of a topic that never became a sample, and keep what is said of the first one."""
+        self.refused.setdefault(reason, f"{topic}: {said}" if said else "")
         self.measurements += any(topic == anchor.name for anchor in self.anchors)
         self._before[reason] += 1
 

@@ -86,9 +86,9 @@ def _remarks(pipeline: Pipeline, why: str | None, brake: str | None) -> Iterator
     for reason, count in pipeline.dropped.items():
         is_line = reason == Reason.NO_TRACK_LINE.name  # that is no fault now and then: it is all fixes
         if is_line or count > MANY * pipeline.measurements:
-            known = [kind[reason].value for kind in (Outcome, Reason) if reason in kind.__members__]
+            known = Outcome[reason].value if reason in Outcome.__members__ else pipeline.refused.get(reason)
             what = "fixes" if is_line else "messages"
-            yield f"{count} {what} were dropped: {reason}" + "".join(f": {text}" for text in known)
+            yield f"{count} {what} were dropped: {reason}" + (f": {known}" if known else "")
     if why is not None:
         yield f"nothing is identified: {why}"
     elif pipeline.back_m > BACK_M:
@@ -144,7 +144,7 @@ def feed(
         topics[FIX.name] = FIX  # without a track line it is none of the reader's: refused, it is counted, and told
     for name, message, _ in recorded:
         if isinstance(message, Rejected):
-            pipeline.refuse(name, message.reason)
+            pipeline.refuse(name, message.reason, str(message))
             continue
         topic = topics.get(name)
         if topic is None:
@@ -152,7 +152,7 @@ def feed(
         try:
             sample = reader.read(topic, message)
         except Rejected as refusal:
-            pipeline.refuse(name, refusal.reason)
+            pipeline.refuse(name, refusal.reason, str(refusal))
         else:
             started = time.perf_counter()
             outputs = pipeline.push(sample)

@@ -6,7 +6,10 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Reads what an estimator takes in, live and offline, and sees to it that one topic alone gives the positions."""
+"""Reads what an estimator takes in, live and offline.
+
+One topic alone gives the positions, and the axes of an accelerometer are what they seem.
+"""
 
 from collections.abc import Sequence
 from typing import Any
@@ -17,7 +20,8 @@ from ..wire.messages.parts import NS
 from ..wire.messages.refused import Reason, Rejected
 from ..wire.settings.sensing import USE
 from ..wire.topic import Topic
-from ..wire.topics import FIX, POSITIONS
+from ..wire.topics import FIX, IMU, POSITIONS
+from .gravity import Gravity
 
 
 class Reader:
@@ -35,6 +39,7 @@ class Reader:
         self.inputs = tuple(topic for topic in inputs if topic in possible or topic not in POSITIONS)
         self.source: Topic | None = None
         """The anchor that counts; None before one was heard."""
+        self._gravity = Gravity()
 
     def read(self, topic: Topic, message: Any) -> Sample:
         """Read a message of one of the inputs, at the time of what it measured; raises Rejected.
@@ -48,6 +53,9 @@ class Reader:
         if is_better and self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):
             raise Rejected(Reason.OTHER_SOURCE, f"{topic.name} beside {self.source.name}")
         sample: Sample = message if isinstance(message, Sample) else topic.read(message, self.line)
+        if topic.name == IMU.name and sample is not message:
+            self._gravity = self._gravity.after(sample.t_ns, message.linear_acceleration)
+            self._gravity.check()
         if is_better:
             self.source = topic
         late_s = self.line.latency_s.get(topic.name)

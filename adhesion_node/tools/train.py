@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..bag import BagReader, select_from
+from ..bag import BagReader, overlooked, select_from
 from ..command.checks import refuse
 from ..command.options import (
     DONE,
@@ -167,6 +167,8 @@ def _estimate(options: argparse.Namespace) -> int:
         for loss in reader.damage:
             print(f"train: {loss}", file=sys.stderr)
         selection = select_from(reader, options.remap, namespace=options.namespace)
+        for hint in overlooked(reader.topics, selection, reader.namespace):
+            print(f"train: {hint}", file=sys.stderr)
         recorded = progress(offline.messages(reader, selection, setup.line), "messages")
         found = train_found.find(setup.config, train_found.read(recorded, setup.line))
     text = [f"believed: {setup.train}", *found.told()]

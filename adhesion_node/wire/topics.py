@@ -82,7 +82,8 @@ IMU = _sensor(
     "imu",
     "sensor_msgs/msg/Imu",
     sensors.IMU,
-    "**in**, optional: linear_acceleration.x m/s², forward along the track, its covariance[0], 0 = unknown",
+    "**in**, optional: linear_acceleration.x m/s², forward along the track, its covariance[0], 0 = unknown, -1 = none; "
+    "gravity on y and z, where it is there, tells whether the unit is right",
 )
 WHEEL_SPEED = _sensor(
     "wheel_speed",

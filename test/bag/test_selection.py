@@ -15,8 +15,19 @@ from typing import cast
 
 import pytest
 
-from adhesion_node.bag import BagReader, choose_train, parse_remap, select
-from adhesion_node.wire.topics import BRAKE_PRESSURE, CLOCK, FIX, MU, ODOMETRY, POSITION, RECORDED, WHEEL_SPEED
+from adhesion_node.bag import BagReader, choose_train, overlooked, parse_remap, select
+from adhesion_node.wire.topics import (
+    BRAKE_PRESSURE,
+    CLOCK,
+    FIX,
+    IMU,
+    MU,
+    ODOMETRY,
+    POSITION,
+    RECORDED,
+    SPEED,
+    WHEEL_SPEED,
+)
 
 RECORDED_ELSEWHERE = {"/odo/pose": POSITION.type, "/brake_pressure": BRAKE_PRESSURE.type, "/x": MU.type}
 
@@ -85,3 +96,30 @@ def test_a_train_is_selected_by_its_namespace_alone() -> None:
     assert select(both, namespace="/b") == {"/b/position": "position", "/b/brake_pressure": "brake_pressure"}
     mended = select(both, [("/a/brake_pressure", "brake_pressure")], namespace="/b")
     assert mended == {"/b/position": "position", "/a/brake_pressure": "brake_pressure"}
+
+
+def test_what_could_be_a_sensor_under_another_name_is_said() -> None:
+    elsewhere = {"/wheel_speed": WHEEL_SPEED.type, "/odom": ODOMETRY.type, "/gnss/fix": FIX.type, "/xsens": IMU.type}
+    assert list(overlooked(elsewhere, select(elsewhere))) == [
+        "no position is read; could it be /gnss/fix (sensor_msgs/msg/NavSatFix), /odom (nav_msgs/msg/Odometry)? "
+        "--remap /gnss/fix:=fix",
+        "no imu is read; could it be /xsens (sensor_msgs/msg/Imu)? --remap /xsens:=imu",
+    ]
+    remaps = [("/odom", "odometry"), ("/xsens", "imu")]
+    assert list(overlooked(elsewhere, select(elsewhere, remaps))) == []
+
+
+def test_what_is_ours_or_another_trains_is_not_overlooked() -> None:
+    own = {f"/{topic.name}": topic.type for topic in RECORDED if topic not in (POSITION, FIX, ODOMETRY)}
+    assert list(overlooked(own, select(own))) == [], "the simulator's truth and results have the type of an odometry"
+    both = within("/a") | within("/b", OF_A_TRAIN | {"/imu": IMU.type, "/x/imu": IMU.type}) | OF_A_TRAIN
+    assert list(overlooked(both, select(both, namespace="/a"), "/a")) == []
+
+
+def test_a_topic_of_another_type_under_our_name_is_to_be_left_out() -> None:
+    near = OF_A_TRAIN | {"/speed": "geometry_msgs/msg/TwistStamped"}
+    with pytest.raises(ValueError, match=r"speed needs .*\. Convert it, or leave it out: --remap /speed:=unused$"):
+        select(near)
+    assert set(select(near, [parse_remap("/speed:=unused")])) == set(OF_A_TRAIN)
+    with pytest.raises(ValueError, match=r"It holds: .*--remap /radar:=speed$"):
+        select(near | {"/radar": SPEED.type})

@@ -57,6 +57,7 @@ import signal, sys
 from types import SimpleNamespace
 from adhesion_node import main
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it may be ignored
 main.import_module = lambda _: SimpleNamespace(main=lambda: signal.raise_signal(signal.SIGINT))
 sys.exit(main.train())
 """

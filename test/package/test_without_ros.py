@@ -11,6 +11,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -79,3 +81,14 @@ def test_an_offline_replay_needs_none(tmp_path: Path) -> None:
     assert told.returncode == 0, told.stderr
     assert "digest" in told.stdout
     assert len(out.read_text(encoding="utf-8").splitlines()) > 100
+
+
+def test_the_tests_say_what_they_need_in_one_line() -> None:
+    code = (
+        f"{BLOCKED}\nimport pytest\nsys.exit(pytest.main(['-p', 'no:cacheprovider', 'test/core/test_prediction.py']))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert told.returncode == 4
+    said = "ERROR: rclpy is missing, without which no test runs: source /opt/ros/jazzy/setup.bash"
+    assert told.stderr.strip().startswith(said)
+    assert told.stderr.strip().count("\n") == 0

@@ -139,7 +139,8 @@ def test_a_bag_without_any_estimate_has_failed(tmp_path: Path, offline: Offline)
     write_run(tmp_path / "bad", samples()[:20], edit=no_variance)
     code, result, _, err = offline(tmp_path / "bad")
     dropped, why = err
-    assert dropped.startswith("replay: 20 messages were dropped: BAD_VARIANCE: ")
+    said = "BAD_VARIANCE: position: position covariance[0] = -1: give covariance[0] in SI units squared"
+    assert dropped.startswith(f"replay: 20 messages were dropped: {said}"), "the thing, its value and the remedy"
     assert (code, why) == (1, f"replay: nothing is identified: {result['why']}")
     assert result["why"] == "no estimate came of it; see what was dropped, and why"
     assert set(result) == KEYS | {"why"}
@@ -164,7 +165,9 @@ def test_fixes_without_a_track_line_are_told(count: int, beside: Topic, tmp_path
     write_fixes(tmp_path / "fixes", count, beside)
     write_fixes(tmp_path / "none", 0, beside)
     told, without = offline(tmp_path / "fixes"), offline(tmp_path / "none")
-    remedy = "NO_TRACK_LINE: set track_line to a GeoJSON or CSV file with the centre line of the track"
+    remedy = (
+        "NO_TRACK_LINE: fix: track_line = '': set track_line to a GeoJSON or CSV file with the centre line of the track"
+    )
     assert f"replay: {count} fixes were dropped: {remedy}" in told.err
     assert told.result["dropped"] == {**without.result["dropped"], "NO_TRACK_LINE": count}
     assert told.result["measurements"] == without.result["measurements"] + count

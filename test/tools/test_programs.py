@@ -134,5 +134,14 @@ def test_lines_on_one_machine_have_domains_of_their_own(monkeypatch: pytest.Monk
         assert again == one, "free again"
 
 
-def test_signals_are_those_of_python_after_an_import() -> None:
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+def test_an_import_leaves_the_signals_as_they_are() -> None:
+    """Of a suite in the background SIGINT is ignored, and that of a terminal is Python's own."""
+    code = (
+        "import signal, sys\n"
+        "for handler in signal.default_int_handler, signal.SIG_IGN:\n"
+        "    signal.signal(signal.SIGINT, handler)\n"
+        "    import adhesion_node.main\n"
+        "    assert signal.getsignal(signal.SIGINT) is handler\n"
+        "    del sys.modules['adhesion_node.main']"
+    )
+    subprocess.run([sys.executable, "-c", code], timeout=60.0, cwd=ROOT, check=True)

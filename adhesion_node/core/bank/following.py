@@ -32,6 +32,7 @@ from .memory import HALF_LOG_2PI, Memory, S, steps
 from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
 from .rims import with_wheels
 from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
+from .sensors.pointing import ASKEW_MPS2
 from .sensors.scatter import BRAKED_FAR, PLACE_FAR, SLOW_FAR
 
 if TYPE_CHECKING:
@@ -188,14 +189,16 @@ def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Br
     shaking = memory.shaking.after(felt[-1].t_ns, mean, told, elapsed_s, swing)
     memory, variance = memory._replace(shaking=shaking), shaking.variance_of(told, elapsed_s)
     shown, before = felt[-1].acceleration_mps2, memory.pointing
-    braked = memory.braked or memory.misled
-    if braked:
+    bias_mps2 = GRAVITY * memory.bank.mean_of(BIAS)
+    if memory.braked or memory.misled:
         pointing = before.after(shown, mean, variance, elapsed_s)
     else:
-        pointing = before.resting(shown, elapsed_s, GRAVITY * memory.bank.mean_of(BIAS))
+        pointing = before.resting(shown, elapsed_s, bias_mps2)
+    if abs(bias_mps2) > ASKEW_MPS2:
+        pointing = pointing.biased(bias_mps2, GRAVITY * memory.bank.std_of(BIAS))
     memory = memory._replace(pointing=pointing)
-    if pointing.forward is False:
-        outcome = Outcome.STUCK if pointing.is_still else Outcome.TURNED
+    if pointing.lies:
+        outcome = Outcome.STUCK if pointing.is_still else Outcome.ASKEW if pointing.askew else Outcome.TURNED
         return memory.leaving_out(Event(outcome, f"acceleration x = {mean:.3g}"))
     if pointing.repeats:
         return memory

@@ -85,6 +85,10 @@ class Bank(NamedTuple):
         """Mean of one component over all hypotheses."""
         return uniting.mean_of(self.log_weight, self.mean, component)
 
+    def std_of(self, component: int) -> float:
+        """Standard deviation of one component over all hypotheses."""
+        return math.sqrt(self.moments(component + 1)[1][component, component])
+
     def with_fresh(self, component: int, mean: float | Array, std: float | Array) -> Bank:
         """With a component that is known anew, apart from all others."""
         means, covariance = self.mean.copy(), self.covariance.copy()

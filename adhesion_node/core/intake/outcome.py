@@ -35,7 +35,7 @@ class Outcome(Enum):
     ACCEPTED = "accepted"
     TICK = "no position at its time: the other sensors are used without one"
     LATE = "older than the newest one by more than max_lag_s: dropped; raise it, or is there a second publisher?"
-    DUPLICATE = "a second measurement with the same stamp: dropped; does the publisher's clock stand still?"
+    DUPLICATE = "a second measurement with the same stamp: dropped; does its clock stand still, or header.stamp stay 0?"
     REPEATED = "a second sample of another sensor with the same stamp: dropped"
     OVERTAKEN = "came when all of its time had been used: dropped; is its clock right? Else raise pressure_wait_s"
     STRAY = "stamped apart from all others, and none came that agrees: dropped; check the clock of its publisher"
@@ -48,13 +48,25 @@ class Outcome(Enum):
     )
     HELD = "the same to the bit as before: taken for a value that is held until the next one; publish each only once"
     SPEED_IN_KMH = "speed is in m/s: divide km/h by 3.6"
+    WHEEL_UNIT = (
+        "left out until they agree while no brake is applied; wheel_speed is in rad/s: multiply rpm by 0.1047, divide "
+        "m/s by the radius; or is train.wheel_radius_m another, or are positions not in m?"
+    )
+    POSITION_UNIT = (
+        "positions hardly run while all wheels turn: left out until they do; are they in km, not in m, or does the "
+        "receiver hang?"
+    )
     SLIDING = (
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
-        "take them from an axle without a brake, or from satellites"
+        "take them from an axle without a brake, or from satellites; or is a speed beside them not in m/s?"
     )
     TURNED = (
         "the accelerometer feels the brake push the train forward: left out until a braking says otherwise; "
         "x is to point forward along the track, level"
+    )
+    ASKEW = (
+        "the accelerometer shows too much for one that is level: left out until the train is met anew; x is to point "
+        "forward along the track, level, in m/s^2"
     )
     OUTLIER = "further from the prediction than gate_sigma: dropped"
     UNPAIRED = "no speed or force of its time: dropped; is that sensor alive, its clock right?"
@@ -64,7 +76,7 @@ class Outcome(Enum):
     IDLE = "creep below min_creep: says nothing of the curve, nothing is forgotten"
     CHANGED = "the newest samples lie on one side of the curve: the surface changed, what was known is forgotten"
     FAILED = "the numbers of a window failed, nothing is identified by it: is a setting far from what any train has?"
-    RESET = "stamp or position jumped: the estimation starts anew"
+    RESET = "stamp or position jumped, or a sensor had deceived: the estimation starts anew"
 
 
 DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED", "TICK", "SHIFTED", "CHANGED", "RESET"))

@@ -52,6 +52,8 @@ def read_fix(message: Any, line: Line) -> PositionSample:
         raise Rejected(Reason.NO_FIX, f"status = {message.status.status}")
     latitude = plausible("latitude", message.latitude, Reason.IMPLAUSIBLE_FIX, 90.0)
     longitude = plausible("longitude", message.longitude, Reason.IMPLAUSIBLE_FIX, 180.0)
+    if latitude == longitude == 0.0:  # as written for none; no railway is there
+        raise Rejected(Reason.NO_FIX, "latitude = longitude = 0")
     known = message.position_covariance_type != UNKNOWN
     east, mixed, _, mixed_too, north, *_ = map(float, message.position_covariance) if known else [0.0] * 9
     widest = max(_variance(spread, line) for spread in (east, north))

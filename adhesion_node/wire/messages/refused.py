@@ -67,6 +67,13 @@ class Reason(Enum):
     IMPLAUSIBLE_ACCELERATION = (
         f"linear_acceleration.x is in m/s^2 along the track, not in g, within +-{MAX_ACCELERATION_MPS2:g}"
     )
+    ACCELERATION_UNIT = (
+        "that is no gravity in m/s^2, where it is 9.8: multiply g by 9.80665, mg by 0.00980665; left out until then"
+    )
+    GRAVITY_ALONG = (
+        "no train gains or loses speed so for long: x is to point forward along the track, level, in m/s^2; "
+        "left out until it does"
+    )
     NO_AXLE = "give one velocity, rad/s, for every driven axle in name"
     MANY_AXLES = f"give at most {MOST_AXLES}, of the axles that have a sensor"
     IMPLAUSIBLE_WHEEL_SPEED = f"velocity is in rad/s, not rpm, within +-{MAX_WHEEL_RADPS:g}"

@@ -77,6 +77,7 @@ def test_the_variance_is_that_along_the_track(covariance: tuple[float, ...], kin
     ("message", "reason", "text"),
     [
         (fix(status=plain("", status=-1)), "NO_FIX", r"status = -1: the receiver has no fix"),
+        (fix(latitude=0.0, longitude=0.0), "NO_FIX", r"latitude = longitude = 0: the receiver has no fix"),
         (fix(latitude=math.nan), "NOT_FINITE", r"latitude = nan"),
         (fix(latitude=91.0), "IMPLAUSIBLE_FIX", r"latitude = 91: latitude is in degrees"),
         (fix(longitude=181.0), "IMPLAUSIBLE_FIX", r"longitude = 181: "),

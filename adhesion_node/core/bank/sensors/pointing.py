@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""An accelerometer that a braking shows to lie: it is turned round, or dead."""
+"""An accelerometer that lies: a braking shows that it is turned round, or dead, and positions that it is askew."""
 
 from __future__ import annotations
 
@@ -20,6 +20,10 @@ and once it is seen not to be."""
 STILL_S, LEAST_STILL_S, WATCHED_S, STILLER = 2.0, 0.3, 5.0, 3.0
 """No accelerometer shows the same to the bit for so long under the brake. One that was watched for so long before the
 brake, and whose noise made it differ, does not for more than this, and so many times what it did then."""
+
+ASKEW_MPS2, ASKEW_SIGMA = 0.7, 3.0
+"""What an accelerometer that was mounted by eye shows too much at most, 4 degrees, and standard deviations by which it
+surely shows more: its gravity is on the wrong axis, or in another unit."""
 
 
 class Pointing(NamedTuple):
@@ -41,12 +45,24 @@ class Pointing(NamedTuple):
     """... of so long a time."""
     bias_mps2: float = 0.0
     """What it is known to show too much, from before the brake."""
+    askew: bool = False
+    """Whether that is, or was, too much for one that points along the track."""
+
+    @property
+    def lies(self) -> bool:
+        """Whether it is to be left out."""
+        return self.askew or self.forward is False
+
+    def biased(self, bias_mps2: float, std_mps2: float) -> Pointing:
+        """Note what it is known to show too much by now."""
+        return self._replace(askew=self.askew or abs(bias_mps2) - ASKEW_SIGMA * std_mps2 > ASKEW_MPS2)
 
     def resting(self, shown_mps2: float, elapsed_s: float, bias_mps2: float) -> Pointing:
         """Note what it shows while no brake is applied, and how much of that is too much."""
         rested_s = self.rested_s + elapsed_s if shown_mps2 == self.shown_mps2 else 0.0
         longest_s, watched_s = max(self.longest_s, rested_s), self.watched_s + elapsed_s
-        return Pointing(self.mean_mps2, self.forward, shown_mps2, 0.0, rested_s, longest_s, watched_s, bias_mps2)
+        before = self.mean_mps2, self.forward
+        return Pointing(*before, shown_mps2, 0.0, rested_s, longest_s, watched_s, bias_mps2, self.askew)
 
     @property
     def repeats(self) -> bool:
