@@ -38,7 +38,7 @@ from adhesion_node.tools.log.cell.numbers import END_OF_STAMPS_NS
 from adhesion_node.tools.log.format import OPTIONAL, Format
 from adhesion_node.tools.log.odd.checks import odd
 from adhesion_node.tools.log.text import Refusal
-from adhesion_node.tools.log.whole import read_log
+from adhesion_node.tools.log.whole.read import read_log
 from adhesion_node.wire.files import parameters
 from adhesion_node.wire.settings.given import parse_setting
 from adhesion_node.wire.settings.nodes import SETTINGS
