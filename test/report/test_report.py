@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
+from slowing import FREE, START_NS, TRUTH, S, read, record, rows
 from std_msgs.msg import Float64
 from test_offline import samples, write_run
-from test_picture import FREE, START_NS, TRUTH, S, read, record, rows
 
 from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core import Config
