@@ -33,7 +33,7 @@ from adhesion_node.report.read.recorded import read_run
 from adhesion_node.study.__main__ import main as study
 from adhesion_node.study.intervention.figure import draw_changing
 from adhesion_node.study.trial.figures import Place
-from adhesion_node.tools.brakings import main as brakings
+from adhesion_node.tools.brakings.__main__ import main as brakings
 from adhesion_node.tools.demo import main as demo
 from sim_node.real import known
 from sim_node.real.plant.scenarios import SCENARIOS
