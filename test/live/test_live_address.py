@@ -19,7 +19,7 @@ from rclpy.context import Context
 
 from adhesion_node.live.__main__ import main
 from adhesion_node.live.node import Live
-from adhesion_node.tools import demo
+from adhesion_node.tools.demo import __main__ as demo
 
 pytest.importorskip("aiohttp", reason="the extra `live` is not installed")
 
