@@ -23,7 +23,8 @@ from adhesion_node.core.atp.supervision import read
 from adhesion_node.core.physics.braking import BrakingCurve, curve
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.live.feed import Feed
-from adhesion_node.live.view import EXPECTED, View
+from adhesion_node.live.inputs import EXPECTED
+from adhesion_node.live.view import View
 from adhesion_node.report.ahead import ahead
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, STATE
 
