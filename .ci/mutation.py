@@ -54,7 +54,7 @@ TESTS = {
     False: [
         *("--doctest-modules", "adhesion_node/core", "test/core"),
         *("--ignore-glob=*/test_trains.py", "--ignore-glob=*/test_faults_simulated.py"),  # of the simulator, and slow
-        *("test/run/test_pipeline.py", "test/run/test_frames.py"),
+        *("test/run/test_pipeline.py", "test/run/test_digest.py", "test/run/test_frames.py"),
         *("test/run/results/test_seen.py", "test/run/results/test_results.py", "test/run/results/test_score.py"),
     ],
     True: [

@@ -33,8 +33,8 @@ from adhesion_node.report.read.recorded import read_run
 from adhesion_node.study.__main__ import main as study
 from adhesion_node.study.intervention.figure import draw_changing
 from adhesion_node.study.trial.figures import Place
-from adhesion_node.tools.brakings import main as brakings
-from adhesion_node.tools.demo import main as demo
+from adhesion_node.tools.brakings.__main__ import main as brakings
+from adhesion_node.tools.demo.__main__ import main as demo
 from sim_node.real import known
 from sim_node.real.plant.scenarios import SCENARIOS
 from sim_node.real.sensors.fitted import FITTED
@@ -55,7 +55,7 @@ FLEET = {"patches": "2026-11-09", "leaves": "2026-11-10", "patch_fall": "2026-11
 """Scenarios, and the days that they are shown as."""
 
 DEMO = (
-    "from adhesion_node.tools.demo import main; "
+    "from adhesion_node.tools.demo.__main__ import main; "
     "raise SystemExit(main(['--live', '--scenario', 'approach', '--port', '{}', '--output', r'{}']))"
 )
 

@@ -21,7 +21,7 @@ from ..core.belief.gaussian import Gaussian
 from ..core.belief.window import Window
 from ..core.config import Config
 from ..core.intake.samples import PositionSample, PressureSample
-from ..core.methods.kernels import filtering
+from ..core.methods.kernels import expecting, maximising
 from ..core.methods.kernels.filtering import Particles
 from ..core.methods.particle_em.particles import given
 from ..core.physics.adhesion import WET
@@ -61,8 +61,8 @@ def maximised(scene: Scene, states: Array, marginal: Array, mu: float) -> float:
     states, window = np.ascontiguousarray(states), scene.window
     stepped = scene.motion.advance(states[0, :-1], states[1, :-1], window.dt_s[:, None], window.brake[:, None], mu)
     particles = Particles(states, np.array(stepped), np.zeros(marginal.shape))
-    statistics = filtering.reduced(given(*scene), mu, particles, np.ascontiguousarray(marginal))
-    return filtering.maximised(statistics, 0.0)[0]
+    statistics = expecting.reduced(given(*scene), mu, particles, np.ascontiguousarray(marginal))
+    return maximising.maximised(statistics, 0.0)[0]
 
 
 def braking_window(steps: int, rng: np.random.Generator) -> Scene:

@@ -11,7 +11,6 @@
 The parts are replaced as a whole and never changed in place, so that another thread may read them at any time.
 """
 
-from collections import deque
 from collections.abc import Mapping
 from itertools import islice
 from typing import Any, NamedTuple
@@ -25,21 +24,7 @@ from ..report.found.regimes import IN_WORDS
 from ..web.creep import creep_part
 from ..web.fit import number, numbers, rounded
 from ..wire.topic import Topic
-from ..wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE
-
-EXPECTED = {
-    POSITION: "position",
-    BRAKE_PRESSURE: "brake pressure",
-    SPEED: "odometer (optional)",
-    STATE: "estimator",
-    MU: "adhesion",
-    BRAKING_CURVE: "braking curve",
-    ATP_STATUS: "ATP monitor",
-}
-"""The inputs whose health is shown, in words."""
-
-RATE_OVER_S = 3.0
-"""Time over which the rate of an input is counted."""
+from .inputs import Inputs
 
 MOST_POINTS, MOST_EVENTS = 600, 60
 """Rows of a history, and of the events."""
@@ -73,9 +58,7 @@ class View:
     """Takes what the messages say and gives it out by parts, ready for JSON. Mutable."""
 
     def __init__(self) -> None:
-        self._arrivals: dict[Topic, deque[float]] = {topic: deque() for topic in EXPECTED}
-        self._refusals: dict[Topic, str] = {}
-        self._taken: dict[str, float | None] = {}  # when the last message was taken of topics now refused
+        self._inputs = Inputs()
         self._ended_s: float | None = None
         self._start_ns = self._newest_ns = self._run = 0
         self._mu: dict[str, float] = {}
@@ -94,30 +77,18 @@ class View:
             "run": self._run,
             "sign": self._sign,
             "now": round(now_s, 2),
-            "inputs": {topic.name: self._health(topic, now_s) for topic in EXPECTED},
-            "heard": {name: round(at_s, 2) for name, at_s in self.last_heard().items()},
-            "taken": self._taken,
+            **self._inputs.parts(now_s),
             "ended": self._ended_s is not None,
         }
 
     def last_heard(self) -> dict[str, float]:
         """When the last message of each expected topic came, by its name; of none that is silent from the start."""
-        return {topic.name: at[-1] for topic in EXPECTED if (at := tuple(self._arrivals[topic]))}
+        return self._inputs.last_heard()
 
     def heard(self, topic: Topic, now_s: float, refusal: str = "") -> None:
         """A message of a topic has come; `refusal` says why it cannot be shown."""
-        arrivals = self._arrivals.setdefault(topic, deque())
-        arrivals.append(now_s)
-        while arrivals[0] < now_s - RATE_OVER_S:
-            arrivals.popleft()
-        if refusal and not self._refusals.get(topic):
+        if self._inputs.heard(topic, now_s, refusal):
             self._event("fault", f"{topic.name} refused: {text_of(refusal)}")
-        self._refusals[topic] = text_of(refusal)
-        if not refusal:
-            self._taken = {name: at_s for name, at_s in self._taken.items() if name != topic.name}
-        elif topic.name not in self._taken:
-            before_s = round(arrivals[-2], 2) if len(arrivals) > 1 else None
-            self._taken = {**self._taken, topic.name: before_s}
 
     def place(self, position_m: float) -> None:
         """A measured position."""
@@ -237,10 +208,3 @@ class View:
         history = self._parts[name]
         if row[key] is not None and (not history.rows or abs(row[key] - history.rows[-1][key]) >= spacing):
             self._parts[name] = history.with_row(row, MOST_POINTS)
-
-    def _health(self, topic: Topic, now_s: float) -> dict[str, Any]:
-        arrivals, refusal = tuple(self._arrivals[topic]), self._refusals.get(topic, "")
-        state = "never" if not arrivals else "refused" if refusal else "heard"
-        # A message of 3 s ago has only left the window when the next one comes.
-        recent = sum(arrival > now_s - RATE_OVER_S for arrival in arrivals)
-        return {"name": EXPECTED[topic], "state": state, "hz": round(recent / RATE_OVER_S, 1), "why": refusal}

@@ -25,7 +25,7 @@ from .log.odd.checks import odd
 from .log.options import add_options, format_of
 from .log.text import BLOCK
 from .log.told import Refused, ranges, read_as, units_read
-from .log.whole import Log, read_log
+from .log.whole.read import Log, read_log
 
 EXAMPLES = (
     "import_csv log.csv --dry-run",

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import Any
 
 import pytest
-from test_live_view import STATUS
+from told_view import STATUS
 
 from adhesion_node.live.view import View
 from adhesion_node.wire.topic import Topic

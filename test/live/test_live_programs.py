@@ -73,7 +73,7 @@ def test_ctrl_c_ends_the_page_while_it_is_watched() -> None:
 
 DEMO = """
 from dataclasses import replace
-from adhesion_node.tools import demo
+from adhesion_node.tools.demo import __main__ as demo
 from adhesion_node.core.physics.track import LEVEL
 from sim_node.train import scenario
 from sim_node.train.scenario import SCENARIOS, Brake

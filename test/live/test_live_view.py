@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""What the live page is told: units, health of the inputs, histories, a new run; all of it fit for JSON."""
+"""What the live page is told: units, health of the inputs, limits; all of it fit for JSON."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from told_view import STATUS, S, estimate
 
 from adhesion_node.core.atp.config import SupervisionConfig
 from adhesion_node.core.atp.received import StampedCurve, TrainState
@@ -22,28 +23,10 @@ from adhesion_node.core.atp.supervision import read
 from adhesion_node.core.physics.braking import BrakingCurve, curve
 from adhesion_node.core.physics.train import CRH3
 from adhesion_node.live.feed import Feed
-from adhesion_node.live.view import EXPECTED, MOST_POINTS, View
+from adhesion_node.live.inputs import EXPECTED
+from adhesion_node.live.view import View
 from adhesion_node.report.ahead import ahead
-from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, BRAKING_CURVE, MU, POSITION, SPEED, STATE
-
-S = 10**9
-STATUS = {
-    "level": "OVERSPEED",
-    "target_position_m": "6000.000",
-    "target_speed_mps": "27.778",
-    "distance_to_target_m": "3500.000",
-    "margin_m": "369.000",
-    **{f"{name}_mps": str(value) for name, value in (("permitted", 50), ("warning", 51), ("sbi", 52), ("ebi", 54))},
-    "indication_mps": "nan",
-}
-
-
-def estimate(view: View, second: int, mu: float = 0.08, regime: str = "ADHESION_LIMITED") -> None:
-    """What the estimator says each second, in its order."""
-    view.adhesion("mu", mu)
-    view.adhesion("mu_lower", mu - 0.005)
-    view.train(TrainState(1000 * S + second * S, 80.0 * second, 80.0))
-    view.estimated({"regime": regime, "accepted": "9", "dropped.LATE": "2", "confidence": "0.95"}, "all is well")
+from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION, SPEED, STATE
 
 
 def health(view: View, now_s: float) -> dict[str, dict[str, Any]]:
@@ -118,57 +101,6 @@ def test_the_health_of_an_input() -> None:
     assert health(view, 10.0)[SPEED.name]["state"] == "never"
 
 
-def test_stamps_that_go_back_begin_a_new_run() -> None:
-    view = View()
-    for second in (0, 1, 2):
-        estimate(view, second)
-    view.supervised(STATUS, "brake")
-    estimate(view, 0)  # a recording that is played again
-    assert [row["t"] for row in view.parts(0.0)["history"].rows] == [0.0]
-    assert view.parts(0.0)["passed"].rows == ()
-
-
-def test_histories_are_bounded() -> None:
-    view = View()
-    for second in range(MOST_POINTS + 5):
-        estimate(view, second)
-        view.supervised(STATUS | {"distance_to_target_m": str(6000.0 - 80.0 * second)}, "brake")
-    parts = view.parts(0.0)
-    assert (len(parts["history"].rows), parts["history"].rows[-1]["t"]) == (MOST_POINTS, MOST_POINTS + 4.0)
-    assert len(parts["passed"].rows) == MOST_POINTS
-    assert (parts["history"].gone, len(parts["events"].rows)) == (5, 2)
-
-
-def test_a_quick_estimator_fills_a_history_no_faster() -> None:
-    view = View()
-    for tenth in range(31):
-        view.adhesion("mu", 0.08)
-        view.adhesion("mu_lower", 0.07)
-        view.train(TrainState(S + tenth * S // 10, 5.0 * tenth, 50.0))
-        view.supervised(STATUS | {"distance_to_target_m": str(6000.0 - 5.0 * tenth)}, "brake")
-        view.estimated({"regime": "COASTING"}, "")
-    assert [row["t"] for row in view.parts(0.0)["history"].rows] == [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
-    assert [row["position"] for row in view.parts(0.0)["passed"].rows] == [20.0 * k for k in range(8)]
-
-
-def test_what_was_given_out_does_not_change() -> None:
-    view = View()
-    estimate(view, 0)
-    before = view.parts(0.0)
-    text = repr(before)
-    estimate(view, 1, mu=0.1)
-    assert repr(before) == text
-
-
-def test_at_the_end_the_ages_stand_still() -> None:
-    view = View()
-    view.heard(POSITION, 10.0)
-    view.end(10.5)
-    parts = view.parts(60.0)
-    assert parts["ended"] is True
-    assert (parts["now"], parts["heard"]) == (10.5, {"position": 10.0})
-
-
 def test_what_is_refused_is_no_news_of_what_is_shown() -> None:
     view = View()
     view.heard(STATE, 1.0)
@@ -190,29 +122,6 @@ def test_what_is_withheld_is_not_shown_with_the_numbers_of_before() -> None:
     assert [row.get("mu") for row in parts["history"].rows] == [0.08, None]
 
 
-def test_events_are_told_once_each() -> None:
-    view = View()
-    for second, (regime, changes, resets) in enumerate(
-        [("COASTING", 0, 0), ("BRAKE_LIMITED", 0, 0), ("BRAKE_LIMITED", 1, 1)]
-    ):
-        view.train(TrainState(1000 * S + second * S, 80.0 * second, 80.0))
-        view.estimated({"regime": regime, "changes": str(changes), "resets": str(resets)}, "well")
-    for _ in range(3):
-        view.heard(SPEED, 1.0, "speed = nan")
-        view.supervised(STATUS, "brake")
-    view.supervised(STATUS | {"level": "EMERGENCY_BRAKE"}, "brake")
-    told = [(row["t"], row["kind"], row["text"]) for row in view.parts(0.0)["events"].rows]
-    assert told == [
-        (0.0, "regime", "nothing is claimed"),
-        (1.0, "regime", "the brake limits"),
-        (2.0, "change", "the rail has changed"),
-        (2.0, "reset", "the estimator began anew"),
-        (2.0, "fault", "speed refused: speed = nan"),
-        (2.0, "level", "OVERSPEED"),
-        (2.0, "intervention", "EMERGENCY BRAKE"),
-    ]
-
-
 @pytest.mark.parametrize("wild", ["1e308", "-1e308", "nan", "inf", "x" * 1_000_000])
 def test_no_value_spoils_what_is_sent(wild: str) -> None:
     view = View()
@@ -227,43 +136,6 @@ def test_no_value_spoils_what_is_sent(wild: str) -> None:
     sent = whole(view)
     assert len(sent) < 10_000
     assert json.loads(sent)["all"]["supervision"]["ebi"] is None
-
-
-def viewers_parts(messages: list[str]) -> dict[str, Any]:
-    """What the messages add up to."""
-    parts: dict[str, Any] = {}
-    for message in map(json.loads, messages):
-        parts |= message.get("all", {}) | message.get("set", {}) | {"now": message["now"]}
-        parts |= {name: parts[name] | entries for name, entries in message.get("change", {}).items()}
-        parts |= {name: (parts[name] + rows)[-MOST_POINTS:] for name, rows in message.get("add", {}).items()}
-    return parts
-
-
-def test_the_news_add_up_to_the_whole_and_are_short() -> None:
-    """Twenty minutes at 10 Hz with 2 estimates a second; before, the whole history went with every one of them."""
-    view, clock, lengths = View(), [0.0], []
-    feed = Feed(lambda: view.parts(clock[0]))
-    messages = [feed.whole()]
-    braking = curve(CRH3, 60.0, 0.07)
-    for tick in range(12_000):
-        clock[0] = 0.1 * tick
-        for topic in (POSITION, BRAKE_PRESSURE, SPEED):
-            view.heard(topic, clock[0])
-        view.place(8.0 * tick)
-        if tick % 5 == 0:
-            view.adhesion("true_mu", 0.09)
-            for topic in (MU, STATE, BRAKING_CURVE, ATP_STATUS):
-                view.heard(topic, clock[0])
-            for name in ("safe", "nominal"):
-                view.curve(name, StampedCurve(0, 8.0 * tick, braking))
-            estimate(view, tick // 5, mu=0.07 + 1e-5 * (tick % 1000))
-            view.supervised(STATUS | {"distance_to_target_m": f"{1e5 - 8.0 * tick:.3f}"}, "brake")
-        messages.append(feed.news())
-        lengths.append(len(messages[-1]))
-    clock[0] += 1.0
-    messages.append(feed.news())
-    assert viewers_parts(messages) == json.loads(Feed(lambda: view.parts(clock[0])).whole())["all"]
-    assert sum(lengths[-600:]) / 60.0 < 5000.0, "bytes a second"
 
 
 def test_the_limits_ahead_are_those_of_the_monitor() -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import pytest
 from pages import line, server
-from test_live_view import S, estimate
+from told_view import S, estimate
 
 from adhesion_node.core.atp.received import TrainState
 from adhesion_node.live.view import View

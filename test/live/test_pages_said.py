@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import pytest
 from pages import line
-from test_live_view import S, estimate
+from told_view import S, estimate
 
 from adhesion_node.core.atp.config import SupervisionConfig
 from adhesion_node.core.atp.received import StampedCurve, TrainState

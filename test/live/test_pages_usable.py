@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import pytest
 from pages import browser, line
-from test_live_view import estimate
+from told_view import estimate
 
 pytestmark = pytest.mark.usefixtures("chromium")
 

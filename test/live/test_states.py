@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import pytest
 import seen
 from pages import Line, browser, line
-from test_live_view import S, estimate
+from told_view import S, estimate
 
 from adhesion_node.core.atp.received import StampedCurve, TrainState
 from adhesion_node.core.physics.braking import curve

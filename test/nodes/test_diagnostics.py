@@ -10,39 +10,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import messages
 import pytest
 import rclpy
-from conftest import SpinUntil
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
-from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
-from rclpy.parameter import Parameter
-from recorded import write_steps
 from std_msgs.msg import String
+from told_line import Line, S, beside, make_line
 
-from adhesion_node.bag import BagReader, select
 from adhesion_node.live.node import Live
 from adhesion_node.nodes.atp_monitor import AtpMonitor
 from adhesion_node.nodes.creep_estimator import CreepEstimator
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.nodes.player import Replay
 from adhesion_node.nodes.recorder import Recorder
-from adhesion_node.nodes.ros import qos
 from adhesion_node.wire import topics
 from adhesion_node.wire.messages.parts import stamp_ns
 from adhesion_node.wire.topic import Topic
 from sim_node.nodes.simulator import Simulator
 from sim_node.nodes.slip_simulator import SlipSimulator
 
-S = 10**9
+__all__ = ["beside", "make_line"]
+
 NODES: dict[str, Callable[..., Node]] = {
     "estimator/adhesion": Estimator,
     "creep_estimator/peak": CreepEstimator,
@@ -53,73 +47,6 @@ NODES: dict[str, Callable[..., Node]] = {
     "simulator/run": Simulator,
     "slip_simulator/run": SlipSimulator,
 }
-
-
-class Line:
-    """A node, what it says, and a driver that publishes to it."""
-
-    def __init__(
-        self, executor: SingleThreadedExecutor, spin_until: SpinUntil, make: Callable[..., Node], **given: Any
-    ) -> None:
-        context, namespace = executor.context, given.pop("namespace", None)
-        overrides = [Parameter(name, value=value) for name, value in given.items()]
-        self.executor, self.spin_until = executor, spin_until
-        self.node: Any = make(context=context, namespace=namespace, parameter_overrides=overrides)
-        self.driver = Node("driver", context=context, namespace=namespace)
-        self.told: list[DiagnosticArray] = []
-        qos.subscribe(self.driver, topics.DIAGNOSTICS, self.told.append)
-        for node in (self.node, self.driver):
-            executor.add_node(node)
-        own = sum(end.topic_name == topics.DIAGNOSTICS.name for end in self.node.subscriptions)
-        spin_until(executor, lambda: self.node.count_subscribers(topics.DIAGNOSTICS.name) == 1 + own)
-
-    def outlet(self, topic: Topic) -> Any:
-        output = qos.advertise(self.driver, topic)
-        self.spin_until(self.executor, output.get_subscription_count)
-        return output
-
-    def wait(self, done: Callable[[], object], timeout_s: float = 10.0) -> None:
-        self.spin_until(self.executor, done, timeout_s)
-
-    def wait_until_said(self, words: str) -> None:
-        """Wait for a message with these words that is said from now on."""
-        self.told.clear()
-        self.wait(lambda: any(words in array.status[0].message for array in self.told))
-
-    def wait_for_values(self, **wanted: str) -> None:
-        """Wait for these values among those that are told."""
-        self.wait(lambda: self.told and wanted.items() <= self.values.items())
-
-    @property
-    def values(self) -> dict[str, str]:
-        return {pair.key: pair.value for pair in self.last.values}
-
-    @property
-    def last(self) -> DiagnosticStatus:
-        (status,) = self.told[-1].status
-        return status
-
-
-@pytest.fixture
-def make_line(executor: SingleThreadedExecutor, spin_until: SpinUntil) -> Callable[..., Line]:
-    return lambda make, **given: Line(executor, spin_until, make, **given)
-
-
-@pytest.fixture
-def beside(tmp_path: Path) -> Iterator[dict[Any, Callable[..., Node]]]:
-    """The nodes that take more than parameters, with it; closed at the end. The player has 40 steps."""
-    write_steps(tmp_path / "played", 40)
-    with ExitStack() as stack:
-        reader = stack.enter_context(BagReader(tmp_path / "played"))
-
-        def closed(make: Callable[..., Any], *given: Any, **others: Any) -> Any:
-            return stack.enter_context(closing(make(*given, **others)))
-
-        yield {
-            Recorder: partial(closed, Recorder, tmp_path / "bag"),
-            Replay: partial(Replay, reader, select(reader.topics), 0.0, 0),
-            Live: partial(closed, Live, "127.0.0.1", 0),
-        }
 
 
 @pytest.mark.parametrize("use_sim_time", [False, True], ids=["system time", "no /clock"])
@@ -240,77 +167,3 @@ def test_resets_again_and_again_are_told(make_line: Callable[..., Line]) -> None
     assert "resets so far" not in line.last.message
     play(400)
     line.wait_until_said("2 resets so far, 2 of them within 60 s: stamps or positions jump")
-
-
-def test_the_recorder_tells_what_it_has_written(
-    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]], tmp_path: Path
-) -> None:
-    line = make_line(beside[Recorder], diagnostics_period_s=0.1)
-    line.outlet(topics.MU).publish(messages.mu_message(0.08))
-    line.wait(lambda: line.node.counts.get("/adhesion/mu") == 1)
-    line.wait(lambda: line.told and int(line.values["written"]) > 0)
-    assert int(line.values["bytes"]) > 0
-    assert line.last.level == DiagnosticStatus.OK
-    assert Path(line.values["file"]).parent == tmp_path / "bag"
-    assert Path(line.values["file"]).exists()
-    assert 0 < int(line.values["written"]) <= sum(line.node.counts.values())
-    assert line.values["dropped"] == "0"
-
-
-def test_the_recorder_tells_that_there_is_no_clock(
-    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
-) -> None:
-    line = make_line(beside[Recorder], diagnostics_period_s=0.1, use_sim_time=True)
-    line.wait_until_said("no /clock yet")
-    assert line.last.level == DiagnosticStatus.WARN
-    line.outlet(topics.CLOCK).publish(messages.clock(1000 * S))
-    line.wait(lambda: line.last.level == DiagnosticStatus.OK)
-
-
-def test_the_player_tells_how_much_is_left(
-    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
-) -> None:
-    line = make_line(beside[Replay], diagnostics_period_s=0.1)
-    line.wait_until_said("the end of the recording")
-    assert (line.values["published"], line.values["left"], line.values["next_ns"]) == ("80", "0", "none")
-
-
-def test_a_player_that_waits_tells_for_whom(make_line: Callable[..., Line], tmp_path: Path) -> None:
-    write_steps(tmp_path / "bag", 3)
-    with BagReader(tmp_path / "bag") as reader:
-        line = make_line(partial(Replay, reader, select(reader.topics)), diagnostics_period_s=0.1)
-        line.wait_until_said("waiting for 1 subscriber(s) to /position")
-    assert (line.values["published"], line.values["left"]) == ("0", "6")
-
-
-def test_the_page_tells_who_looks_and_how_old_is_what_it_shows(
-    make_line: Callable[..., Line], beside: dict[Any, Callable[..., Node]]
-) -> None:
-    line = make_line(beside[Live], diagnostics_period_s=0.1)
-    line.wait_for_values(viewers="0")
-    assert line.last.message == f"open {line.node.server.url}"
-    assert "age_s.adhesion/mu" not in line.values
-    line.outlet(topics.MU).publish(messages.mu_message(0.08))
-    line.wait(lambda: "age_s.adhesion/mu" in line.values)
-    assert 0.0 <= float(line.values["age_s.adhesion/mu"]) < 10.0
-
-
-@pytest.mark.parametrize(
-    ("fault", "begins_s", "active"), [("loss", 0.0, True), ("loss", 1e5, False), ("mass", 0.0, True)]
-)
-def test_the_simulator_tells_its_fault(
-    make_line: Callable[..., Line], fault: str, begins_s: float, active: bool
-) -> None:
-    line = make_line(Simulator, diagnostics_period_s=0.1, fault=fault, fault_start_s=begins_s)
-    line.wait(lambda: line.told and int(line.values["samples"]) > 1)
-    assert line.last.level == (DiagnosticStatus.WARN if active else DiagnosticStatus.OK)
-    assert (f"fault {fault}" in line.last.message) is active
-    assert (line.values["fault"], line.values["fault_active"]) == (fault, str(active).lower())
-    assert line.values["scenario"] == "tunnel_entry"
-    assert float(line.values["simulated_s"]) > 1000.0
-
-
-def test_a_simulator_that_waits_tells_for_whom(make_line: Callable[..., Line]) -> None:
-    line = make_line(SlipSimulator, diagnostics_period_s=0.1, wait_for=1)
-    line.wait_until_said("waiting for 1 subscriber(s) to wheel_speed")
-    assert line.values["samples"] == "0"

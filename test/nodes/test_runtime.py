@@ -10,118 +10,24 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
-import subprocess
-import sys
-from collections.abc import Callable
-from pathlib import Path
 from typing import IO
 
 import pytest
-from conftest import PATIENCE_S, SpinUntil
+from conftest import SpinUntil
 from rclpy.context import Context
 from rclpy.duration import Duration
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
+from runnable import Start, end, start, wait_for
 from std_msgs.msg import Float64
 
-from adhesion_node.command.options import BAD_INPUT, DONE, FAILED
+from adhesion_node.command.options import DONE, FAILED
 from adhesion_node.command.signals import stop_on_signals
 from adhesion_node.nodes.ros import runtime
-from adhesion_node.wire.files.parameters import sections, unheeded
 
-PROGRAM = """
-import gc, os, sys
-from rclpy.node import Node
-from std_msgs.msg import Float64
-from adhesion_node.nodes.ros import runtime
-from adhesion_node.core.setting import Setting
-from adhesion_node.nodes.ros.params import declare
-
-SPECS = (Setting("gain", 0.5, "a gain", "dB", 0.0, 1.0),)
-
-def say(word):
-    print(word, flush=True)
-    if os.environ.get("WAIT_AT") == word:  # the test sends its signals meanwhile
-        sys.stdin.readline()
-
-class Probe(Node):
-    '''A node that says what it does.'''
-
-    def __init__(self):
-        say("starting")
-        super().__init__("probe", automatically_declare_parameters_from_overrides=True)
-        self.values = declare(self, SPECS)
-        self.words = self.create_publisher(Float64, "last_word", 100)
-        self.create_timer(0.001, self.tick)
-        self.heard = []
-        self.create_subscription(Float64, "first_word", lambda message: self.heard.append(message.data), 1000)
-        self.task = os.environ.get("TASK", "")
-
-    def tick(self):
-        if not hasattr(self, "spun"):
-            self.spun = True
-            say("spinning")
-        if self.task == "fill the disk":
-            raise OSError(28, "No space left on device")
-        if self.task == "collect":
-            say(f"of {gc.get_freeze_count()} objects {len(gc.get_objects())} are looked through")
-            self.task = ""
-        if self.task == "finish":
-            self.finished = True
-        if self.task == "stumble":  # the messages of the test queue up behind this
-            say("stumbling")
-            sys.stdin.readline()
-            self.task = ""
-        if self.task == "call":
-            self.words.publish(Float64(data=-1.0))
-
-    def close(self):
-        say("closing")
-        say(f"heard {len(self.heard)}")
-        for number in range(50):
-            self.words.publish(Float64(data=float(number)))
-
-sys.exit(runtime.run("probe", Probe, parameters=SPECS))
-"""
-
-Program = subprocess.Popen[str]
-Start = Callable[..., Program]
-
-
-@pytest.fixture
-def start(started: list[Program]) -> Start:
-    """Return a function that starts the program; whatever still runs after the test is killed."""
-
-    def _start(*args: str, **environment: str) -> Program:
-        program = subprocess.Popen(
-            [sys.executable, "-c", PROGRAM, *args],
-            env=os.environ | environment,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        started.append(program)
-        return program
-
-    return _start
-
-
-def wait_for(program: Program, word: str) -> None:
-    stdout: IO[str] = program.stdout or pytest.fail("no pipe")
-    for line in stdout:
-        if line.strip() == word:
-            return
-    pytest.fail(f"the program ended before it said {word}: {program.communicate()[1]}")
-
-
-def end(program: Program) -> tuple[int, list[str]]:
-    """Wait for the end; return the exit code and what it complained about, log lines aside."""
-    _, errors = program.communicate("go on\n" if program.poll() is None else None, timeout=PATIENCE_S)
-    return program.returncode, [line for line in errors.splitlines() if not line.startswith("[INFO]")]
+__all__ = ["start"]
 
 
 BURSTS = [
@@ -207,76 +113,8 @@ def test_the_last_messages_arrive(
     assert end(program) == (0, [])
 
 
-def test_an_integer_for_a_float_is_accepted(start: Start) -> None:
-    program = start("--ros-args", "-p", "gain:=0", TASK="finish")
-    assert end(program) == (0, [])
-
-
-@pytest.mark.parametrize(
-    ("args", "message"),
-    [
-        (("-p", "gain:=7"), "gain = 7: give a value from 0 to 1 dB"),
-        (("-p", "gain:=loud"), "gain = 'loud': give a value of type float (a value from 0 to 1 dB)"),
-        (("-p", "use_sim_time:=1"), "use_sim_time = 1: give a value of type bool (true or false)"),
-        (("--params-file", "/nowhere.yaml"), "/nowhere.yaml"),
-        (("-p", "gain"), "gain"),
-        (("-r", "__node:=a b"), "a b"),
-    ],
-)
-def test_bad_ros_arguments_are_one_line_and_code_2(start: Start, args: tuple[str, ...], message: str) -> None:
-    code, errors = end(start("--ros-args", *args))
-    assert code == BAD_INPUT
-    (complaint,) = [line for line in errors if not line.startswith("[ERROR]")]  # rcl logs some of them itself
-    assert complaint.startswith("probe: ")
-    assert message in complaint
-
-
-@pytest.mark.parametrize(
-    ("section", "told"), [("prob", True), ("probe", False), ("/**", False), ("/other/probe", True)]
-)
-def test_a_parameter_file_for_another_node_is_told(start: Start, tmp_path: Path, section: str, told: bool) -> None:
-    file = tmp_path / "parameters.yaml"
-    file.write_text(f"{section}:\n  ros__parameters:\n    gain: 0.25\n")
-    program = start("--ros-args", "--params-file", str(file), TASK="finish")
-    _, errors = program.communicate(timeout=PATIENCE_S)
-    assert program.returncode == 0
-    assert (f"has sections for {section.strip('/')}, none for /probe: name one 'probe' or '/**'" in errors) == told
-    assert ("gain = 0.25" in errors) != told
-
-
-def test_nested_namespaces_are_sections_too(tmp_path: Path) -> None:
-    file = tmp_path / "parameters.yaml"
-    file.write_text("train1:\n  probe: {ros__parameters: {gain: 1.0}}\n  other: {ros__parameters: {}}\n")
-    assert [one.name for one in sections(str(file))] == ["train1/probe", "train1/other"]
-    assert unheeded(["--params-file", str(file)], "/train1/probe") == []
-    (warning,) = unheeded(["-p", "a:=1", "--params-file", str(file)], "/train2/probe")
-    assert "has sections for train1/probe, train1/other, none for /train2/probe" in warning
-
-
-def test_arguments_without_ros_args_are_refused(start: Start) -> None:
-    code, complaints = end(start("-p", "gain:=0"))
-    assert code == BAD_INPUT
-    assert "unrecognized arguments: -p gain:=0" in complaints[-1]
-    assert "--ros-args -p NAME:=VALUE" in complaints[0]
-
-
-def test_help_shows_the_parameters(start: Start) -> None:
-    program = start("--help")
-    shown, errors = program.communicate(timeout=PATIENCE_S)
-    assert (program.returncode, errors) == (0, "")
-    assert "A node that says what it does." in shown
-    assert "gain (default: 0.5): a gain; a value from 0 to 1 dB" in shown
-
-
 def test_a_full_disk_is_one_line_and_code_1(start: Start) -> None:
     assert end(start(TASK="fill the disk")) == (FAILED, ["probe: input/output: No space left on device"])
-
-
-def test_own_and_ros_arguments_are_told_apart() -> None:
-    args = ["--output", "x", "--ros-args", "-p", "a:=1", "--", "--json", "-", "--ros-args", "-r", "a:=b"]
-    own, ros = runtime.split_ros_arguments(args)
-    assert own == ["--output", "x", "--json", "-"]
-    assert ros == ["--ros-args", "-p", "a:=1", "--", "--ros-args", "-r", "a:=b"]
 
 
 def test_without_a_signal_the_earlier_handlers_return() -> None:

@@ -24,7 +24,8 @@ from test_package import console_scripts
 MODULES = {"simulator": "sim_node.nodes.simulator", "slip_simulator": "sim_node.nodes.slip_simulator"}
 MODULES |= {name: f"adhesion_node.nodes.{name}" for name in ("estimator", "creep_estimator", "atp_monitor")}
 MODULES |= {name: f"adhesion_node.nodes.{name}" for name in ("recorder", "replay")}
-MODULES |= {name: f"adhesion_node.tools.{name}" for name in ("import_csv", "train", "brakings", "recover", "demo")}
+MODULES |= {name: f"adhesion_node.tools.{name}" for name in ("import_csv", "recover")}
+MODULES |= {name: f"adhesion_node.tools.{name}.__main__" for name in ("train", "brakings", "demo")}
 MODULES |= {name: f"adhesion_node.{name}.__main__" for name in ("live", "report", "study", "bench")}
 """Where the programs are behind their entries."""
 

@@ -32,7 +32,7 @@ class NoRos(MetaPathFinder):
 sys.meta_path.insert(0, NoRos())
 """
 
-SHARED = "import adhesion_node.report.__main__, adhesion_node.study.__main__, adhesion_node.tools.brakings"
+SHARED = "import adhesion_node.report.__main__, adhesion_node.study.__main__, adhesion_node.tools.brakings.__main__"
 """What needs no ROS, and most of what the others import."""
 
 ARGUMENTS = {"recorder": ["--output", "there"], "replay": [str(ROOT / "bags" / "tunnel_entry")]}

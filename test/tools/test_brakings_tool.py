@@ -22,7 +22,8 @@ from test_import_log import ride, text
 from test_offline import NO_TRUTH, samples, write_run
 
 from adhesion_node.run.results.rail_map import map_of
-from adhesion_node.tools import brakings, import_csv
+from adhesion_node.tools import import_csv
+from adhesion_node.tools.brakings import __main__ as brakings
 from adhesion_node.tools.log.format import Format
 
 

@@ -33,8 +33,9 @@ from adhesion_node.core.physics.adhesion import DRY, WET
 from adhesion_node.core.physics.track import LEVEL
 from adhesion_node.nodes import replay
 from adhesion_node.report import __main__ as report
-from adhesion_node.tools import demo, line, staged
-from adhesion_node.tools.line import executor_of_line
+from adhesion_node.tools.demo import __main__ as demo
+from adhesion_node.tools.demo import line, staged
+from adhesion_node.tools.demo.line import executor_of_line
 from adhesion_node.wire.topics import ATP_STATUS, BRAKE_PRESSURE, DIAGNOSTICS, POSITION, RESULTS, TRUTH_MU, TRUTH_STATE
 from sim_node.nodes import simulator
 from sim_node.real.plant.scenarios import SCENARIOS as REAL

@@ -110,7 +110,9 @@ def offers(tmp_path_factory: pytest.TempPathFactory) -> dict[str, set[str]]:
         )
         for line, answer in answers.items()
     ]
-    shared = "import adhesion_node.study.__main__, adhesion_node.tools.brakings, adhesion_node.tools.demo"
+    shared = (
+        "import adhesion_node.study.__main__, adhesion_node.tools.brakings.__main__, adhesion_node.tools.demo.__main__"
+    )
     assert [call.returncode for call in ended(calls, folder / "calls", shared)] == [0] * len(calls)
     return {line: {word.strip() for word in answer.read_text().splitlines()} for line, answer in answers.items()}
 

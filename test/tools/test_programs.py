@@ -23,7 +23,7 @@ from conftest import ROOT
 from test_package import console_scripts
 
 from adhesion_node import main
-from adhesion_node.tools import line
+from adhesion_node.tools.demo import line
 
 TOOLS = {"import_csv", "brakings", "recover", "demo", "report", "study", "bench", "train"}
 

@@ -20,7 +20,7 @@ import pytest
 from oracles import G
 
 from adhesion_node.bag import BagWriter
-from adhesion_node.tools import train
+from adhesion_node.tools.train import __main__ as train
 from adhesion_node.wire.files.train import SHIPPED, read_train
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 

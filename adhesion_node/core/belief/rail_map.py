@@ -22,10 +22,10 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr, ndtri
 
 from ..physics.adhesion import AdhesionLaw
 from ..physics.train import GRAVITY, Array
+from .either import LEAST_MU, either
 from .rail import Rail
 
 DAY_NS = 86_400_000_000_000
@@ -42,9 +42,6 @@ SHOWN = 0.5
 LEAST_M, BRAKES_MPS2, FAR = 200.0, 1.0, 4.0
 """The way that tells of the rail: that of this deceleration to a standstill, and at least so long. So many times as far
 it counts whether a stretch was seen."""
-
-MISSED, LEAST_MU, LEAST_STD, BISECTIONS = 0.05, 1e-3, 1e-3, 40
-"""What a bound misses; numbers that keep logarithms finite; steps to the bound."""
 
 
 class Piece(NamedTuple):
@@ -124,7 +121,7 @@ class RailMap:
         thin = float(near @ stretches.brakings) < THIN * reach_m
 
         def told(count: int) -> Rail:
-            one = _either(seen, rail, trust.probability * worth * count / (count + THIN))
+            one = either(seen, rail, trust.probability * worth * count / (count + THIN))
             if count >= THIN and not thin:
                 return one
             return Rail(min(one.mu, rail.mu), max(one.std, rail.std), min(one.lower, rail.lower))
@@ -208,28 +205,3 @@ def _joined(known: Sequence[tuple[Piece, float]], law: AdhesionLaw, speed_mps: f
     mean = float(np.average(mu, weights=weights))
     variance = float(np.average(std**2 + (mu - mean) ** 2, weights=weights))
     return Rail(mean, math.sqrt(variance), min(float(lower.min()), mean))
-
-
-def _either(seen: Rail, otherwise: Rail, probability: float) -> Rail:
-    """The one rail with a probability, else the other; each law is that of its mean and its bound of 95 %.
-
-    >>> nothing = Rail(0.06, 0.04, 0.02)
-    >>> [round(_either(Rail(0.10, 0.005, 0.09), nothing, p).lower, 4) for p in (0.0, 0.5, 0.9, 1.0)]
-    [0.02, 0.0255, 0.06, 0.09]
-    """
-    mean = otherwise.mu + probability * (seen.mu - otherwise.mu)
-    each = ((probability, seen), (1.0 - probability, otherwise))
-    variance = sum(share * (rail.std**2 + (rail.mu - mean) ** 2) for share, rail in each)
-    low, high = sorted(max(rail.lower, LEAST_MU) for _, rail in each)
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        below = sum(share * _share_below(rail, middle) for share, rail in each)
-        low, high = (middle, high) if below < MISSED else (low, middle)
-    return Rail(mean, math.sqrt(variance), min(low, mean))
-
-
-def _share_below(rail: Rail, mu: float) -> float:
-    """Probability that a rail gives less, its logarithm being Gaussian."""
-    lower = max(rail.lower, LEAST_MU)
-    std = max(math.log(max(rail.mu, lower) / lower) / -float(ndtri(MISSED)), LEAST_STD)
-    return float(ndtr(math.log(mu / max(rail.mu, lower)) / std))

@@ -19,7 +19,6 @@ from typing import Any
 import numpy as np
 
 from ...bag import BagReader
-from ...wire.line import NOMINAL, Line
 from ...wire.messages.results import Status
 from ...wire.topic import Topic
 from .messages import Sample, read_topics, with_key
@@ -134,13 +133,6 @@ class Texts:
         t_ns, texts = np.array(self._t_ns, dtype=np.int64), np.array(self._texts, dtype=object)
         order = np.argsort(t_ns, kind="stable")
         return Series(t_ns[order], texts[order])
-
-
-def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any] = _itself, line: Line = NOMINAL) -> Series:
-    """Take `value` of all that is read of a topic, by its stamp or log time. Empty when the recording lacks it."""
-    numbers = Numbers(value)
-    read_topics(reader, [(topic, numbers.take)], line)
-    return numbers.series
 
 
 def read_status(reader: BagReader, topic: Topic, key: str) -> Series:

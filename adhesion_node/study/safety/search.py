@@ -21,8 +21,10 @@ from ...core.atp.monitor import Event, Known, Now, Rules, Tick, step
 from ...core.atp.received import NS_PER_S
 from ...core.atp.supervision import Level
 from ...core.physics.train import Array
-from .case import EPOCH_NS, FREE_S, Case, Target, draw, estimated, told
+from .case import EPOCH_NS, FREE_S, Case, Target
+from .drawn import draw
 from .faults.table import FAULTS
+from .told import estimated, told
 from .truth import allowed
 
 GRID_S = 0.01

@@ -14,7 +14,7 @@ from typing import Any
 
 from ...command.checks import refuse
 from ...wire.line import ATMOSPHERE_PA
-from .cell.clock import has_dates
+from .cell.numbers import has_dates
 from .columns import Columns
 from .format import PRESSURES, Format, option
 

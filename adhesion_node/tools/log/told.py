@@ -17,7 +17,8 @@ import numpy as np
 from ...core.physics.train import KMH
 from .format import FAMILIES, LIMITS, PRESSURES, Format, option
 from .text import Refusal
-from .whole import Log, moment
+from .whole.clock import moment
+from .whole.read import Log
 
 SHOWN = 5
 """Lines for each reason why rows are refused."""

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Recordings that were killed, cut, damaged, split, or made by others: what is left is read, what is not is said."""
+"""Recordings that were killed, cut or damaged: what is left is read, what is not is said."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ import tracemalloc
 from pathlib import Path
 from typing import Any
 
-import cdrs
 import numpy as np
 import pytest
 from mcap.opcode import Opcode
@@ -26,12 +25,10 @@ from mcap.reader import make_reader
 from mcap.summary import Summary
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
-from recorded import S, write_steps
-from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from recorded import write_steps
 
-from adhesion_node.bag import BagReader, Record, typestore
+from adhesion_node.bag import BagReader
 from adhesion_node.bag.write.writer import file_name
-from adhesion_node.wire.topics import POSITION
 
 WRITER_THAT_IS_KILLED = """
 import sys
@@ -189,20 +186,6 @@ def test_a_chunk_that_is_too_long_is_left_out_before_it_is_made(
         tracemalloc.stop()
 
 
-INFINITE = (
-    "rosbag2_bagfile_information: {topics_with_message_count: [{topic_metadata: {name: a}, message_count: .inf}]}"
-)
-
-
-@pytest.mark.parametrize("text", ["[" * 20_000, INFINITE])
-def test_metadata_that_makes_no_sense_is_as_good_as_none(text: str, tmp_path: Path) -> None:
-    written = write_steps(tmp_path / "bag", 3)
-    (tmp_path / "bag" / "metadata.yaml").write_text(text)
-    with BagReader(tmp_path / "bag") as reader:
-        assert list(reader.messages()) == written
-        assert "has no readable metadata.yaml" in reader.damage[0]
-
-
 def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
     """One wrong bit makes the one kind of record the other."""
     written = write_steps(tmp_path / "bag", 20)
@@ -217,87 +200,3 @@ def test_an_index_is_not_taken_for_a_message(tmp_path: Path) -> None:
         assert list(reader.messages()) == written
         assert not reader.complete
         assert "is damaged at byte" in reader.damage[0]
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "message"),
-    [
-        ("x.mcap", b"", r"x\.mcap: is empty: name another recording"),
-        ("x.mcap", b"garbage " * 100, r"x\.mcap: is not an MCAP file"),
-        ("x.mcap", b"\x89MCAP0\r\n", r"x\.mcap: holds no readable message \(.*breaks off"),
-        ("x.mcap", b"\x89MCAP0\r\n" + b"\xff" * 300, r"x\.mcap: holds no readable message"),
-        ("x.db3", b"garbage " * 100, r"x\.db3: unreadable \(.*\): name another recording"),
-        ("x.bag", b"#ROSBAG V2.0", r"x\.bag: is no recording of ROS 2: convert it with rosbags-convert"),
-        ("x.CSV", b"time,speed", r"x\.CSV: is no recording of ROS 2: make one of a log by import_csv"),
-        ("x.mcap.zstd", b"text", r"x\.mcap\.zstd: is no recording of ROS 2: name its directory"),
-        ("x.txt", b"text", r"x\.txt: is no recording of ROS 2: name a rosbag2 directory or an \.mcap file"),
-    ],
-)
-def test_what_is_no_recording_is_refused(tmp_path: Path, name: str, content: bytes, message: str) -> None:
-    (tmp_path / name).write_bytes(content)
-    with pytest.raises(ValueError, match=message):
-        BagReader(tmp_path / name)
-
-
-def test_directories_without_a_recording_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ValueError, match=r"missing: does not exist: name a rosbag2 directory"):
-        BagReader(tmp_path / "missing")
-    with pytest.raises(ValueError, match=r"holds no \.mcap or \.db3 file"):
-        BagReader(tmp_path)
-
-
-def test_recordings_within_a_folder_are_named(tmp_path: Path) -> None:
-    for name in ("tuesday", "monday"):
-        (tmp_path / name).mkdir()
-        (tmp_path / name / "run_0.mcap").touch()
-    with pytest.raises(ValueError, match=r"name the directory of a recording, as .*monday$"):
-        BagReader(tmp_path)
-
-
-def test_broken_metadata_does_not_matter(tmp_path: Path) -> None:
-    written = write_steps(tmp_path / "bag", 3)
-    (tmp_path / "bag" / "metadata.yaml").write_text("{ this is : [ no yaml")
-    with BagReader(tmp_path / "bag") as reader:
-        assert list(reader.messages()) == written
-
-
-def test_a_missing_file_of_a_split_recording_is_reported(tmp_path: Path) -> None:
-    written = write_steps(tmp_path / "bag", 3)
-    metadata = tmp_path / "bag" / "metadata.yaml"
-    metadata.write_text(metadata.read_text().replace(f"- {file_name(0)}\n", f"- {file_name(0)}\n  - bag_1.mcap\n"))
-    with BagReader(tmp_path / "bag") as reader:
-        assert list(reader.messages()) == written
-        assert not reader.complete
-        assert reader.damage[0].endswith("bag_1.mcap is missing")
-
-
-def test_split_recordings_are_merged(tmp_path: Path) -> None:
-    one, two = write_steps(tmp_path / "one", 300), write_steps(tmp_path / "two", 300, first=200)
-    both = tmp_path / "both"
-    both.mkdir()
-    (tmp_path / "one" / file_name(0)).rename(both / "x_9.mcap")
-    (tmp_path / "two" / file_name(0)).rename(both / "x_10.mcap")
-    with BagReader(both) as reader:
-        assert list(reader.messages()) == sorted([*one, *two], key=lambda record: record.log_ns)
-
-
-@pytest.mark.parametrize("plugin", StoragePlugin)
-@pytest.mark.parametrize("compression", CompressionMode)
-def test_recordings_of_other_recorders(tmp_path: Path, plugin: StoragePlugin, compression: CompressionMode) -> None:
-    if plugin is StoragePlugin.SQLITE3 and compression is CompressionMode.STORAGE:
-        pytest.skip("sqlite3 has no compression of its own")
-    path = tmp_path / "foreign"
-    foreign = Writer(path, version=9, storage_plugin=plugin)
-    foreign.set_compression(compression, CompressionFormat.ZSTD)
-    topic = "/train1/odometry/position"
-    written = [Record(topic, POSITION.type, cdrs.position(step * S, float(step), 0.25), step * S) for step in range(50)]
-    with foreign:
-        connection = foreign.add_connection(topic, POSITION.type, typestore=typestore())
-        for record in written:
-            foreign.write(connection, record.log_ns, record.cdr)
-    with BagReader(path) as reader:
-        assert reader.complete
-        assert reader.topics == {topic: POSITION.type}
-        assert reader.counts == {topic: 50}
-        assert list(reader.messages()) == written
-        assert list(reader.messages(["position"])) == []

@@ -17,7 +17,9 @@ from itertools import product
 from pkgutil import iter_modules
 
 import numpy as np
+import numpy_ahead
 import numpy_bank as by_numpy
+import numpy_branching
 import pytest
 from banks import FULL, bank_of
 
@@ -129,7 +131,7 @@ def test_pruning(seed: int) -> None:
     bank = bank_of(kind, law, noise, seed, spread=0.05 * (1 + seed))
     bank = by_numpy.normalised(bank._replace(log_weight=rng.uniform(-9.0 if seed % 3 else -3.0, 0.0, count)))
     ours = branching.pruned(bank)
-    check(ours, by_numpy.pruned(bank))
+    check(ours, numpy_branching.pruned(bank))
     assert ours.log_weight.size < count
     for one, other in zip(bank.moments(), by_numpy.moments(bank), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-11, atol=1e-12)
@@ -143,7 +145,9 @@ def test_what_springs_from_others(config: Config, braking: Braking) -> None:
         chosen = np.random.default_rng(seed).choice(BANK.log_weight.size, 25, replace=False)
         bank = by_numpy.normalised(BANK.part(np.sort(chosen)))
         told = braking._replace(told=(-4.0, 0.0, 4.0)[seed % 3])
-        check(branching.branched(config, bank, told, 77.5, 0.5), by_numpy.branched(config, bank, told, 77.5, 0.5))
+        check(
+            branching.branched(config, bank, told, 77.5, 0.5), numpy_branching.branched(config, bank, told, 77.5, 0.5)
+        )
 
 
 @pytest.mark.parametrize("shape", [(40,), (6, 40)])
@@ -156,7 +160,7 @@ def test_quantiles(shape: tuple[int, ...]) -> None:
         wanted = (0.01, 0.05, 0.5, 0.975)
         ours = quantiles(weights, means, stds, wanted)
         assert ours.shape == (*shape[:-1], 4)
-        np.testing.assert_allclose(ours, by_numpy.quantiles(weights, means, stds, wanted), rtol=0.0, atol=1e-10)
+        np.testing.assert_allclose(ours, numpy_ahead.quantiles(weights, means, stds, wanted), rtol=0.0, atol=1e-10)
 
 
 @pytest.mark.parametrize("braking", BRAKINGS)
@@ -169,7 +173,7 @@ def test_what_is_counted_on_ahead(config: Config, braking: Braking, fails: bool)
     for known, missed in itertools.product((0.0, 0.06), (0.02, 1e-5)):
         rail = Rail(0.07, 0.02, known)
         ours = counted_on(config, bank, missed, braking, rail)
-        speeds, mu = by_numpy.counted_on(config, bank, missed, braking, rail)
+        speeds, mu = numpy_ahead.counted_on(config, bank, missed, braking, rail)
         np.testing.assert_allclose(ours.speed_mps, speeds, rtol=1e-12)
         np.testing.assert_allclose(ours.mu, mu, rtol=1e-7 if fails else 1e-9)
 

@@ -6,67 +6,25 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""EM of one window, (18)-(34): gradient, exact maximum, likelihood and convergence against the exact smoother."""
+"""EM of one window, (18)-(34): likelihood and convergence against the exact smoother."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from em_window import PRIOR, by_particles, exactly, noisy_window
 from loud_rail import SEEN
-from numpy.typing import ArrayLike
-from oracles import (
-    ExactEStep,
-    literal_pairwise,
-    log_densities,
-    log_likelihood,
-    make_window,
-    rts,
-)
+from oracles import ExactEStep, log_likelihood, rts
 from scipy.optimize import minimize_scalar
 
-from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.rail import kept_of_start
 from adhesion_node.core.belief.window import Window
-from adhesion_node.core.methods.particle_em.em import (
-    Expectation,
-    Identified,
-    ParticleEStep,
-    Search,
-    identify,
-    maximise,
-)
+from adhesion_node.core.methods.particle_em.em import Expectation, Identified, Search, identify, maximise
 from adhesion_node.core.methods.particle_em.kalman import filtered_by
 from adhesion_node.core.methods.particle_em.particles import given
-from adhesion_node.core.physics.motion import Motion
-from adhesion_node.core.physics.track import LEVEL, Grade, Track
-from adhesion_node.core.physics.train import CRH3
-
-PRIOR = Gaussian(np.array([100.0, 80.0]), np.array([[0.04, 0.005], [0.005, 0.01]]))
-
-
-def _window(mu: float = 0.06, seed: int = 10, brake: float = 0.0952) -> Window:
-    return make_window(SEEN, PRIOR, mu, np.random.default_rng(seed), steps=30, sigma_m=0.1, brake=brake)
-
-
-def _exact(window: Window, mu: float) -> Expectation:
-    return ExactEStep(SEEN, PRIOR, window)(mu)
-
-
-def _particles(motion: Motion, window: Window, count: int, seed: int = 0) -> ParticleEStep:
-    return ParticleEStep(motion, count, PRIOR, window, np.random.default_rng(seed))
-
-
-def _expected(used: ArrayLike, weight: ArrayLike, limit: ArrayLike) -> Expectation:
-    return Expectation(np.array((used, weight, limit)), 0.0, 0.0, 0.0)
-
-
-def gradient(expected: Expectation, mu: float) -> float:
-    """dQ/dmu (29)-(32) at `mu`: only I2 depends on mu, and only through the steps that adhesion limits."""
-    return float(np.sum(expected.weight * (expected.used - mu), where=expected.limit > mu))
 
 
 def _information(window: Window, mu: float) -> float:
@@ -86,98 +44,16 @@ def _best_mu(window: Window, limit: float = 0.0952) -> float:
     return float(found.x)
 
 
-@pytest.mark.parametrize("track", [LEVEL, Track((Grade(0.0, 1000.0, 1.0),))], ids=["level", "grade"])
-@pytest.mark.parametrize("mu", [0.0, 0.03, 0.05, 0.08, 0.2])
-def test_gradient_29_to_32_is_the_slope_of_i2(mu: float, track: Track) -> None:
-    """At the start's mu and elsewhere, below, between and above the brakes of the steps."""
-    motion, h = Motion(CRH3, track, 0.05, 0.1), 1e-6
-    window = replace(_window(), brake=np.linspace(0.04, 0.0952, 30), dt_s=np.linspace(0.05, 0.2, 30))
-    e_step = _particles(motion, window, 15)
-    slope = gradient(e_step(0.05), mu)
-    states, _, log_weights = e_step.filter.particles
-    weights = np.exp(log_weights - log_weights.max(axis=1, keepdims=True))
-    grade = 1.0 if track.sections else 0.0
-    logs = [log_densities(states, motion, window, m, grade) for m in (0.05, mu - h, mu + h)]
-    pairs, _ = literal_pairwise(weights, np.exp(logs[0]), weights[-1] / weights[-1].sum())
-    low, high = (float(np.sum(np.array(pairs) * log)) for log in logs[1:])
-    assert slope == pytest.approx((high - low) / (2 * h), rel=1e-4, abs=1e-3)
-    if mu == 0.2:
-        assert slope == 0.0
-
-
-def test_gradient_by_hand() -> None:
-    expected = _expected([0.05, 0.09], [2e4, 1e4], [0.08, 0.10])
-    assert gradient(expected, 0.06) == pytest.approx(2e4 * -0.01 + 1e4 * 0.03)
-    assert gradient(expected, 0.085) == pytest.approx(1e4 * 0.005)  # the first step is at its brake's limit
-    assert gradient(expected, 0.11) == 0.0
-
-
-def test_weight_is_the_information_of_a_step() -> None:
-    window = _window()
-    expected = _exact(window, 0.05)
-    # T = 0.1: (9.8 T)^2/(q_v T) + (9.8 T^2/2)^2/(q_s T) = 0.9604/2e-4 + 0.002401/1e-5 = 4802 + 240.1
-    assert expected.weight == pytest.approx(np.full(30, 5042.1))
-    ours = _particles(SEEN.motion, window, 5)(0.05)
-    assert ours.weight == pytest.approx(expected.weight)
-    assert ours.limit == pytest.approx(window.brake)
-
-
-def _q(expected: Expectation, mu: np.ndarray) -> np.ndarray:
-    used = np.minimum(np.reshape(mu, (-1, 1)), expected.limit)
-    return np.asarray(-0.5 * np.sum(expected.weight * (used - expected.used) ** 2, axis=1))
-
-
-def _expectations() -> Iterator[tuple[Expectation, float]]:
-    rng = np.random.default_rng(11)
-    for case in range(60):
-        k = int(rng.integers(1, 8))
-        limit = rng.choice([0.03, 0.06, 0.0952], k) if case % 2 else rng.uniform(0.0, 0.1, k)
-        used = rng.normal(0.06, 0.05, k)
-        yield _expected(used, rng.uniform(1.0, 1e4, k), limit), float(rng.choice([0.0, -0.05, 0.04]))
-
-
-def test_maximum_33_beats_a_dense_grid_and_scipy() -> None:
-    at_kink = 0
-    for expected, lowest in _expectations():
-        mu = maximise(expected, lowest)
-        grid = np.linspace(lowest, 0.15, 20_001)
-        values = _q(expected, grid)
-        best = minimize_scalar(
-            lambda m, e=expected: -_q(e, np.array([m]))[0],
-            bounds=(max(lowest, grid[np.argmax(values)] - 1e-4), grid[np.argmax(values)] + 1e-4),
-            method="bounded",
-        )
-        found = _q(expected, np.array([mu]))[0]
-        assert found >= max(values.max(), -best.fun) - 1e-9 * (1 + abs(found))
-        assert lowest <= mu <= max(lowest, expected.limit.max())
-        at_kink += bool(np.any(np.isclose(mu, expected.limit, atol=1e-12)))
-    assert at_kink > 5  # the cases do visit the kinks
-
-
-def test_maximum_of_one_parabola_is_its_mean() -> None:
-    expected = _expected([0.05, 0.07], [1.0, 3.0], [0.0952, 0.0952])
-    assert maximise(expected, 0.0) == pytest.approx(0.065)  # (0.05 + 3 x 0.07)/4
-    assert gradient(expected, maximise(expected, 0.0)) == pytest.approx(0.0, abs=1e-12)
-
-
-def test_maximum_never_exceeds_what_the_brake_uses_and_respects_the_lowest() -> None:
-    more = _expected([0.2] * 3, [1.0] * 3, [0.05, 0.0952, 0.07])
-    assert maximise(more, 0.0) == 0.0952
-    forward = _expected([-0.013] * 3, [1.0] * 3, [0.0952] * 3)
-    assert maximise(forward, 0.0) == 0.0
-    assert maximise(forward, -0.05) == pytest.approx(-0.013)
-
-
 def _exact_em(window: Window, start: float, iterations: int, tolerance: float = 0.0) -> Identified:
     return identify(ExactEStep(SEEN, PRIOR, window), Search(start, iterations, tolerance))
 
 
 @pytest.mark.parametrize("start", [0.0, 0.05, 0.12])
 def test_exact_em_never_lowers_the_likelihood(start: float) -> None:
-    window, mu = replace(_window(), brake=np.linspace(0.03, 0.0952, 30)), start
+    window, mu = replace(noisy_window(), brake=np.linspace(0.03, 0.0952, 30)), start
     likelihoods = [log_likelihood(SEEN, PRIOR, window, mu)]
     for _ in range(40):
-        mu = maximise(_exact(window, mu), 0.0)
+        mu = maximise(exactly(window, mu), 0.0)
         likelihoods.append(log_likelihood(SEEN, PRIOR, window, mu))
     assert np.all(np.diff(likelihoods) >= -1e-9)
     if start < 0.0952:  # above the largest limit the likelihood is flat
@@ -186,7 +62,7 @@ def test_exact_em_never_lowers_the_likelihood(start: float) -> None:
 
 @pytest.mark.parametrize("start", [0.0, 0.04, 0.09])
 def test_exact_em_converges_to_maximum_likelihood(start: float) -> None:
-    window = _window()
+    window = noisy_window()
     best = _best_mu(window)
     assert 0.02 < best < 0.09  # inside, or the test would be about the bounds
     found = _exact_em(window, start, 2000, 1e-10)
@@ -197,17 +73,17 @@ def test_exact_em_converges_to_maximum_likelihood(start: float) -> None:
 
 def test_em_at_a_weak_brake_says_at_least_that_much() -> None:
     """Noise makes the window look braked by a little less, or by more than the brake can: the answer is the brake's."""
-    found = {seed: _exact_em(_window(0.3, seed, brake=0.03), 0.0, 100) for seed in range(3)}
+    found = {seed: _exact_em(noisy_window(0.3, seed, brake=0.03), 0.0, 100) for seed in range(3)}
     assert {one.limit for one in found.values()} == {0.03}
     for seed, one in found.items():
-        assert one.mu == pytest.approx(_best_mu(_window(0.3, seed, brake=0.03), 0.03), abs=1e-6)
+        assert one.mu == pytest.approx(_best_mu(noisy_window(0.3, seed, brake=0.03), 0.03), abs=1e-6)
     assert any(one.mu == 0.03 and not one.converged for one in found.values())
     assert any(one.mu < 0.03 and one.converged for one in found.values())
 
 
 def test_standing_at_an_end_of_the_range_is_not_convergence() -> None:
     """A train that is pushed forward: mu stays at 0 without EM having arrived anywhere."""
-    found = _exact_em(_window(-0.02), 0.0, 13, 1e-7)
+    found = _exact_em(noisy_window(-0.02), 0.0, 13, 1e-7)
     assert (found.mu, found.converged, found.iterations) == (0.0, False, 7)
 
 
@@ -215,67 +91,67 @@ def _stepwise_em(window: Window, start: float, iterations: int) -> float:
     """EM as the paper has it, an E and an M step after the other."""
     mu = start
     for _ in range(iterations):
-        mu = maximise(_exact(window, mu), 0.0)
+        mu = maximise(exactly(window, mu), 0.0)
     return mu
 
 
 @pytest.mark.parametrize("iterations", [1, 5, 40])
 def test_half_as_many_passes_lead_where_iterations_do(iterations: int) -> None:
     """And that is told by the missing information: the share of its start that EM keeps."""
-    window = _window()
+    window = noisy_window()
     best, found = _best_mu(window), _exact_em(window, 0.03, iterations)
     assert found.mu == pytest.approx(_stepwise_em(window, 0.03, iterations), abs=1e-9)
     assert (found.mu - best) / (0.03 - best) == pytest.approx(found.kept, abs=1e-5)
-    complete = float(_exact(window, found.mu).weight.sum())
+    complete = float(exactly(window, found.mu).weight.sum())
     assert found.kept == pytest.approx(kept_of_start(_information(window, found.mu), complete, iterations), rel=1e-6)
     assert found.iterations == math.ceil(0.5 * (1.0 + found.kept) * iterations)
 
 
 def test_a_start_beyond_the_brake_is_one_at_its_limit() -> None:
-    beyond, at = (_exact_em(_window(), start, 10) for start in (0.2, 0.0952))
+    beyond, at = (_exact_em(noisy_window(), start, 10) for start in (0.2, 0.0952))
     assert beyond.mu == at.mu
     assert beyond.kept == at.kept
 
 
 def test_passes_average_what_their_particles_leave_to_chance() -> None:
     """From where EM ends: the paper's settings, and 50 iterations one after the other; the same mean, less noise."""
-    window, single, averaged = _window(), [], []
+    window, single, averaged = noisy_window(), [], []
     start = _stepwise_em(window, 0.05, 200)
     for seed in range(60):
-        e_step, mu = _particles(SEEN.motion, window, 20, seed), start
+        e_step, mu = by_particles(SEEN.motion, window, 20, seed), start
         for _ in range(50):
             mu = maximise(e_step(mu), 0.0)
         single.append(mu)
-        averaged.append(identify(_particles(SEEN.motion, window, 20, seed), Search(start, 50, 0.0)).mu)
+        averaged.append(identify(by_particles(SEEN.motion, window, 20, seed), Search(start, 50, 0.0)).mu)
     error = math.hypot(np.std(single), np.std(averaged)) / math.sqrt(60)
     assert abs(np.mean(single) - np.mean(averaged)) < 4.0 * error
     assert np.std(averaged) < 0.8 * np.std(single)
 
 
 def test_observed_information_is_that_of_the_exact_expectation() -> None:
-    window = _window()
-    complete = float(_exact(window, 0.05).weight.sum())
+    window = noisy_window()
+    complete = float(exactly(window, 0.05).weight.sum())
     assert complete == pytest.approx(30 * 5042.1)
-    observed = _exact(window, 0.05).observed
-    assert _particles(SEEN.motion, window, 5)(0.05).observed == pytest.approx(observed)
+    observed = exactly(window, 0.05).observed
+    assert by_particles(SEEN.motion, window, 5)(0.05).observed == pytest.approx(observed)
     assert 0.005 < observed / complete < 0.5  # neither all seen nor nothing: the rate tests mean something
 
 
 def test_particle_em_is_exact_em_up_to_monte_carlo_error() -> None:
     """16 independent runs of 15 iterations: their mean within 4 standard errors of exact EM's."""
-    window, runs = _window(), 16
+    window, runs = noisy_window(), 16
     exact = _exact_em(window, 0.03, 15).mu
     search = Search(0.03, 15, 0.0)
-    found = [identify(_particles(SEEN.motion, window, 150, seed), search).mu for seed in range(runs)]
+    found = [identify(by_particles(SEEN.motion, window, 150, seed), search).mu for seed in range(runs)]
     error = float(np.std(found, ddof=1)) / 4.0
     assert abs(float(np.mean(found)) - exact) < 4.0 * error
     assert error < 0.05 * abs(exact - 0.03)  # it can fail
 
 
 def test_particle_e_step_gives_the_exact_statistics() -> None:
-    window = _window()
-    exact = _exact(window, 0.05)
-    runs = [_particles(SEEN.motion, window, 150, seed)(0.05) for seed in range(16)]
+    window = noisy_window()
+    exact = exactly(window, 0.05)
+    runs = [by_particles(SEEN.motion, window, 150, seed)(0.05) for seed in range(16)]
     used = np.array([run.used for run in runs])
     errors = np.std(used, axis=0, ddof=1) / 4.0
     assert np.all(np.abs(used.mean(axis=0) - exact.used) < 5.0 * errors)  # 30 steps: 5 instead of 4
@@ -292,16 +168,18 @@ def test_stops_at_the_tolerance_34_and_not_before() -> None:
             asked.append(mu)
             return super().__call__(mu)
 
-    found = identify(Recorded(SEEN, PRIOR, _window()), Search(0.03, 20, 1e-4))
+    found = identify(Recorded(SEEN, PRIOR, noisy_window()), Search(0.03, 20, 1e-4))
     moved = np.abs(np.diff([*asked, found.mu]))
     assert found.converged
     assert 2 < found.iterations == moved.size < 10
     assert moved[-1] <= 1e-4 < moved[:-1].min()
-    assert found.kept == pytest.approx((found.mu - _best_mu(_window())) / (0.03 - _best_mu(_window())), abs=1e-5)
+    assert found.kept == pytest.approx(
+        (found.mu - _best_mu(noisy_window())) / (0.03 - _best_mu(noisy_window())), abs=1e-5
+    )
 
 
 def test_likelihood_of_identify_is_the_filters() -> None:
-    window = _window()
+    window = noisy_window()
     found = _exact_em(window, 0.06, 1)
     assert found.log_likelihood == rts(SEEN, PRIOR, window, 0.06).log_likelihood
     assert math.isinf(found.ess)

@@ -20,7 +20,7 @@ from oracles import Linear, make_window
 
 from adhesion_node.core.belief.gaussian import Gaussian
 from adhesion_node.core.belief.window import Window
-from adhesion_node.core.methods.kernels import filtering, smoothing
+from adhesion_node.core.methods.kernels import expecting, filtering, maximising, smoothing
 from adhesion_node.core.methods.particle_em.em import ParticleEStep, maximise
 from adhesion_node.core.methods.particle_em.particles import ParticleFilter
 from adhesion_node.core.physics.motion import Motion
@@ -66,8 +66,8 @@ def test_a_pass_of_filter_and_smoother(motion: Motion, count: int, outlier_m: fl
     np.testing.assert_allclose(marginal, exact, rtol=1e-4, atol=1e-6)
     np.testing.assert_allclose(marginal.sum(axis=1), 1.0, rtol=1e-11)
     expected = by_numpy.reduced(motion, window, 0.07, found.particles, exact)
-    np.testing.assert_allclose(filtering.reduced(ours.given, 0.07, found.particles, exact), expected, rtol=1e-10)
-    np.testing.assert_allclose(filtering.reduced(ours.given, 0.07, found.particles, marginal), expected, rtol=1e-6)
+    np.testing.assert_allclose(expecting.reduced(ours.given, 0.07, found.particles, exact), expected, rtol=1e-10)
+    np.testing.assert_allclose(expecting.reduced(ours.given, 0.07, found.particles, marginal), expected, rtol=1e-6)
 
 
 def test_what_single_precision_costs_is_far_below_what_the_particles_leave_open() -> None:
@@ -76,8 +76,8 @@ def test_what_single_precision_costs_is_far_below_what_the_particles_leave_open(
     for _ in range(40):
         found.append(maximise(e_step(0.07), 0.0))
         particles = e_step.filter.particles
-        exact = filtering.reduced(e_step.filter.given, 0.07, particles, by_numpy.smoothed(LEVEL, window, particles))
-        off.append(abs(found[-1] - filtering.maximised(exact, 0.0)[0]))
+        exact = expecting.reduced(e_step.filter.given, 0.07, particles, by_numpy.smoothed(LEVEL, window, particles))
+        off.append(abs(found[-1] - maximising.maximised(exact, 0.0)[0]))
     assert max(off) < 1e-5 * np.std(found)
 
 

@@ -16,8 +16,8 @@ import messages
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
+from slowing import START_NS, S, read, record, rows
 from test_offline import samples, write_run
-from test_picture import START_NS, S, read, record, rows
 
 from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.report.__main__ import main

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 import seen
-from test_picture import TRUTH, record
+from slowing import TRUTH, record
 from test_report_brakings import journey
 
 from adhesion_node.report.__main__ import main

@@ -19,9 +19,9 @@ import numpy as np
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.serialization import serialize_message
+from slowing import FREE, START_NS, S, read
 from std_msgs.msg import Float64
 from test_offline import samples, write_run
-from test_picture import FREE, START_NS, S, read
 
 from adhesion_node.bag import BagReader, BagWriter, select_from
 from adhesion_node.core import Config

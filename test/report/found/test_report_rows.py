@@ -14,8 +14,8 @@ import csv
 from pathlib import Path
 
 import pytest
+from slowing import START_NS, S, record
 from test_offline import NO_TRUTH, samples, write_run
-from test_picture import START_NS, S, record
 
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,8 @@ from std_msgs.msg import Float64
 
 from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core.atp.received import TrainState
-from adhesion_node.report.read.gathered import read_series, read_status
+from adhesion_node.report.read.gathered import Numbers, read_status
+from adhesion_node.report.read.messages import read_topics
 from adhesion_node.report.read.series import Series
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import ATP_STATUS, DIAGNOSTICS, MU, MU_LOWER, POSITION, STATE
@@ -45,6 +47,13 @@ def state(t_ns: int, speed_mps: float) -> Any:
 
 def speed_of(state: TrainState) -> float:
     return state.speed_mps
+
+
+def read_series(reader: BagReader, topic: Topic, value: Callable[[Any], Any] = lambda read: read) -> Series:
+    """Gather `value` of all that is read of a topic."""
+    numbers = Numbers(value)
+    read_topics(reader, [(topic, numbers.take)])
+    return numbers.series
 
 
 def test_the_stamp_counts_before_the_log_time(tmp_path: Path) -> None:

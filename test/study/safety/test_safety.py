@@ -65,7 +65,7 @@ def without_acceleration(patch: pytest.MonkeyPatch) -> None:
 def without_build_up(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(SupervisionConfig, "coasting_s", property(lambda _: 0.0))
     # What the truth takes the brake to need is drawn of the same settings.
-    patch.setattr("adhesion_node.study.safety.case.Brake", lambda pulling_s, _, *of: Brake(pulling_s, 4.0, *of))
+    patch.setattr("adhesion_node.study.safety.drawn.Brake", lambda pulling_s, _, *of: Brake(pulling_s, 4.0, *of))
 
 
 def without_fading(patch: pytest.MonkeyPatch) -> None:

@@ -37,6 +37,9 @@ from .ahead import (
 if TYPE_CHECKING:
     from ...config import Config
 
+LOW_95, HIGH_95 = 0.025, 0.975
+"""Probabilities at both ends of an interval of 95 %."""
+
 WIDTH_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
@@ -71,7 +74,7 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if not memory.braked and memory.brake.known:
         return Findings(Regime.COASTING, before, unfelt(config, bank, before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
-    wanted = (0.025, KNOWN_SHARE * (1.0 - config.confidence), 0.5, 0.975)
+    wanted = (LOW_95, KNOWN_SHARE * (1.0 - config.confidence), 0.5, HIGH_95)
     low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
     rail = Rail(max(middle, 0.0), (high - low) / WIDTH_95, min(max(bound, 0.0), max(middle, 0.0)))
     if not memory.braked:

@@ -27,7 +27,7 @@ from ...belief.rail import kept_of_start
 from ...belief.window import Window
 from ...physics.motion import Motion
 from ...physics.train import Array
-from ..kernels import filtering, smoothing
+from ..kernels import expecting, maximising, smoothing
 from .particles import ParticleFilter
 
 
@@ -77,7 +77,7 @@ class ParticleEStep:
         """Filter, smooth and reduce to the statistics of Q; what is observed is that of the extended Kalman filter."""
         particles, log_likelihood, ess = self.filter.run(mu, self.rng)
         self.marginal = smoothing.smoothed(particles, self.filter.given.spread)
-        statistics, observed = filtering.expected(self.filter.given, float(mu), particles, self.marginal)
+        statistics, observed = expecting.expected(self.filter.given, float(mu), particles, self.marginal)
         return Expectation(statistics, observed, log_likelihood, ess)
 
 
@@ -116,7 +116,7 @@ class Identified(NamedTuple):
 
 def maximise(expected: Expectation, lowest: float) -> float:
     """Adhesion of at least `lowest` that maximises Q, the goal of (33)."""
-    return filtering.maximised(expected.statistics, float(lowest))[0]
+    return maximising.maximised(expected.statistics, float(lowest))[0]
 
 
 def identify(e_step: EStep, search: Search) -> Identified:
@@ -134,7 +134,7 @@ def identify(e_step: EStep, search: Search) -> Identified:
     while True:
         expected = e_step(mu)
         done += 1
-        best, top = filtering.maximised(expected.statistics, float(search.lowest))
+        best, top = maximising.maximised(expected.statistics, float(search.lowest))
         mu = min(mu, top)  # what is beyond the brakes makes no difference
         seen = min(expected.observed / float(expected.weight.dot(expected.limit >= mu)), 1.0)
         left = kept_of_start(seen, 1.0, search.iterations)

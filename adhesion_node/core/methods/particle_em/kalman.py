@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from ...belief.gaussian import Gaussian
 from ...physics.train import Array
-from ..kernels import filtering
+from ..kernels import expecting, filtering
 
 
 class Filtered(NamedTuple):
@@ -36,4 +36,4 @@ class Filtered(NamedTuple):
 
 def filtered_by(known: filtering.Given, mu: float) -> Filtered:
     """Filter a window, put as the compiled loops need it, at an adhesion."""
-    return Filtered(*filtering.tracked(known, float(mu)))
+    return Filtered(*expecting.tracked(known, float(mu)))

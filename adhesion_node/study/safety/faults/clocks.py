@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from ....core.atp.received import StampedCurve, TrainState
-from ..case import FREE_S, Case, Message, Rng, Segment, estimated, told
+from ..case import FREE_S, Case, Message, Rng, Segment
+from ..told import estimated, told
 from .messages import Faulty, lost
 
 DELAY_S = 0.22

@@ -15,7 +15,8 @@ from dataclasses import replace
 import numpy as np
 
 from ....core.atp.received import StampedCurve, TrainState
-from ..case import FREE_S, Case, Message, Noise, Rng, curve_of, estimated, in_units, told
+from ..case import FREE_S, Case, Message, Noise, Rng
+from ..told import curve_of, estimated, in_units, told
 
 Faulty = tuple[Case, list[Message]]
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from ....core.atp.monitor import Part, Refused
 from ....core.atp.received import StampedCurve
-from ..case import FREE_S, Case, Message, Rng, estimated, told
+from ..case import FREE_S, Case, Message, Rng
+from ..told import estimated, told
 from .messages import Faulty, late, lost
 
 

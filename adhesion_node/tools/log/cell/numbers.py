@@ -147,6 +147,11 @@ def is_clock(form: str | None) -> bool:
     return form is not None and form != "ISO8601" and not re.search("%[djxcs]", form)
 
 
+def has_dates(form: Format) -> bool:
+    """Whether the times are dates, which are in a zone; a clock's and numbers are in none."""
+    return form.time_format is not None and not is_clock(form.time_format)
+
+
 def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
     """The dates of a format; a clock's are those of the day on which the epoch begins."""
     if form in FORMATS:

@@ -20,9 +20,11 @@ import numpy as np
 from ....core.physics.train import KMH, Array
 from ....run.results.seen import FASTEST_MPS
 from ....wire.line import ATMOSPHERE_PA
-from ..cell.clock import has_dates
+from ..cell.numbers import has_dates
 from ..format import PLACES, PRESSURE_UNITS, PRESSURES, TIME_UNITS, Format, option
-from ..whole import MOVES_MPS, Log, moment
+from ..whole.clock import moment
+from ..whole.moving import MOVES_MPS
+from ..whole.read import Log
 from .dropouts import dropouts
 from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of

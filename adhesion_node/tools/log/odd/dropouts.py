@@ -14,7 +14,7 @@ import numpy as np
 
 from ....run.results.gone import LEAST_PA, LEAST_RADPS, gone
 from ..format import PRESSURES
-from ..whole import Log
+from ..whole.read import Log
 
 
 def dropouts(log: Log) -> Iterator[str]:

@@ -16,9 +16,11 @@ import pandas as pd
 from ....core.physics.train import Array
 from ....run.results.steps import step_of
 from ..cell.numbers import Flags, Rows
-from ..held import changes
-from ..steps import metres
-from ..whole import MOVES_MPS, Log, moment
+from ..whole.clock import moment
+from ..whole.held import changes
+from ..whole.moving import MOVES_MPS
+from ..whole.read import Log
+from ..whole.steps import metres
 from .motion import OVER_S
 
 LEAST_S, LEAST_WAY_M, UNUSUAL = 3.0, 20.0, 5.0

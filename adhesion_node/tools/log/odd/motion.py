@@ -16,7 +16,7 @@ import pandas as pd
 
 from ....core.physics.train import Array
 from ..cell.numbers import Flags
-from ..whole import Log
+from ..whole.read import Log
 
 LEAST_S, LEAST_M = 10.0, 100.0
 """Of less time or less way nothing is said."""

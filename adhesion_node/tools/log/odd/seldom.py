@@ -15,7 +15,7 @@ import numpy as np
 from ....core.config import Config
 from ....core.physics.train import Array
 from ..format import PRESSURES, option
-from ..whole import Log
+from ..whole.read import Log
 
 LEAST_SHARE = 0.2
 """Of the log's time in which a pressure is older than it counts."""

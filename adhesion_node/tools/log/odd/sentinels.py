@@ -16,7 +16,7 @@ import pandas as pd
 from ....core.physics.train import Array
 from ....run.results.seen import FASTEST_MPS
 from ..cell.marks import marks
-from ..whole import Log
+from ..whole.read import Log
 
 LEAST_ROWS = 3
 """A single number far from the others is an outlier."""

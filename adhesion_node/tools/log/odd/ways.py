@@ -17,7 +17,9 @@ import numpy as np
 from ....core.physics.train import Array
 from ....run.results.seen import FASTEST_MPS
 from ..format import POSITION_UNITS, SPEED_UNITS, Format
-from ..whole import MOVES_MPS, Log, moment
+from ..whole.clock import moment
+from ..whole.moving import MOVES_MPS
+from ..whole.read import Log
 from .motion import LEAST_M, LEAST_S, SAME, Motion
 from .sentinels import LEAPS
 

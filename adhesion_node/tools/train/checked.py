@@ -6,49 +6,17 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Looks at the file of a train before anything is computed for it, or proposes one from a recording.
+"""What the file of a train comes to: its full brake, its stopping distances, and what of its numbers is unlikely."""
 
-`--check` prints what the full brake gives, the dry stopping distances, and what is unlikely; the exit code is 1 if
-anything is. `--estimate` finds resistance and brake from how the recorded train coasts and brakes.
-"""
-
-import argparse
-import sys
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..bag import BagReader, overlooked, select_from
-from ..command.checks import refuse
-from ..command.options import (
-    DONE,
-    FAILED,
-    help_texts,
-    json_option,
-    progress,
-    remap_option,
-    report,
-    run_tool,
-    setting_options,
-)
-from ..command.written import write_text
-from ..core.physics import braking
-from ..core.physics.adhesion import DRY
-from ..core.physics.train import KMH
-from ..run import offline
-from ..wire.files.train import KNOWN_TO, TrainFile, read_train
-from ..wire.settings.given import given
-from ..wire.settings.nodes import SETTINGS
-from ..wire.settings.setup import setup_of
-from . import train_found
-
-EXAMPLES = (
-    "train --check my_train.yaml",
-    "train --check metro",
-    "train --estimate my_run --train my_train.yaml --output better_train.yaml",
-)
+from ...core.physics import braking
+from ...core.physics.adhesion import DRY
+from ...core.physics.train import KMH
+from ...wire.files.train import KNOWN_TO, TrainFile
 
 SPEEDS_KMH = (400, 350, 300, 250, 200, 160, 120, 100, 80, 60, 40)
 
@@ -68,31 +36,6 @@ class Likely(NamedTuple):
         """The number, what is usual, and what may be wrong with it."""
         value = f"{self.value:.4g} {self.unit}".rstrip()
         return f"{self.what} = {value}, usual is {self.low:.4g} to {self.high:.4g}: {self.hint}"
-
-
-def main(args: Sequence[str] | None = None) -> int:
-    """Run `train --check FILE` or `train --estimate BAG`."""
-    parser = argparse.ArgumentParser("train", parents=[json_option()], **help_texts(__doc__ or "", *EXAMPLES))
-    one = parser.add_mutually_exclusive_group(required=True).add_argument
-    one("--check", metavar="FILE", help="the train's file (doc/train.md), or high_speed, metro, freight")
-    one("--estimate", metavar="BAG", help="a recording with coasting and with brakings on a dry rail")
-    add = parser.add_argument
-    add("--output", metavar="FILE", help="with --estimate: write the proposed train, a new file")
-    remap_option(add)
-    setting_options(parser.add_argument_group("what is believed of the recorded train and its track").add_argument)
-    return run_tool(parser, _work, args)
-
-
-def _work(options: argparse.Namespace) -> int:
-    if options.check is None:
-        return _estimate(options)
-    of_estimate = ["output", "remap", "namespace", "seed", "set", "params", "train", "node"]
-    refuse(options, of_estimate, "is for --estimate: --check takes the train's file alone, leave this out")
-    file = read_train(options.check)
-    rows, odd = stopping(file), [one.told for one in likely(file) if not one.low <= one.value <= one.high]
-    result = {**figures(file), "stopping": rows, "unlikely": odd}
-    report(options.json, result, "\n".join([*_told(file, rows), *(f"unlikely: {one}" for one in odd)]))
-    return FAILED if odd else DONE
 
 
 def figures(file: TrainFile) -> dict[str, Any]:
@@ -145,7 +88,8 @@ def likely(file: TrainFile) -> Iterator[Likely]:
             yield Likely(f"known_to {name}", file.values[std], 0.001, 1.0, "of it", "per cent? 0.1 is 10 %")
 
 
-def _told(file: TrainFile, rows: Sequence[dict[str, float]]) -> Iterator[str]:
+def told(file: TrainFile, rows: Sequence[dict[str, float]]) -> Iterator[str]:
+    """The file in words, with the ways to the standstill."""
     found, load = figures(file), ""
     if file.loaded_kg > file.empty_kg:
         load = f", {1e-3 * file.empty_kg:.4g} t empty to {1e-3 * file.loaded_kg:.4g} t loaded"
@@ -156,24 +100,3 @@ def _told(file: TrainFile, rows: Sequence[dict[str, float]]) -> Iterator[str]:
     yield "dry, level, to the standstill:   from km/h   way m   of it built up m   time s"
     for row in rows:
         yield f"{row['from_kmh']:42.0f}{row['distance_m']:8.0f}{row['built_up_m']:19.0f}{row['time_s']:9.1f}"
-
-
-def _estimate(options: argparse.Namespace) -> int:
-    refuse(options, ["seed"], "nothing is drawn by chance: leave it out")
-    if options.output and Path(options.output).exists():
-        raise ValueError(f"output = {options.output}: is there already: name a new file")
-    setup = setup_of(given(options, "estimator", SETTINGS))
-    with BagReader(options.estimate) as reader:
-        for loss in reader.damage:
-            print(f"train: {loss}", file=sys.stderr)
-        selection = select_from(reader, options.remap, namespace=options.namespace)
-        for hint in overlooked(reader.topics, selection, reader.namespace):
-            print(f"train: {hint}", file=sys.stderr)
-        recorded = progress(offline.messages(reader, selection, setup.line), "messages")
-        found = train_found.find(setup.config, train_found.read(recorded, setup.line))
-    text = [f"believed: {setup.train}", *found.told()]
-    if options.output and found.says_anything:
-        write_text(options.output, train_found.file_of(found, Path(options.estimate).name))
-        text.append(f"{options.output} holds the proposal: train --check {options.output}")
-    report(options.json, found.result(), "\n".join(text))
-    return DONE if found.says_anything else FAILED

@@ -6,15 +6,15 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The times of a log as a whole: of a clock that goes on after midnight, written in digits alone, or in a zone."""
+"""The times of a log: of a clock that goes on after midnight, written in digits alone, or in a zone."""
 
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
+from ..cell.numbers import has_dates, is_clock
 from ..format import Format
-from .numbers import is_clock
 
 DAY_NS, S = 86_400 * 10**9, 10**9
 
@@ -46,11 +46,6 @@ def over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
     return rows
 
 
-def has_dates(form: Format) -> bool:
-    """Whether the times are dates, which are in a zone; a clock's and numbers are in none."""
-    return form.time_format is not None and not is_clock(form.time_format)
-
-
 def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
     """The times of a zone as UTC; of an hour that is there twice, where the rows do not tell, that which joins them."""
     if form.time_zone == "UTC" or not has_dates(form):
@@ -64,3 +59,12 @@ def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
         utc = min(both, key=lambda each: np.max(np.abs(np.diff(each.asi8)), initial=0))
     rows["t_ns"] = utc.as_unit("ns").asi8
     return rows, [f"time: local of {zone}"]
+
+
+def moment(t_ns: int) -> str:
+    """Write a time: seconds, or a date where it is one.
+
+    >>> moment(1_500_000_000), moment(1_700_000_000_000_000_000)
+    ('1.5 s', '2023-11-14T22:13:20')
+    """
+    return f"{t_ns / 1e9:.9g} s" if t_ns < 10**17 else pd.Timestamp(t_ns).isoformat()

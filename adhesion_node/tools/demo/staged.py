@@ -16,9 +16,9 @@ from sim_node.real.sensors import centre_line
 from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.scenario import SCENARIOS
 
-from ..command.written import write_text
-from ..core.physics.train import KMH
-from ..wire.files.parameters import text_of
+from ...command.written import write_text
+from ...core.physics.train import KMH
+from ...wire.files.parameters import text_of
 from .line import Task
 
 PARAMS, TRACK_LINE = "params.yaml", "track.geojson"

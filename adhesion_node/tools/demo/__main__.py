@@ -13,19 +13,15 @@ and with a page in the browser.
 """
 
 import argparse
-import math
 import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from functools import partial
-from itertools import chain, count, pairwise
+from itertools import chain, count
 from pathlib import Path
-from shlex import join
 from shutil import rmtree
-from typing import Any
 
-import numpy as np
 from rclpy.executors import SingleThreadedExecutor
 
 from sim_node.real.plant.scenarios import SCENARIOS as REAL
@@ -33,26 +29,21 @@ from sim_node.real.sensors.fitted import FITTED
 from sim_node.settings import SENSORS
 from sim_node.train.scenario import SCENARIOS
 
-from ..bag import BagReader, select
-from ..command.checks import refuse
-from ..command.options import DONE, FAILED, help_texts, json_option, report, run_tool
-from ..command.signals import stop_on_signals
-from ..core import Estimate, Regime
-from ..core.physics.train import KMH
-from ..live.__main__ import address_of, address_options
-from ..live.node import Live
-from ..report.drawn.picture import draw
-from ..report.drawn.table import table
-from ..report.found.regimes import IN_WORDS, Band
-from ..report.read.gathered import read_status
-from ..report.read.recorded import read_run
-from ..report.read.run import Run
-from ..run import offline
-from ..run.pipeline import Pipeline
-from ..run.results.score import Truth
-from ..wire.settings.setup import setup_of
-from ..wire.topics import ATP_STATUS
-from .line import UNASKED, Pace, Task, executor_of_line, parameters, play
+from ...bag import BagReader
+from ...command.checks import refuse
+from ...command.options import DONE, FAILED, help_texts, json_option, report, run_tool
+from ...command.signals import stop_on_signals
+from ...core import Estimate
+from ...core.physics.train import KMH
+from ...live.__main__ import address_of, address_options
+from ...live.node import Live
+from ...report.drawn.picture import draw
+from ...report.drawn.table import table
+from ...report.found.regimes import IN_WORDS
+from ...report.read.recorded import read_run
+from ...wire.settings.setup import setup_of
+from .evaluated import evaluate, found, said, true_bands
+from .line import UNASKED, Pace, executor_of_line, parameters, play
 from .staged import PARAMS, task_of
 
 EXAMPLES = (
@@ -158,48 +149,17 @@ def _run(
         played = play(executor, task, output / "bag", pace)
     ended()
     with BagReader(output / "bag") as reader:
-        result, run = _evaluate(reader, task), read_run(reader)
-    truth = _true_bands(played.regimes, run)
+        result, run = evaluate(reader, task), read_run(reader)
+    truth = true_bands(played.regimes, run)
     fitted = f", {options.sensors}" if options.scenario in REAL else ""
     draw(run, [output / "run.png"], f"{options.scenario}{fitted}, seed {options.seed}", target_kmh, train, truth)
     if options.scenario in REAL:
-        result |= _found(truth, run)
+        result |= found(truth, run)
     result |= {"live_digest": played.digest, "live_equals_offline": played.digest == result["digest"]}
     result |= {name: str(output / file) for name, file in (("bag", "bag"), ("params", PARAMS), ("picture", "run.png"))}
     result["seconds"] = round(time.monotonic() - started_s, 1)
-    report(options.json, result, "\n".join(["", table(run, target_kmh, train), "", *_said(result)]))
+    report(options.json, result, "\n".join(["", table(run, target_kmh, train), "", *said(result)]))
     return DONE if result["live_equals_offline"] else FAILED
-
-
-def _true_bands(regimes: Sequence[tuple[int, str]], run: Run) -> list[Band]:
-    """The true regimes over the time of the run."""
-    ends = [*(t_ns for t_ns, _ in regimes[1:]), int(run.true_speed.t_ns[-1])]
-    times = run.seconds(np.array([[t_ns for t_ns, _ in regimes], ends])).T
-    return [Band(start_s, end_s, regime) for (start_s, end_s), (_, regime) in zip(times.tolist(), regimes, strict=True)]
-
-
-def _found(truth: Sequence[Band], run: Run) -> dict[str, float]:
-    """When adhesion first limited the train, s, and how long after that an estimate says so."""
-    limited = Regime.ADHESION_LIMITED.name
-    begun_s = next((band.start_s for band in truth if band.regime == limited), math.inf)
-    said_s = run.seconds(run.regime.t_ns[run.regime.values == limited])
-    said_s = said_s[said_s >= begun_s]
-    return {"limited_from_s": begun_s, "told_after_s": float(said_s[0]) - begun_s} if said_s.size else {}
-
-
-def _said(result: dict[str, Any]) -> Iterator[str]:
-    """The result in words."""
-    if "mean_relative_error_percent" in result:
-        yield f"mean relative error while adhesion limits: {result['mean_relative_error_percent']:.2f} %"
-    if "told_after_s" in result:
-        yield f"adhesion limits from {result['limited_from_s']:.1f} s on, told {result['told_after_s']:.1f} s later"
-    if "ms_per_window_p50" in result:
-        yield f"an estimate takes {result['ms_per_window_p50']:.1f} ms (median of {result['windows']})"
-    same = "gives the same numbers to the last bit" if result["live_equals_offline"] else "GIVES OTHER NUMBERS"
-    yield f"an offline replay of the recording {same} (digest {result['digest'][:16]}...):"
-    yield f"  {join(['replay', result['bag'], '--offline', '--params', result['params']])}"
-    yield f"ATP monitor: {result['atp']}"
-    yield f"recording: {result['bag']}    picture: {result['picture']}    ({result['seconds']} s)"
 
 
 @contextmanager
@@ -229,13 +189,5 @@ def _say(text: str) -> None:
     print(text, file=sys.stderr)
 
 
-def _evaluate(reader: BagReader, task: Task) -> dict[str, Any]:
-    """Replay the demo's own recording offline, and sum up what the ATP monitor said."""
-    selection = select(reader.topics)
-    setup, truth = setup_of(task.estimator), Truth()
-    pipeline = Pipeline(setup.config, task.seed)
-    replayed = offline.replay(pipeline, truth, offline.messages(reader, selection, setup.line), setup.line)
-    levels = read_status(reader, ATP_STATUS, "level").values.tolist()
-    changes = [level for previous, level in pairwise(["", *levels]) if level != previous]
-    estimates = [made.estimate for made in replayed.predictions]
-    return {**offline.summary(pipeline, replayed.window_ms, truth, estimates), "atp": " > ".join(changes)}
+if __name__ == "__main__":
+    raise SystemExit(main())

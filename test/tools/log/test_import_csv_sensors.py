@@ -30,7 +30,7 @@ from adhesion_node.wire.track_line import line_of
 
 __all__ = ["importing"]
 
-PAGE = Path(__file__).resolve().parents[2] / "doc" / "own_data.md"
+PAGE = Path(__file__).resolve().parents[3] / "doc" / "own_data.md"
 S = 10**9
 
 ALL = """\

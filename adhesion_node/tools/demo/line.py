@@ -32,11 +32,11 @@ from rclpy.signals import SignalHandlerOptions
 
 from sim_node.nodes.simulator import Simulator
 
-from ..core import Estimate
-from ..nodes.atp_monitor import AtpMonitor
-from ..nodes.estimator import Estimator
-from ..nodes.recorder import Recorder
-from ..wire.topics import ADHESION_INPUTS, BRAKING_CURVE, STATE
+from ...core import Estimate
+from ...nodes.atp_monitor import AtpMonitor
+from ...nodes.estimator import Estimator
+from ...nodes.recorder import Recorder
+from ...wire.topics import ADHESION_INPUTS, BRAKING_CURVE, STATE
 
 PATIENCE_S = 10.0
 """Longest wait for a message between two nodes of the process."""

@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ...core.physics.train import Array
-from .cell.numbers import Flags, Rows
+from ....core.physics.train import Array
+from ..cell.numbers import Flags, Rows
 
 LEAST_CHANGES = 10
 """Of fewer nothing is said."""

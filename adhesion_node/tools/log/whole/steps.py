@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import pandas as pd
 
-from ...core.config import Config
-from ...core.physics.train import Array
-from ...run.results.steps import step_of
-from ...wire.line import Line
-from .format import Format
+from ....core.config import Config
+from ....core.physics.train import Array
+from ....run.results.steps import step_of
+from ....wire.line import Line
+from ..format import Format
 
 DEGREE_M = 111.2e3
 """Of latitude."""

@@ -11,10 +11,10 @@
 import numpy as np
 import pandas as pd
 
-from ...core.physics.train import Array
-from ...run.results.seen import FASTEST_MPS
-from .cell.numbers import Rows
-from .format import POSITION_UNITS, Format
+from ....core.physics.train import Array
+from ....run.results.seen import FASTEST_MPS
+from ..cell.numbers import Rows
+from ..format import POSITION_UNITS, Format
 
 LEAST_M = 100.0
 """A lesser leap may be an outlier."""
