@@ -16,6 +16,7 @@ from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...intake.samples import PressureSample
+from .seldom import apart_ns, at_least
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -32,9 +33,9 @@ HELD_NS = 4 * S
 EMPTY_NS = 3 * S // 2
 """A cylinder that has been empty so long was released."""
 
-LATELY, KEPT, HELD, EMPTY, SELDOM_NS = 1.5, 3.5, 8, 4.5, 2 * S
-"""Samples that the times of a fall, of those that are kept, behind a dump and of an empty cylinder are at least, where
-they come seldom; apart they count as so far at most."""
+LATELY, KEPT, HELD, EMPTY = 1.5, 3.5, 8.0, 4.5
+"""Samples that the times of a fall, of those that are kept, behind a dump and of an empty cylinder hold at least, where
+they come seldom."""
 
 SLID_NS = 2 * S
 """So long behind a dump axles have slid of late."""
@@ -80,14 +81,14 @@ class BrakeSeen(NamedTuple):
         self, config: Config, sample: PressureSample, demand_pa: float | None, rolls: bool | None
     ) -> BrakeSeen:
         t_ns, pressure = sample
-        every_ns = min(t_ns - self.recent[-1].t_ns, SELDOM_NS) if self.recent else 0
-        kept_ns, end = max(RISING_NS, round(KEPT * every_ns)), bisect_left(self.recent, (t_ns,))
+        every_ns = apart_ns(self.recent[-1].t_ns if self.recent else None, t_ns)
+        kept_ns, end = at_least(RISING_NS, KEPT, every_ns), bisect_left(self.recent, (t_ns,))
         recent = (*self.recent[bisect_left(self.recent, (t_ns - kept_ns,)) : end], sample)
         empty = pressure < max(config.brake_threshold_pa, 1.0)
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
             return BrakeSeen(recent, pressure, self._following(config, sample, pressure), None, full_ns)
-        lately = recent[bisect_left(recent, (t_ns - max(DUMP_NS, round(LATELY * every_ns)),)) :]
+        lately = recent[bisect_left(recent, (t_ns - at_least(DUMP_NS, LATELY, every_ns),)) :]
         peak = max([each.pressure_pa for each in lately])
         dumped_ns = None if rolls else self.dumped_ns
         if demand_pa is not None or rolls is not None:
@@ -97,8 +98,8 @@ class BrakeSeen(NamedTuple):
         if dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
         dumped_ns = t_ns if dumps and not rolls else dumped_ns
-        held = dumped_ns is not None and (rolls is False or t_ns - dumped_ns < max(HELD_NS, HELD * every_ns))
-        dumping = held and t_ns - full_ns < max(EMPTY_NS, round(EMPTY * every_ns))
+        held = dumped_ns is not None and (rolls is False or t_ns - dumped_ns < at_least(HELD_NS, HELD, every_ns))
+        dumping = held and t_ns - full_ns < at_least(EMPTY_NS, EMPTY, every_ns)
         demanded = demand_pa
         if demanded is None:
             demanded = max(self.demanded_pa, peak) if dumping else pressure  # it fell before that was a dump

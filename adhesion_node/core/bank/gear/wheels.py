@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...intake.plausibility import STRONGEST_MPS2
 from ...intake.samples import WheelSample
+from .seldom import apart_ns, at_least
 from .wander import Wander
 
 if TYPE_CHECKING:
@@ -26,8 +27,8 @@ S = 1_000_000_000
 SLID_NS, FRESH_NS = 3 * S, S
 """An axle counts as sliding so long, as its protection lets it roll in between; so long may wheels not be heard."""
 
-SLID_SAMPLES, SELDOM_NS = 16, 2 * S
-"""And for so many samples where they are seldom, as slides fall between them; apart they count as so far at most."""
+SLID_SAMPLES = 16
+"""And for so many samples where they come seldom, as slides fall between them."""
 
 LEARNT = 0.05
 """Share of a new sample in what is learnt of a radius."""
@@ -126,8 +127,7 @@ class WheelsSeen(NamedTuple):
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         if braked and speed_mps < LEARNING_MPS:
             return wheels
-        every_ns = 0 if wheels.heard_ns is None else min(sample.t_ns - wheels.heard_ns, SELDOM_NS)
-        wheels = wheels._replace(heard_ns=sample.t_ns, every_ns=every_ns)
+        wheels = wheels._replace(heard_ns=sample.t_ns, every_ns=apart_ns(wheels.heard_ns, sample.t_ns))
         if not braked:
             return wheels._learning(rims)
         rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
@@ -207,7 +207,7 @@ class WheelsSeen(NamedTuple):
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
         if not self.slid_ns:
             return None
-        counts_ns = max(SLID_NS, SLID_SAMPLES * self.every_ns)
+        counts_ns = at_least(SLID_NS, SLID_SAMPLES, self.every_ns)
         slid = [each is not None and now_ns - each < counts_ns for each in self.slid_ns]
         rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
         known = sum(one or other for one, other in zip(slid, rolled, strict=True))
