@@ -32,6 +32,10 @@ from .state import State
 EARLY_S = 1e-3
 """An estimate is told by a measurement that is so much too early, as stamps jitter; not by the next one."""
 
+SOON_NS = 75_000_000
+"""A position that comes sooner behind the one before tells nothing new: what a receiver errs by lasts longer. Taken in,
+the hypothesis nearest is one of another white part, which takes the wandering for the train."""
+
 LOST_S = 5.0
 """A wheel that slides loses no more than the way of so many seconds before it is told, and no receiver steps by more;
 further off is another place."""
@@ -55,7 +59,8 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     if measurement.has_position and memory.misled:
         detail = f"position x = {measurement.position_m:.12g}"
         state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
-    memory, measurement = bank.heard(memory, measurement)
+    soon = measurement.has_position and 0 <= measurement.t_ns - memory.placed_ns < SOON_NS
+    memory, measurement = (memory, measurement) if soon else bank.heard(memory, measurement)
     before = memory.bank
 
     def rail() -> Rail:
@@ -74,13 +79,14 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         state = state._replace(stepping=stepping)
         elsewhere = elsewhere or (state.outliers + 1 >= config.max_outliers and not doubted)
         return _unbelieved(config, state, memory, measurement, off, elsewhere, rail)
+    measurement = measurement._replace(variance_m2=math.inf) if soon else measurement
     followed = bank.followed(config, memory, measurement, rail, off)
     if measurement.imu or state.proving.since:
         followed, proving = state.proving.after(config, memory, followed, measurement, rail)
         state = state._replace(proving=proving)
     if followed.pointing.askew and not memory.pointing.askew and (measurement.has_position or not memory.is_placed):
         return _undeceived(config, state, measurement, followed)
-    return _accepted(config, state, measurement, followed, stepping)
+    return _accepted(config, state, measurement, followed, stepping, soon)
 
 
 def _undeceived(
@@ -127,7 +133,12 @@ def _anew(state: State, event: Event) -> State:
 
 
 def _accepted(
-    config: Config, state: State, measurement: Measurement, memory: Memory, stepping: Stepping | None = None
+    config: Config,
+    state: State,
+    measurement: Measurement,
+    memory: Memory,
+    stepping: Stepping | None = None,
+    soon: bool = False,
 ) -> tuple[State, Estimate | None]:
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
@@ -135,7 +146,7 @@ def _accepted(
     state = state.told(*memory.left_out)
     state = state._replace(
         stepping=state.stepping if stepping is None else stepping,
-        counts=counted(state.counts, ACCEPTED if placed else TICK),
+        counts=counted(state.counts, ACCEPTED if placed or soon else TICK),
         newest=measurement,
         memory=memory,
         outliers=0 if placed else state.outliers,

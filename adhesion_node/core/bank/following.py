@@ -29,7 +29,16 @@ from .labels.kinds import FREE, FREE_STD
 from .labels.noises import NOISES, of_receiver
 from .layout import BIAS, BRAKE, GRADE, MU, OFFSET, PITCH, POSITION, RADIUS, SCALE, SIZE, SPEED, Bank
 from .memory import HALF_LOG_2PI, Memory, S, steps
-from .motion import Braking, Foreseen, foreseen, open_variance, slow_variance, white_variance, white_variances
+from .motion import (
+    Braking,
+    Foreseen,
+    foreseen,
+    open_variance,
+    slow_variance,
+    slowing,
+    white_variance,
+    white_variances,
+)
 from .rims import with_wheels
 from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
 from .sensors.pointing import ASKEW_MPS2
@@ -56,6 +65,7 @@ def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen
         return memory._replace(
             bank=bank.believing(*beliefs),
             declared_m=declared,
+            placed_ns=measurement.t_ns,
             course=course,
             fixes=memory.fixes + 1,
             log_likelihood=memory.log_likelihood + total - HALF_LOG_2PI,
@@ -107,11 +117,13 @@ def followed(
 
     `rail` is asked for where a braking opens; `predicted` is what `off` has said of the measurement, if that is known.
     """
-    pressures, speeds = _pressures(measurement), measurement.all_speeds
+    pressures, speeds = _pressures(config, memory.brake, measurement), measurement.all_speeds
     demand_pa, imu = measurement.demand_pa, measurement.imu
     memory = memory._replace(untold=measurement.brake_pressure_pa is None and demand_pa is None)
     if memory.untold:
         memory = memory._replace(brake=BrakeSeen(), braking=Braking(0.0))
+    elif measurement.pressures and not memory.brake.gauged:
+        memory = memory._replace(brake=memory.brake._replace(gauged=True))
     before_ns = memory.t_ns
     memory = memory._replace(left_out=()) if memory.left_out else memory
     ends = steps(before_ns, measurement.t_ns, speeds)
@@ -134,8 +146,9 @@ def followed(
             felt = [each for each in imu if since_ns < each.t_ns <= until_ns]
             braking = memory.braking._replace(applied=0.5 * (before.applied + memory.braking.applied))
             memory = _felt(config, memory, felt, braking, (until_ns - since_ns) / S) if felt else memory
+        first_ns = -math.inf if until_ns == ends[0] else since_ns  # late ones count by now
         for speed in speeds:
-            if since_ns < speed.t_ns <= until_ns and not (config.speed_source == "axle" and _may_slide(memory)):
+            if first_ns < speed.t_ns <= until_ns and not (config.speed_source == "axle" and _may_slide(memory)):
                 memory = _with_speed(config, memory, speed)
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
@@ -148,7 +161,8 @@ def heard(memory: Memory, measurement: Measurement) -> tuple[Memory, Measurement
         return memory, measurement
     told = measurement.variance_m2
     places = memory.places.after(measurement.t_ns, measurement.position_m, told, far=PLACE_FAR)
-    memory = memory._replace(places=places, coarse=memory.coarse.after(measurement.position_m))
+    coarse = memory.coarse.after(measurement.position_m)
+    memory = memory._replace(places=places, coarse=coarse)
     return memory, measurement._replace(variance_m2=places.variance_of(told))
 
 
@@ -167,7 +181,13 @@ def _may_slide(memory: Memory) -> bool:
 
 
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
-    """Take in a speed, unless it repeats itself while the train must have slowed."""
+    """Take in a speed, unless it repeats itself while the train must have slowed.
+
+    Since one that comes late the train has slowed as it does now.
+    """
+    if memory.braked and sample.t_ns < memory.t_ns:
+        lost_mps = slowing(config, memory.bank, memory.braking) * (memory.t_ns - sample.t_ns) / S
+        sample = sample._replace(speed_mps=sample.speed_mps - lost_mps)
     told = config.speed_std_mps**2 if sample.variance is None else sample.variance
     elapsed_s, pressed = memory.speeds.quick.since_s(sample.t_ns), memory.is_pressed(config)
     repeating = memory.repeating.after(sample.speed_mps, memory.slowed_mps)
@@ -205,9 +225,16 @@ def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Br
     return memory.told(acceleration_seen(config, memory.bank, mean, variance, braking))
 
 
-def _pressures(measurement: Measurement) -> tuple[PressureSample, ...]:
-    """Pressures since the measurement before; the demand, where none is measured."""
+def _pressures(config: Config, brake: BrakeSeen, measurement: Measurement) -> tuple[PressureSample, ...]:
+    """Pressures since the measurement before; the demand, where none is measured.
+
+    One that is said again is none, else a dump between two samples looks like a pressure that is held; but by it the
+    cylinders go on following what is demanded.
+    """
     newest = measurement.demand_pa if measurement.brake_pressure_pa is None else measurement.brake_pressure_pa
+    follows = measurement.demand_pa is not None or config.pressure_kind == "demanded"
+    if not follows and brake.repeats(newest):
+        return measurement.pressures
     return measurement.pressures or (() if newest is None else (PressureSample(measurement.t_ns, newest),))
 
 

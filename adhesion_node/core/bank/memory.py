@@ -83,6 +83,8 @@ class Memory(NamedTuple):
     repeating: Repeating = Repeating()
     pointing: Pointing = Pointing()
     places: Scatter = Scatter()
+    placed_ns: int = -S
+    """Stamp of the last position that was taken in."""
     coarse: Coarse = Coarse()
     speeds: Coloured = Coloured(LASTING)
     shaking: Coloured = Coloured()

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..physics.train import Array
+from ..physics.train import GRAVITY, Array
 from ..setting import once
 from .kernels import moving
 from .kernels.weighing import variances
@@ -86,6 +86,12 @@ def resistance(config: Config, bank: Bank) -> Array:
 def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> Use:
     """Adhesion used under each hypothesis: axles slide where the rail gives less than the brake asks for."""
     return Use(*moving.used(model_of(config)[:], bank[:], resisting, (0.0, *braking, 0.0)), resisting)
+
+
+def slowing(config: Config, bank: Bank, braking: Braking) -> float:
+    """By how much the train slows down under the brake, m/s^2, on the mean of all hypotheses."""
+    resisting = resistance(config, bank)
+    return GRAVITY * float(bank.weight @ (use(config, bank, braking, resisting).value + resisting))
 
 
 def rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:

@@ -18,12 +18,11 @@ import numpy as np
 
 from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement
-from ..physics.train import GRAVITY
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import RADIUS, SPEED, Bank
 from .memory import Memory, S
-from .motion import resistance, use
+from .motion import slowing
 from .seeing import CLIPPED, corrected, fall_seen, speed_seen
 
 if TYPE_CHECKING:
@@ -128,9 +127,8 @@ def _telling(memory: Memory) -> Memory:
 
 def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
     """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
-    bank, resisting = memory.bank, resistance(config, memory.bank)
-    slowing = GRAVITY * float(bank.weight @ (use(config, bank, memory.braking, resisting).value + resisting))
-    rim_mps = memory.wheels.fastest(rims) - slowing * (memory.t_ns - t_ns) / S
+    bank = memory.bank
+    rim_mps = memory.wheels.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
     if rim_mps <= config.slowest_mps:
         return memory
     bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)

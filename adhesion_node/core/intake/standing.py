@@ -22,6 +22,9 @@ S = 1_000_000_000
 HELD_MPS = 3.0
 """What is slower is as good as standing: of such a train receivers tell that it stands."""
 
+QUICKEST_NS = S // 10
+"""Speeds that come faster may differ by as much as over this time: noise is no fall to a standstill."""
+
 
 class Standing(NamedTuple):
     """A speed as it was measured last, and whether it is of a standstill that cannot be."""
@@ -42,7 +45,8 @@ def moving(measurement: Measurement, standing: Standing, pace: Pace) -> tuple[Me
     """Without speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
     newest_mps, kept, left_out = measurement.speed_mps, list[SpeedSample](), list[float]()
     for sample in measurement.all_speeds:
-        slowest_mps = STRONGEST_MPS2 * abs(sample.t_ns - standing.t_ns) / S + HELD_MPS
+        elapsed_s = max(abs(sample.t_ns - standing.t_ns), QUICKEST_NS) / S
+        slowest_mps = STRONGEST_MPS2 * elapsed_s + HELD_MPS
         standing = standing.after(*sample[:2], slowest_mps, pace.runs)
         kept += [] if standing.silent else [sample]
         left_out += [sample.speed_mps] if standing.silent else []

@@ -63,6 +63,8 @@ class BrakeSeen(NamedTuple):
     """When the slide protection dumped last."""
     full_ns: int = 0
     """When the cylinder was last not empty."""
+    gauged: bool = False
+    """Whether samples come each by itself: what is said again between them is none."""
 
     def after(
         self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None, rolls: bool | None = None
@@ -87,7 +89,7 @@ class BrakeSeen(NamedTuple):
         empty = pressure < max(config.brake_threshold_pa, 1.0)
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
-            return BrakeSeen(recent, pressure, self._following(config, sample, pressure), None, full_ns)
+            return BrakeSeen(recent, pressure, self._following(config, sample, pressure), None, full_ns, self.gauged)
         lately = recent[bisect_left(recent, (t_ns - at_least(DUMP_NS, LATELY, every_ns),)) :]
         peak = max([each.pressure_pa for each in lately])
         dumped_ns = None if rolls else self.dumped_ns
@@ -110,7 +112,7 @@ class BrakeSeen(NamedTuple):
             applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
         if demand_pa is not None:  # what cylinders lack of it an electric brake gives
             applied = max(applied, self._following(config, sample, demand_pa))
-        return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns)
+        return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns, self.gauged)
 
     def _following(self, config: Config, sample: PressureSample, demanded_pa: float) -> float:
         """What presses by now of what is demanded, as the brake builds up and is released."""
@@ -118,6 +120,10 @@ class BrakeSeen(NamedTuple):
             return sample.pressure_pa
         most = (sample.t_ns - self.recent[-1].t_ns) / S * config.train.full_pressure_pa / config.brake_build_up_s
         return self.applied_pa + min(max(demanded_pa - self.applied_pa, -most), most)
+
+    def repeats(self, pressure_pa: float | None) -> bool:
+        """Whether a pressure is no new one, but the last sample said again until the next."""
+        return self.gauged and bool(self.recent) and pressure_pa == self.recent[-1].pressure_pa
 
     def has_slid(self, now_ns: int) -> bool:
         """Whether the slide protection has been at work of late."""

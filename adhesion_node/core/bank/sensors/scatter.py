@@ -18,6 +18,10 @@ SPAN_NS, SAMPLES = 5 * S // 2, 50
 """Three of a sensor's values within such a time tell how they scatter, whatever the train does; of how many the mean is
 taken."""
 
+SELDOM = 2.1
+"""Means over a second lie a value's period farther apart than that: three of them are looked at within so many times
+both, where that is longer."""
+
 LEAST, SLOW_LEAST = 20, 5
 """Of how many values it is taken at least, and of how many means over a second."""
 
@@ -42,13 +46,15 @@ class Scatter(NamedTuple):
     samples: int = 0
     least: int = LEAST
 
-    def after(self, t_ns: int, value: float, told: float, real: float = 0.0, far: float = FAR) -> Scatter:
+    def after(
+        self, t_ns: int, value: float, told: float, real: float = 0.0, far: float = FAR, span_ns: int = SPAN_NS
+    ) -> Scatter:
         """Note the next value, whose message tells such a variance; so much of it is no error."""
         before = (*self.before[-1:], (t_ns, value))
         if len(self.before) < 2:
             return self._replace(before=before)
         (first_ns, first), (middle_ns, middle) = self.before
-        if not first_ns < middle_ns < t_ns <= first_ns + SPAN_NS:
+        if not first_ns < middle_ns < t_ns <= first_ns + span_ns:
             return self._replace(before=before)
         share = (middle_ns - first_ns) / (t_ns - first_ns)
         off = middle - (1.0 - share) * first - share * value
@@ -102,7 +108,8 @@ class Coloured(NamedTuple):
         sum_s, summed_s = self.sum_s + value * elapsed_s, self.summed_s + elapsed_s
         if t_ns - self.since_ns < S:
             return self._replace(quick=quick, sum_s=sum_s, summed_s=summed_s)
-        slow = self.slow.after(t_ns, sum_s / summed_s, told * elapsed_s / summed_s, far=far)
+        span_ns = max(SPAN_NS, round(SELDOM * (1.0 + elapsed_s) * S))
+        slow = self.slow.after(t_ns, sum_s / summed_s, told * elapsed_s / summed_s, far=far, span_ns=span_ns)
         return Coloured(self.lasting, quick, slow)
 
     def variance_of(self, told: float, elapsed_s: float) -> float:
