@@ -83,3 +83,17 @@ def test_a_kernel_file_stands_alone(package: Any, module: Any) -> None:
         if isinstance(value, int | float) and name in constants:
             assert value == constants[name], name
     assert names <= {"annotations", "math", "numpy", "NDArray", "kernel", "TYPE_CHECKING", "NamedTuple"}
+
+
+@pytest.mark.parametrize("modules", MODULES.values(), ids=[package.__name__ for package in MODULES])
+def test_what_a_kernel_file_repeats_of_another_is_the_same(modules: Any) -> None:
+    """Functions of the same name and arguments that are private to their files."""
+    found: dict[tuple[str, str], set[str]] = {}
+    for module in modules:
+        with open(module.__file__, encoding="utf-8") as file:
+            tree = ast.parse(file.read())
+        for node in tree.body:
+            if isinstance(node, ast.FunctionDef) and node.name.startswith("_"):
+                body = node.body[1:] if ast.get_docstring(node) else node.body
+                found.setdefault((node.name, ast.unparse(node.args)), set()).add("\n".join(map(ast.unparse, body)))
+    assert [name for name, texts in found.items() if len(texts) > 1] == []

@@ -23,7 +23,8 @@ HELD_MPS = 3.0
 """What is slower is as good as standing: of such a train receivers tell that it stands."""
 
 QUICKEST_NS = S // 10
-"""Speeds that come faster may differ by as much as over this time: noise is no fall to a standstill."""
+"""Speeds that come faster may differ by as much as over this time: neither noise nor the last step of a train that
+comes to a stand is a fall to a standstill."""
 
 
 class Standing(NamedTuple):
@@ -32,6 +33,10 @@ class Standing(NamedTuple):
     t_ns: int = 0
     speed_mps: float = math.nan
     silent: bool = False
+
+    def fallen_mps(self, t_ns: int, strongest_mps2: float) -> float:
+        """By how much a speed may have fallen until a time, where none falls faster."""
+        return strongest_mps2 * max(abs(t_ns - self.t_ns), QUICKEST_NS) / S
 
     def after(self, t_ns: int, speed_mps: float, slowest_mps: float, runs: bool = False) -> Standing:
         """Note the next speed, NaN: not known; what was faster than `slowest_mps`, or `runs`, does not stand."""
@@ -45,8 +50,7 @@ def moving(measurement: Measurement, standing: Standing, pace: Pace) -> tuple[Me
     """Without speeds of a standstill that no brake brings about, or while positions run; and what is to be told."""
     newest_mps, kept, left_out = measurement.speed_mps, list[SpeedSample](), list[float]()
     for sample in measurement.all_speeds:
-        elapsed_s = max(abs(sample.t_ns - standing.t_ns), QUICKEST_NS) / S
-        slowest_mps = STRONGEST_MPS2 * elapsed_s + HELD_MPS
+        slowest_mps = standing.fallen_mps(sample.t_ns, STRONGEST_MPS2) + HELD_MPS
         standing = standing.after(*sample[:2], slowest_mps, pace.runs)
         kept += [] if standing.silent else [sample]
         left_out += [sample.speed_mps] if standing.silent else []

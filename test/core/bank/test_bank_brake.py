@@ -6,65 +6,20 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""What the brake does by its pressures: cycles of the slide protection are no release, a release is one."""
+"""What the brake does by its pressures: what is demanded, applied and released."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from banks import FULL_PA, S
+from pressures import CYLINDER, DEMANDED, MEAN, MS, applying, cycling, released, sampled, seen
 
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.config import Config
-from adhesion_node.core.intake.samples import PressureSample
-
-MS = S // 1000
-CYLINDER, MEAN, DEMANDED = (Config(method="bank", pressure_kind=kind) for kind in ("cylinder", "mean", "demanded"))
-
-
-def sampled(
-    pressure: Callable[[float], float], seconds: float, every_ms: int = 100, noise_pa: float = 0.0
-) -> list[PressureSample]:
-    rng = np.random.default_rng(1)
-    stamps = range(S, S + round(seconds * 1000) * MS, every_ms * MS)
-    return [PressureSample(t, pressure((t - S) / S) + noise_pa * rng.standard_normal()) for t in stamps]
-
-
-def seen(config: Config, samples: list[PressureSample], demand_pa: float | None = None) -> list[BrakeSeen]:
-    brakes = [BrakeSeen()]
-    for sample in samples:
-        brakes.append(brakes[-1].after(config, [sample], demand_pa))
-    return brakes[1:]
-
-
-def applying(time: float) -> float:
-    """Built up within 2 s."""
-    return FULL_PA * min(time / 2.0, 1.0)
-
-
-def cycling(period_s: float, least_pa: float) -> Callable[[float], float]:
-    """From 4 s on dumped in 0.3 s, held low for half a period, and built up again, over and over."""
-
-    def pressure(time: float) -> float:
-        if time < 4.0:
-            return applying(time)
-        phase = (time - 4.0) % period_s
-        if phase < 0.3:
-            return FULL_PA + (least_pa - FULL_PA) * phase / 0.3
-        if phase < 0.5 * period_s:
-            return least_pa
-        return least_pa + (FULL_PA - least_pa) * min((phase - 0.5 * period_s) / (0.4 * period_s), 1.0)
-
-    return pressure
-
-
-def released(time: float) -> float:
-    """From 4 s on eased to 150 kPa within 0.8 s, as a valve does."""
-    return applying(time) if time < 4.0 else 150e3 + (FULL_PA - 150e3) * 0.1 ** ((time - 4.0) / 0.8)
 
 
 @pytest.mark.parametrize("config", [CYLINDER, MEAN])
@@ -100,111 +55,6 @@ def test_what_cylinders_lack_of_the_demand_an_electric_brake_gives(config: Confi
     assert pressed[5:55:10] == pytest.approx([0.25, 0.75, 1.0, 1.0, 1.0], abs=0.3)
     assert pressed[58] == pytest.approx(1.0)
     assert pressed[-1] == pytest.approx(share, abs=0.01)
-
-
-@pytest.mark.parametrize("every_ms", [50, 100, 200])
-@pytest.mark.parametrize("least_pa", [0.0, 40e3, 150e3])
-@pytest.mark.parametrize("period_s", [1.0, 2.0])
-def test_cycles_of_one_cylinder_are_no_release(period_s: float, least_pa: float, every_ms: int) -> None:
-    samples = sampled(cycling(period_s, least_pa), 24.0, every_ms)
-    for sample, brake in zip(samples, seen(CYLINDER, samples), strict=True):
-        time = (sample.t_ns - S) / S
-        if time > 4.5:
-            assert brake.demanded_pa > 0.9 * FULL_PA, time
-            assert brake.applied_pa > 0.9 * FULL_PA, time  # the other cylinders
-            assert brake.has_slid(sample.t_ns)
-        elif time < 4.0:
-            assert not brake.has_slid(sample.t_ns)
-            assert brake.demanded_pa == pytest.approx(applying(time))
-
-
-@pytest.mark.parametrize("config", [CYLINDER, MEAN])
-@pytest.mark.parametrize("period_s", [2.7, 3.4, 4.3])
-def test_cycles_that_are_heard_once_a_second_are_no_release(config: Config, period_s: float) -> None:
-    """Dumps fall between samples; the first seconds behind the first one may still look like a brake that is eased."""
-    samples = sampled(cycling(period_s, 40e3), 60.0, 1000)
-    for sample, brake in zip(samples, seen(config, samples), strict=True):
-        assert brake.demanded_pa > 0.9 * FULL_PA or (sample.t_ns - S) / S < 4.0 + 2.0 * period_s
-
-
-@pytest.mark.parametrize("every_ms", [100, 1000])
-def test_a_brake_that_is_eased_is_eased_however_seldom_it_is_heard(every_ms: int) -> None:
-    samples = sampled(
-        lambda time: applying(time) if time < 8.0 else max(FULL_PA * (1.0 - 0.15 * (time - 8.0)), 0.0), 20.0, every_ms
-    )
-    brakes = seen(CYLINDER, samples)
-    assert all(brake.demanded_pa == sample.pressure_pa for sample, brake in zip(samples, brakes, strict=True))
-
-
-def test_a_cylinder_that_is_held_low_while_axles_slide_is_not_eased() -> None:
-    """No further dump is seen; what axles that roll tell, or an empty cylinder, ends it."""
-    samples, brake = sampled(lambda time: applying(time) if time < 4.0 else 0.2 * FULL_PA, 30.0), BrakeSeen()
-    for sample in samples:
-        brake = brake.after(CYLINDER, [sample], None, rolls=False)
-    assert brake.demanded_pa == FULL_PA
-    assert brake.after(CYLINDER, [PressureSample(31 * S, 0.2 * FULL_PA)], None, rolls=True).demanded_pa == 0.2 * FULL_PA
-    for index in range(20):
-        brake = brake.after(CYLINDER, [PressureSample(31 * S + index * 100 * MS, 0.0)], None, rolls=False)
-    assert brake.demanded_pa < FULL_PA
-
-
-@pytest.mark.parametrize("least_pa", [200e3, 300e3])
-def test_a_mean_pressure_swings_but_the_demand_is_held(least_pa: float) -> None:
-    samples = sampled(cycling(2.0, least_pa), 24.0)
-    brakes = seen(MEAN, samples)
-    later = [(sample, brake) for sample, brake in zip(samples, brakes, strict=True) if sample.t_ns - S > 7 * S]
-    assert all(brake.demanded_pa > 0.9 * FULL_PA for _, brake in later)
-    assert all(brake.applied_pa == brake.demanded_pa for _, brake in later)  # axles that roll are pressed with all
-
-
-@pytest.mark.parametrize("every_ms", [50, 100, 200])
-def test_behind_a_dump_small_swings_tell_that_the_protection_is_at_work(every_ms: int) -> None:
-    def pressure(time: float) -> float:
-        return applying(time) if time < 4.0 else FULL_PA * (0.6 + 0.05 * math.sin(math.pi * time))
-
-    samples = sampled(pressure, 24.0, every_ms, noise_pa=500.0)
-    for sample, brake in zip(samples, seen(MEAN, samples), strict=True):
-        if sample.t_ns > 6 * S:
-            assert brake.has_slid(sample.t_ns)
-            assert brake.demanded_pa > 0.9 * FULL_PA
-            assert not brake.rising
-
-
-@pytest.mark.parametrize("size", [-0.1, 0.1])
-def test_behind_a_dump_a_single_dip_or_hump_tells_it_too(size: float) -> None:
-    """At 7 to 7.8 s, when the pressure has been steady for 3 s: the protection is at work for 4 s more."""
-
-    def pressure(time: float) -> float:
-        bent = size * math.sin(math.pi * (time - 7.0) / 0.8) if 7.0 < time < 7.8 else 0.0
-        return applying(time) if time < 4.0 else FULL_PA * (0.6 + bent)
-
-    for sample in (samples := sampled(pressure, 14.0)):
-        assert sample.pressure_pa <= FULL_PA
-    for sample, brake in zip(samples, seen(MEAN, samples), strict=True):
-        time = (sample.t_ns - S) / S
-        if 5.0 < time < 11.0:
-            assert brake.demanded_pa == pytest.approx(FULL_PA), time
-        elif time > 12.5:
-            assert brake.demanded_pa == sample.pressure_pa, time
-
-
-def test_a_valve_that_holds_a_cylinder_low_for_two_seconds_is_no_release() -> None:
-    samples = sampled(lambda time: cycling(10.0, 150e3)(min(time, 5.0)), 6.3)
-    assert samples[-1].pressure_pa == 150e3
-    newest = seen(CYLINDER, samples)[-1]
-    assert (newest.demanded_pa, newest.applied_pa) == (FULL_PA, FULL_PA)
-
-
-@pytest.mark.parametrize("config", [CYLINDER, MEAN])
-def test_behind_a_dump_a_steady_or_falling_pressure_is_the_drivers_again(config: Config) -> None:
-    def pressure(time: float) -> float:
-        return applying(time) if time < 4.0 else FULL_PA * (0.6 - 0.01 * (time - 4.0))
-
-    samples = sampled(pressure, 24.0, noise_pa=500.0)
-    for sample, brake in zip(samples, seen(config, samples), strict=True):
-        if sample.t_ns > 10 * S:
-            assert not brake.has_slid(sample.t_ns)
-            assert brake.applied_pa == pytest.approx(sample.pressure_pa, rel=0.03)
 
 
 @pytest.mark.parametrize("kind", [CYLINDER, MEAN])

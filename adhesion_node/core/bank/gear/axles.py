@@ -16,13 +16,8 @@ from typing import NamedTuple
 from ...intake.standing import Standing
 from .repeating import Repeating
 
-S = 1_000_000_000
-
 FASTEST_FALL_MPS2 = 100.0
 """No brake stops a wheel faster, at the rim."""
-
-QUICKEST_NS = S // 10
-"""Of samples that come faster the fall is that over this time: each wheel comes through what is as good as standing."""
 
 ROLLS = 0.006
 """Error of a rim's speed under the brake where it rolls, relative."""
@@ -44,7 +39,7 @@ class Axles(NamedTuple):
         before = self if len(self.standing) == count else Axles((Repeating(),) * count, (Standing(),) * count)
         repeating = (one.after(rim, slowed_mps) for one, rim in zip(before.repeating, rims_mps, strict=True))
         standing = (
-            one.after(t_ns, rim, FASTEST_FALL_MPS2 * max(abs(t_ns - one.t_ns), QUICKEST_NS) / S, runs)
+            one.after(t_ns, rim, one.fallen_mps(t_ns, FASTEST_FALL_MPS2), runs)
             for one, rim in zip(before.standing, rims_mps, strict=True)
         )
         return Axles(tuple(repeating), tuple(standing))
