@@ -76,6 +76,8 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         return _accepted(config, state, measurement, memory, stepping)
     doubted = stepping.doubts(config)
     if elsewhere or (measurement.has_position and doubted) or off.nearest > config.gate_sigma:
+        if memory.braked and not doubted:  # one that may have stepped tells nothing
+            memory = memory._replace(course=memory.course.outlying(measurement.t_ns, off.stds))
         state = state._replace(stepping=stepping)
         elsewhere = elsewhere or (state.outliers + 1 >= config.max_outliers and not doubted)
         return _unbelieved(config, state, memory, measurement, off, elsewhere, rail)

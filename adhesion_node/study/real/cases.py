@@ -38,7 +38,7 @@ from . import point_mass
 AIDED = ("gnss_doppler", "gnss_smoothed", "gnss_imu", "radar", "doppler_only", "full")
 """Sets with a speed of their own or an accelerometer."""
 
-UNSOUND = ("tacho", "gnss_outages", "gnss_stamps", "tunnel_wheels", "one_cylinder", "no_pressure")
+UNSOUND = ("tacho", "tacho_1hz", "gnss_outages", "gnss_stamps", "tunnel_wheels", "one_cylinder", "no_pressure")
 """Sets whose sensors cannot be trusted, or lack what a narrow answer needs."""
 
 SLOWEST_BUILD_UP = 1.15
@@ -112,7 +112,7 @@ CASES = tuple(
         (point_mass.NAME, "white"),
         ("wet", "white gnss gnss_wheels gnss_doppler gnss_smoothed gnss_imu radar doppler_only tacho axle_speed"),
         ("wet", "gnss_recorded fix gnss_sure gnss_zero_covariance gnss_outages gnss_1hz gnss_late gnss_stamps full"),
-        ("wet", "tunnel_wheels electric_demand one_axle rear_wheels wheels_1hz"),
+        ("wet", "tunnel_wheels electric_demand one_axle rear_wheels wheels_1hz tacho_1hz"),
         ("wet_mass_over", "white gnss_wheels"),
         ("wet_pads_weak", "gnss_wheels"),
         ("wet_fast", "gnss_doppler"),
@@ -129,7 +129,8 @@ CASES = tuple(
         ("sequence_dry", "gnss_doppler"),
         ("leaves", "white gnss gnss_recorded gnss_wheels gnss_smoothed gnss_imu gnss_outages"),
         ("leaves", "one_cylinder one_cylinder_wheels mean_cylinder mean_cylinder_wheels mean_cylinder_demand"),
-        ("leaves", "wheel_dropouts tunnel_wheels electric_demand one_axle rear_wheels wheels_1hz no_pressure full"),
+        ("leaves", "wheel_dropouts tunnel_wheels electric_demand one_axle rear_wheels wheels_1hz tacho_1hz"),
+        ("leaves", "no_pressure full"),
         ("leaves_severe", "gnss_doppler"),
         ("wet_rough", "gnss gnss_wheels gnss_doppler"),
         ("wet_falls", "gnss gnss_wheels gnss_doppler"),
@@ -146,7 +147,7 @@ CASES = tuple(
         ("freight_wet", "gnss_doppler"),
         ("freight_leaves", "gnss"),
         ("tram_dry", "gnss_wheels"),
-        ("tram_wet", "full"),
+        ("tram_wet", "full tacho"),
         ("tram_leaves", "gnss_wheels"),
     )
     for fitted in sets.split()

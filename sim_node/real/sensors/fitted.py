@@ -64,6 +64,7 @@ def _pressure(of: str) -> dict[str, Mounted]:
 _WHITE = {"position": Mounted(Gnss(0.0, white_std_m=0.5), _BUS, "receiver")}
 _FIX = {"fix": Mounted(GnssFix(Gnss()), _RECEIVER, "receiver")}
 _TACHO = {"tacho": Mounted(TachoPosition(), _BUS, "tacho")}
+_TACHO_1HZ = {"tacho": Mounted(TachoPosition(), Timing(rate_hz=1.0), "tacho")}
 _DOPPLER = {"speed doppler": Mounted(DOPPLER, _RECEIVER, "receiver")}
 _SMOOTHED = {"speed smoothed doppler": Mounted(SMOOTHED, _RECEIVER, "receiver")}
 _RADAR = {"speed radar": Mounted(RADAR, _BUS, "radar")}
@@ -114,6 +115,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("axle_speed", "satellites and the speed of an axle that slides", _gnss(), _DEMANDED, _AXLE),
             ("doppler_only", "the receiver's speed, no position", _DOPPLER, _DEMANDED),
             ("tacho", "the position of an axle that slides", _TACHO, _DEMANDED),
+            ("tacho_1hz", "the same once a second", _TACHO_1HZ, _DEMANDED),
             ("one_cylinder", "satellites, the pressure of one cylinder", _gnss(), _CYLINDER),
             ("one_cylinder_wheels", "the same and the wheels", _gnss(), _CYLINDER, _WHEELS),
             ("mean_cylinder", "satellites, the mean pressure of the cylinders", _gnss(), _MEAN),

@@ -56,9 +56,10 @@ def gauss_markov(count: int, rng: np.random.Generator, std: float, lasts_s: floa
     return error
 
 
-def followed(positions: Array, std: float) -> tuple[State, list[Estimate]]:
+def followed(positions: Array, std: float, every: int = 1) -> tuple[State, list[Estimate]]:
+    """By one of so many positions."""
     state, estimates = init(CONFIG, 1), []
-    for index, position in enumerate(positions):
+    for index, position in tuple(enumerate(positions))[::every]:
         pressure = FULL_PA if BRAKE_S <= index * H < RELEASE_S else 0.0
         measurement = Measurement(S + round(index * H * 1e9), float(position), std**2, pressure)
         state, estimate = step(CONFIG, state, measurement)
@@ -99,14 +100,38 @@ def test_a_wheel_that_slides_a_little_by_turns_is_caught(seed: int, slip: float)
     assert min((each.t_ns - S) / S for each in estimates if each.withheld) < BRAKE_S + 5.0
 
 
+@pytest.mark.parametrize("every", [3, 5, 10])
+@pytest.mark.parametrize(("slip", "more"), [(0.1, 2), (0.2, 5)])
+def test_a_wheel_that_is_heard_seldom_is_caught(slip: float, more: int, every: int) -> None:
+    """Down to one position a second, within so many that are off; what is off by far may first be a step."""
+    for seed in range(4):
+        _, speeds = truth(0.03)
+        state, estimates = followed(wheel(speeds, np.random.default_rng(seed), slip), 0.5, every)
+        assert state.counts[Outcome.SLIDING] > 0, seed
+        first = min((each.t_ns - S) / S for each in estimates if each.withheld)
+        assert BRAKE_S + 1.0 < first <= BRAKE_S + 2.0 + more * every * H
+
+
+@pytest.mark.parametrize(("lasts_s", "every"), [(0.1, 10), (0.1, 1), (0.25, 1)])
+def test_outliers_that_have_one_cause_are_no_sliding_wheel(lasts_s: float, every: int) -> None:
+    """By 60 m behind under the brake, every 5 s: one of positions once a second, or a burst of some of ten."""
+    places, _ = truth(0.05)
+    index = np.arange(places.size)
+    off = np.where((index * H > BRAKE_S + 2.0) & (index % 50 * H < lasts_s), -60.0, 0.0)
+    state, _ = followed(places + off + 0.2 * np.random.default_rng(1).standard_normal(places.size), 0.5, every)
+    assert state.counts[Outcome.OUTLIER] >= 3
+    assert state.counts[Outcome.SLIDING] == 0
+
+
+@pytest.mark.parametrize("every", [1, 3, 10])
 @pytest.mark.parametrize(("mu", "seeds"), [(0.03, range(3)), (0.2, range(20))])
-def test_a_receiver_whose_error_wanders_is_believed(mu: float, seeds: range) -> None:
+def test_a_receiver_whose_error_wanders_is_believed(mu: float, seeds: range, every: int) -> None:
     """Errors of 2 m that last 30 s."""
     places, speeds = truth(mu)
     for seed in seeds:
         rng = np.random.default_rng(seed)
         error = gauss_markov(places.size, rng, 2.0, 30.0) + 0.1 * rng.standard_normal(places.size)
-        state, estimates = followed(places + error, 2.0)
+        state, estimates = followed(places + error, 2.0, every)
         assert state.counts[Outcome.SLIDING] == 0, seed
         assert state.counts[Outcome.RESET] == 0
         assert not estimates[-1].withheld

@@ -89,6 +89,19 @@ def test_what_limits_is_said_by_the_wheels_and_where_some_slide_by_nothing(slidi
     assert found(CONFIG, memory, NOTHING, NOTHING).regime is regime
 
 
+@pytest.mark.parametrize(("part", "regime"), [(0.71, Regime.BRAKE_LIMITED), (0.69, Regime.COASTING)])
+def test_where_far_less_is_used_than_the_brake_should_give_rolling_wheels_claim_nothing(
+    part: float, regime: Regime
+) -> None:
+    """All of them may be held at the same creep, which none of them shows."""
+    config = replace(CONFIG, brake_std=0.1, mass_std=0.0, rotating_mass_std=0.0)
+    bank = bank_of([HELD], spread=0.0)
+    bank.mean[:, BRAKE] = part
+    memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(FULL), 3)
+    memory = memory._replace(wheels=WheelsSeen((1.0,) * 4, 0, 0.03, (None,) * 4, (10 * S,) * 4))
+    assert found(config, memory, NOTHING, NOTHING).regime is regime
+
+
 def limits(kind: int, used: float, told: float = 0.0, config: Config = CONFIG) -> Regime:
     """Without wheels, of a train that slows down for this reason by this part of its full brake."""
     bank = bank_of([kind], spread=0.0).with_fresh(ROUGH, 0.0, 0.0)
@@ -106,7 +119,10 @@ def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well()
     assert limits(HELD, 0.89, config=config) is Regime.COASTING
     assert limits(SMOOTH, 0.5) is Regime.ADHESION_LIMITED
     assert limits(SMOOTH, 0.97) is Regime.COASTING
-    assert limits(SMOOTH, 0.97, told=4.0) is Regime.ADHESION_LIMITED, "the slide protection says it"
+    mean, one = replace(config, pressure_kind="mean"), replace(config, pressure_kind="cylinder")
+    assert limits(SMOOTH, 0.97, told=4.0, config=mean) is Regime.ADHESION_LIMITED, "the slide protection says it"
+    assert limits(SMOOTH, 0.91, told=4.0, config=one) is Regime.COASTING, "of one axle, maybe the only one"
+    assert limits(SMOOTH, 0.89, told=4.0, config=one) is Regime.ADHESION_LIMITED
 
 
 def test_a_brake_is_said_to_limit_only_where_it_gives_what_is_demanded() -> None:

@@ -21,7 +21,7 @@ from adhesion_node.command.running import Running
 from adhesion_node.core.physics.train import GRAVITY
 from adhesion_node.study.__main__ import main
 from adhesion_node.study.real import point_mass
-from adhesion_node.study.real.cases import CASES, chosen
+from adhesion_node.study.real.cases import CASES, Case, chosen
 from adhesion_node.study.real.trials import arrays, found
 from adhesion_node.study.real.truth import truth_at
 from sim_node.real.plant.scenarios import SCENARIOS
@@ -79,7 +79,7 @@ def test_the_point_mass_slides_all_the_way_to_its_standstill() -> None:
 
 def test_positions_of_an_axle_that_slides_are_left_out_before_they_mislead() -> None:
     """This one slides so little, and by turns, that no deceleration of it is impossible."""
-    (case,) = chosen("wet tacho")
+    case = Case("wet", "tacho")
     (drive,) = case.drives([5001])
     parts = arrays(drive, case.config, case.built_after_s)
     rows, (run,) = parts["rows"], parts["runs"]

@@ -52,6 +52,9 @@ LIKELY = 0.5
 SLIDES_FROM, CLAIMED = 0.5, 0.8
 """Share of sliding axles that leaves no doubt, and the probability from which something is claimed without them."""
 
+HELD_BACK = 3.0
+"""Errors of the brake by which less is used than it should give, from which all axles may be held at some creep."""
+
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 
@@ -102,11 +105,15 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     """What limits: the wheels know best; else nothing is claimed that a wrong brake could explain as well."""
     share = memory.wheels.share(memory.t_ns)
-    if share is not None and not BRAKE_BELOW <= share < SLIDES_FROM:
-        return Regime.ADHESION_LIMITED if share >= SLIDES_FROM else Regime.BRAKE_LIMITED
     demanded = config.train.specific_brake(memory.brake.demanded_pa)
     part, error = mu / max(demanded, 1e-6), config.brake_error
-    if slides > CLAIMED and (part < 1.0 - 2.0 * error or memory.braking.told > 0.0):
+    if share is not None and share >= SLIDES_FROM:
+        return Regime.ADHESION_LIMITED
+    if share is not None and share < BRAKE_BELOW and part > 1.0 - HELD_BACK * error:
+        return Regime.BRAKE_LIMITED
+    alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides
+    dumped = memory.braking.told > 0.0 and (part < 1.0 - error or not alone)
+    if slides > CLAIMED and (part < 1.0 - 2.0 * error or dumped):
         return Regime.ADHESION_LIMITED
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake
     weak = config.train.full_brake <= SLIPPERY  # a film may give what such a brake asks for, to within its error

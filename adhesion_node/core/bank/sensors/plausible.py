@@ -44,10 +44,13 @@ WHITE, WANDERING = 720.0, 34.0
 n T^4, or that of errors which wander, over the time that they last and T^3. At the part u of the time a position weighs
 360 (u^2 - u + 1/6)/T^2: the mean square of that is 720/T^4, the one of its integral, twice, 240/7."""
 
-ALIKE_S, FAR, ALIKE, SAMPLES = 1.0, 3.2, 2.5, 4.0
-"""Over such a time the product of deviations that follow each other, in standard deviations by the hypothesis nearest
-and counted as no more than this, is above so much in the mean of so many at least: errors that come by chance, however
-large, do not follow each other so, and those that wander are foreseen."""
+FAR, FORESEEN, RUNS_OFF = 4.0, 2.0, 10.0
+"""Deviations by the hypothesis nearest count as no more than so many standard deviations. Of the product of one and the
+next so much is foreseen each time; what is more is summed up, and above the last runs off (Page 1954). Errors that come
+by chance, however large, do not follow each other so, and those that wander are foreseen."""
+
+BURST_NS = 300_000_000
+"""Positions not believed that follow each other sooner have one cause, as a signal that is reflected."""
 
 GAIN_MPS2, BRAKED_NS = 0.1, 3 * S
 """A train that has been braked so long does not gain speed by more than this, and the grade's part."""
@@ -60,13 +63,12 @@ class Course(NamedTuple):
     recent: tuple[tuple[int, float], ...] = ()
     braked_ns: int | None = None
     """Since when the brake is applied."""
-    off_ns: int = 0
+    heard_ns: int = 0
+    """Stamp of the newest, believed or not, ..."""
     off: float = 0.0
-    """Stamp and deviation of the newest, in standard deviations, ..."""
-    alike: float = 0.0
-    """... its product with the one before, with those under this brake before it, older ones fading, ..."""
-    samples: float = 0.0
-    """... and how many they are."""
+    """... how far off it was, in standard deviations, ..."""
+    running: float = 0.0
+    """... and how far they run off."""
 
     def after(self, t_ns: int, position_m: float, braked: bool, off: float | None) -> Course:
         """With the next position, and how far off it is in standard deviations by the hypothesis nearest, if known."""
@@ -75,16 +77,25 @@ class Course(NamedTuple):
         recent, braked_ns = (*self.recent[first:end], (t_ns, position_m)), before.braked_ns
         if braked_ns is None and braked:
             braked_ns = t_ns
+        return before._replace(recent=recent, braked_ns=braked_ns)._running(t_ns, off)
+
+    def outlying(self, t_ns: int, off: float | None) -> Course:
+        """With a position that is not believed: such as come soon are of one burst."""
+        if t_ns - self.heard_ns < BURST_NS:
+            return self._replace(heard_ns=t_ns)
+        return self._running(t_ns, off)
+
+    def _running(self, t_ns: int, off: float | None) -> Course:
         if off is None:
-            return before._replace(recent=recent, braked_ns=braked_ns)
-        off, fading = min(max(off, -FAR), FAR), math.exp(-abs(t_ns - before.off_ns) / (ALIKE_S * S))
-        alike, samples = fading * before.alike + off * before.off, fading * before.samples + 1.0
-        return Course(recent, braked_ns, t_ns, off, alike, samples)
+            return self._replace(heard_ns=t_ns)
+        off = min(max(off, -FAR), FAR)
+        running = max(self.running + max(off * self.off, 0.0) - FORESEEN, 0.0)
+        return self._replace(heard_ns=t_ns, off=off, running=running)
 
     @property
     def runs_off(self) -> bool:
         """Whether the positions under the brake run off in a way that none of the known errors does."""
-        return self.samples > SAMPLES and self.alike > ALIKE * self.samples
+        return self.running > RUNS_OFF
 
     def is_impossible(self, config: Config, bank: Bank, declared_m: float, rounded_m: float = 0.0) -> bool:
         """Whether no train moves so: they run off, or a parabola through them says so in spite of their errors."""
