@@ -19,7 +19,7 @@ from typing import Any
 
 import pytest
 from rclpy.serialization import serialize_message
-from slowing import START_NS, TRUTH, S, record, rows
+from slowing import START_NS, TRUTH, S, record, rows, undrawn
 from std_msgs.msg import Float64
 from test_offline import samples, write_run
 
@@ -27,6 +27,8 @@ from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
 from adhesion_node.wire.topics import TRUTH_MU
+
+__all__ = ["undrawn"]
 
 QUICK = ("--set", "estimate_s=1.0")
 
@@ -105,6 +107,7 @@ def test_a_recording_with_results_is_shown_as_recorded(shown: tuple[Path, dict[s
     assert (folder / "mine.pdf").read_bytes().startswith(b"%PDF")
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: Path) -> None:
     write_run(tmp_path / "bag", samples())
     _, page = make(tmp_path, str(tmp_path / "bag"), *QUICK)
@@ -126,6 +129,7 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     assert last["safe"]["y"][-1] == 0.0
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("results", [True, False])
 def test_messages_that_do_not_decode_are_left_out_and_told(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], results: bool
@@ -184,6 +188,7 @@ def test_a_recorded_number_that_is_none_leaves_a_gap(tmp_path: Path) -> None:
     assert [second for second, value in enumerate(values) if value is None] == [7]
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize("text", ["high", "", "inf", "\u00b2", "9" * 5000])
 def test_what_should_be_a_number_and_is_none_is_told(
     text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
@@ -200,6 +205,7 @@ def test_what_should_be_a_number_and_is_none_is_told(
     assert line == f"report: bag: its diagnostics tell no number: {odd}: left out"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_the_only_train_of_a_recording_is_shown_whatever_its_namespace(tmp_path: Path) -> None:
     without, _ = make(tmp_path, str(record(tmp_path / "bag")))
     within, page = make(tmp_path, str(record(tmp_path / "other" / "bag", namespaces=["/line1/train7"])))
@@ -207,6 +213,7 @@ def test_the_only_train_of_a_recording_is_shown_whatever_its_namespace(tmp_path:
     assert lines(page.data["runs"][0], "Adhesion")["identified"]["y"] == [None] * 5 + [0.09] * 15
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_of_several_trains_one_is_to_be_chosen(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     both = str(record(tmp_path / "both", namespaces=["/train2", "/train1"]))
     assert main([both, "--output", str(tmp_path / "report")]) == 2
@@ -220,6 +227,7 @@ def test_of_several_trains_one_is_to_be_chosen(tmp_path: Path, capsys: pytest.Ca
     assert result["runs"][0]["source"] == "as recorded"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_setting_that_counts_for_a_recording_with_results_is_taken(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,11 +13,13 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pandas as pd
 import pytest
 import test_offline
+from tasks import computed_here
 from test_import_log import ride, text
 from test_offline import NO_TRUTH, samples, write_run
 
@@ -35,6 +37,13 @@ def bags(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_run(folder / "tuesday", samples(15.0, 26.0), names=NO_TRUTH)
     (folder / "broken.mcap").write_bytes(b"nothing")
     return folder
+
+
+@pytest.fixture
+def here() -> Iterator[None]:
+    """Compute in this process: that other ones can do it is shown by the first test below."""
+    with computed_here():
+        yield
 
 
 def test_all_brakings_are_one_table_whatever_a_single_recording_is_worth(
@@ -63,6 +72,7 @@ def test_all_brakings_are_one_table_whatever_a_single_recording_is_worth(
     assert (pieces["mu_lower"] > 0.0).all()
 
 
+@pytest.mark.usefixtures("here")
 def test_what_is_finished_is_kept(bags: Path, tmp_path: Path) -> None:
     options = ["--output", str(tmp_path / "brakings.csv"), "--cache", str(tmp_path / "cache")]
     assert brakings.main([str(bags / "monday"), *options]) == 0
@@ -73,6 +83,7 @@ def test_what_is_finished_is_kept(bags: Path, tmp_path: Path) -> None:
     assert ((tmp_path / "brakings.csv").read_bytes(), kept.stat().st_mtime_ns) == (first, written)
 
 
+@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("copied", [False, True])
 def test_a_braking_counts_once_however_often_it_is_given(
     copied: bool, bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
@@ -101,6 +112,7 @@ def told(capfd: pytest.CaptureFixture[str]) -> list[str]:
     return [line for line in capfd.readouterr().err.splitlines() if line.startswith("brakings: ")]
 
 
+@pytest.mark.usefixtures("here")
 def test_stamps_without_a_date_are_said_of_a_map(
     bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -116,6 +128,7 @@ def test_stamps_without_a_date_are_said_of_a_map(
     assert told(capfd) == [], "a table tells no age"
 
 
+@pytest.mark.usefixtures("here")
 def test_a_recording_without_positions_is_in_the_table_alone(
     bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -155,6 +168,7 @@ def test_no_file_takes_the_place_of_the_table(
     assert not Path("cache").exists(), "nothing is replayed"
 
 
+@pytest.mark.usefixtures("here")
 def test_a_name_of_bytes_that_are_no_text_is_escaped(bags: Path, tmp_path: Path) -> None:
     named, table = tmp_path / os.fsdecode(b"t\xff"), tmp_path / "brakings.csv"
     named.symlink_to(bags / "monday", target_is_directory=True)

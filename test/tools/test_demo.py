@@ -70,6 +70,12 @@ def run_demo(tmp_path: Path) -> Callable[..., dict[str, Any]]:
     return _run
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the picture, which takes a second, where the test is of something else."""
+    monkeypatch.setattr(demo, "draw", lambda *_: None)
+
+
 def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
     tmp_path: Path, run_demo: Callable[..., dict[str, Any]], capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -174,6 +180,7 @@ def _statuses(bag: Path) -> list[tuple[int, str, str]]:
         ]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable[..., dict[str, Any]]) -> None:
     for name in ("demo", "demo_2"):
         (tmp_path / name).mkdir()
@@ -184,6 +191,7 @@ def test_a_folder_that_is_taken_is_left_alone(tmp_path: Path, run_demo: Callable
         assert [path.name for path in (tmp_path / name).iterdir()] == ["mine.txt"]
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_two_at_once_take_two_folders(
     tmp_path: Path, run_demo: Callable[..., dict[str, Any]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -194,6 +202,7 @@ def test_two_at_once_take_two_folders(
     assert Path(run_demo()["bag"]) == tmp_path / "demo_2" / "bag"
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_its_folder_may_be_read_by_whom_the_umask_lets(tmp_path: Path, run_demo: Callable[..., dict[str, Any]]) -> None:
     before = os.umask(0o027)
     try:
@@ -203,6 +212,7 @@ def test_its_folder_may_be_read_by_whom_the_umask_lets(tmp_path: Path, run_demo:
     assert (tmp_path / "demo").stat().st_mode & 0o777 == 0o750
 
 
+@pytest.mark.usefixtures("undrawn")
 def test_one_scenario_shows_every_level_of_the_supervision(run_demo: Callable[..., dict[str, Any]]) -> None:
     told = run_demo("--scenario", "approach")["atp"].split(" > ")
     once = list(dict.fromkeys(told[1:]))  # before the first pair of state and curve no distance is safe

@@ -24,6 +24,7 @@ from std_msgs.msg import Float64
 
 from adhesion_node.bag import BagReader, BagWriter
 from adhesion_node.core.physics.train import Train
+from adhesion_node.report.drawn import picture
 from adhesion_node.report.read.recorded import read_run
 from adhesion_node.report.read.run import Run
 from adhesion_node.wire.topic import Topic
@@ -76,3 +77,9 @@ def read(path: Path) -> Run:
 @pytest.fixture
 def recorded(tmp_path: Path) -> Run:
     return read(record(tmp_path / "bag"))
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave out the pictures of a report, a second each, where the test is of its page, words or rows."""
+    monkeypatch.setattr(picture, "draw", lambda *_: None)

@@ -14,13 +14,16 @@ import csv
 from pathlib import Path
 
 import pytest
-from slowing import START_NS, S, record
+from slowing import START_NS, S, record, undrawn
 from test_offline import NO_TRUTH, samples, write_run
 
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
 
+__all__ = ["undrawn"]
 
+
+@pytest.mark.usefixtures("undrawn")
 def test_of_sensors_alone_the_rows_are_those_of_an_offline_replay(tmp_path: Path) -> None:
     bag, ours, theirs = str(tmp_path / "bag"), tmp_path / "ours.csv", tmp_path / "theirs.csv"
     write_run(tmp_path / "bag", samples(), names=NO_TRUTH)
@@ -30,6 +33,7 @@ def test_of_sensors_alone_the_rows_are_those_of_an_offline_replay(tmp_path: Path
     assert ours.read_bytes() == theirs.read_bytes()
 
 
+@pytest.mark.usefixtures("undrawn")
 @pytest.mark.parametrize(("options", "sign"), [((), 1), (("--set", "direction=down"), -1)])
 def test_results_as_recorded_are_rows_with_what_was_recorded(
     options: tuple[str, ...], sign: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
