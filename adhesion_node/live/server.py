@@ -34,7 +34,7 @@ BEHIND = 50
 """Messages that wait for a viewer until it is given up: it comes back and is sent the whole."""
 
 HEADERS = {
-    "Content-Security-Policy": f"{POLICY}; connect-src 'self'; img-src data:; frame-ancestors 'none'",
+    "Content-Security-Policy": f"{POLICY}; connect-src 'self'; frame-ancestors 'none'",
     "X-Content-Type-Options": "nosniff",
     "Referrer-Policy": "no-referrer",
     "Cache-Control": "no-store",

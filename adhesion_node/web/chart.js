@@ -78,7 +78,8 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     ctx.beginPath();
     ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
     ctx.clip();
-    ctx.font = `${11 * px}px system-ui, sans-serif`;
+    // The axes leave an alignment of their own.
+    [ctx.font, ctx.textAlign, ctx.textBaseline] = [`${11 * px}px system-ui, sans-serif`, "left", "alphabetic"];
     for (const band of spec.bands ?? []) {
       const left = Math.max(u.valToPos(band.from, "x", true), bbox.left), right = Math.min(u.valToPos(band.to, "x", true), bbox.left + bbox.width);
       if (right <= left) continue;
@@ -96,7 +97,7 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     ctx.rect(bbox.left - 6 * px, 0, bbox.width + 12 * px, bottom + 6 * px);
     ctx.clip();
     spec.lines.forEach((line, i) => LOOKS[line.kind].arrows && arrows(u, i + 1));
-    ctx.font = `600 ${11 * px}px system-ui, sans-serif`;
+    [ctx.font, ctx.textBaseline] = [`600 ${11 * px}px system-ui, sans-serif`, "alphabetic"];
     for (const event of spec.events ?? []) {
       const x = u.valToPos(event.x, "x", true);
       ctx.fillStyle = ink(`event ${event.kind}`);
@@ -153,12 +154,14 @@ function chart(host, { view = shared(), onPick = null } = {}) {
         const look = LOOKS[line.kind];
         return { label: line.label, value, stroke: () => ink(line.kind), width: look.width ?? 1.6, dash: look.dash, points: { show: look.points !== undefined, size: look.points, fill: () => ink(line.kind) } };
       })],
-      legend: { mount: (_, legend) => area.after(legend), markers: { width: 3, dash: (u, i) => (LOOKS[spec.lines[i - 1]?.kind]?.dash ? "dashed" : "solid") } },
+      legend: { mount: (_, legend) => area.after(legend), markers: { width: 3, stroke: () => "currentColor", dash: (u, i) => (LOOKS[spec.lines[i - 1]?.kind]?.dash ? "dashed" : "solid") } },
       cursor: { sync: { key: spec.x.label, scales: ["x", null] }, drag: { x: true, y: false, setScale: false }, points: { size: 6 },
                 bind: { dblclick: () => () => view.show(null),
                         mousedown: (u, _, handler) => (event) => (event.shiftKey ? drag(event) : handler(event)) } },
-      hooks: { drawClear: [bands(false)], drawAxes: [bands(true)], draw: [over], setSelect: [select] },
+      hooks: { drawClear: [bands(false)], drawAxes: [bands(true)], draw: [over], setSelect: [select], setCursor: [point] },
     }, table(), area);
+    point(plot);
+    figure.querySelectorAll(".u-marker").forEach((marker, i) => i > 0 && marker.classList.add("ink", spec.lines[i - 1].kind));
     pointer = plot.over.appendChild(element("div", { class: "present" }));
     const wrap = plot.root.querySelector(".u-wrap");
     for (const [name, text] of Object.entries({ tabindex: 0, role: "group", "aria-label": `${spec.title}: chart` })) wrap.setAttribute(name, text);
@@ -169,6 +172,9 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     }, { passive: false });
     plot.over.addEventListener("click", (event) => onPick?.(plot.posToVal(event.offsetX, "x")));
   }
+
+  // Without a pointer the legend does not name x. WebKit does not follow `:has(:empty)` here, a class it does.
+  function point(u) { figure.classList.toggle("pointed", u.cursor.idx != null); }
 
   function select(u) {
     const { left, width } = u.select;
@@ -214,8 +220,9 @@ function chart(host, { view = shared(), onPick = null } = {}) {
 
   const rescale = () => { const [min, max] = range(); plot?.setScale("x", { min, max }); };
 
+  // At once: what is only queued comes too late for the paper, as Firefox may print before.
   function fit() {
-    if (plot !== null && area.clientWidth > 0) plot.setSize({ width: area.clientWidth, height: area.clientHeight });
+    if (plot !== null && area.clientWidth > 0) plot.batch(() => plot.setSize({ width: area.clientWidth, height: area.clientHeight }));
   }
 
   function place() {

@@ -4,6 +4,7 @@
 // The report: a column of charts for every run, and one present that slider, charts, rows of brakings and the address move.
 
 const { runs, target_kmh: target, fixed_mu: fixedMu } = JSON.parse(document.getElementById("data").textContent);
+const ADDRESS_MS = 200;
 const slider = document.getElementById("slider"), shownTime = document.getElementById("time");
 const LIMITS = { permitted: "permitted", warning: "warning", sbi: "service brake", ebi: "emergency brake" };
 const all = (pick) => runs.flatMap(pick), highest = (values) => values.reduce((high, value) => Math.max(high, value), 1);
@@ -88,7 +89,15 @@ function show(t) {
   slider.value = String(shown);
   shownTime.textContent = `${shown.toFixed(1)} s`;
   columns.forEach((update) => update(shown, wide));
-  history.replaceState(null, "", `#t=${Number(shown.toFixed(1))}`);
+  address(`#t=${Number(shown.toFixed(1))}`);
+}
+
+// The address follows a moving slider five times a second: Safari refuses more than ten.
+let told_ms = -ADDRESS_MS, later;
+function address(hash) {
+  const tell = () => { told_ms = performance.now(); history.replaceState(null, "", hash); }, wait_ms = told_ms + ADDRESS_MS - performance.now();
+  clearTimeout(later);
+  if (wait_ms <= 0) tell(); else later = setTimeout(tell, wait_ms);
 }
 
 const asked = () => /t=([\d.]+)/.exec(location.hash)?.[1];

@@ -48,8 +48,9 @@ class Parser(HTMLParser):
         self._inside = tag if tag in ("script", "style") else self._inside
         if tag == "script" and ("id", "data") in attrs:
             self._inside = "data"
-        self.fetched += [f"{tag} {name}" for name, _ in attrs if name in ("src", "href", "srcset", "action")]
-        self.fetched += [tag] if tag in ("link", "iframe", "object", "base") else []
+        asked = [name for name, value in attrs if not str(value).startswith("data:")]
+        self.fetched += [f"{tag} {name}" for name in asked if name in ("src", "href", "srcset", "action")]
+        self.fetched += [tag] if tag in ("iframe", "object", "base") else []
 
     def handle_endtag(self, tag: str) -> None:
         self._inside = "" if tag in ("script", "style") else self._inside
@@ -164,6 +165,8 @@ def test_the_page_fetches_nothing(shown: tuple[Path, dict[str, Any], Parser]) ->
     html = (folder / "report.html").read_text(encoding="utf-8")
     assert set(re.findall(r"https?://[^\s\"']+", html)) == {"http://www.w3.org/2000/svg"}
     assert "default-src 'none'" in html
+    assert '<link rel="icon" href="data:,">' in html, "else a browser asks the server for a picture, in vain"
+    assert "img-src data:" in html
     assert not re.search(r"@import|url\((?!#)", html)
 
 

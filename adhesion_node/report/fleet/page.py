@@ -123,7 +123,7 @@ def _button(text: str, from_m: float, to_m: float, date: str = ALL) -> str:
 def _legend() -> str:
     between = (f"{low:g} to {high:g}" for low, high in pairwise(EDGES))
     names = (f"below {EDGES[0]:g}", *between, f"from {EDGES[-1]:g}")
-    return "".join(f'<span><i class="tile m{kind}"></i>{name}</span>' for kind, name in enumerate(names))
+    return " ".join(f'<span><i class="tile m{kind}"></i>{name}</span>' for kind, name in enumerate(names))
 
 
 def _map(fleet: Fleet, dates: list[str], track: tuple[float, float]) -> str:

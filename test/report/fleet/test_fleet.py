@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -104,6 +105,8 @@ def test_the_page_has_a_row_for_each_braking_and_says_how_low_where(
     page = Path(told["page"]).read_text(encoding="utf-8")
     assert "unit_8 &lt;b&gt;" in page
     assert "unit_8 <b>" not in page
+    legend = re.findall(r'<p class="legend">(.*)</p>', page)[0]
+    assert legend.count("</span> <span>") == legend.count("<span>") - 1 == 4, "Firefox breaks a line at a space alone"
 
 
 def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:

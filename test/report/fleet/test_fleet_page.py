@@ -126,6 +126,7 @@ def test_paper_has_the_places_and_dates_that_are_buttons_on_the_screen(report: s
         picture = seen.look(page)
         for told in ("1.00 to 1.20 km", *DATES, "2023-11-14 22:13:20"):
             assert picture.has(told), told
+        assert page.evaluate("[...document.querySelectorAll('.scroll')].every((each) => each.scrollWidth <= 680)")
 
 
 @pytest.mark.parametrize("look", browser.LOOKS)
