@@ -155,7 +155,7 @@ def report_() -> None:
     recordings = [folder() / "recordings" / name for name in ("patch_fall", "leaves")]
     for path in recordings:
         shutil.copytree(real(path.name) / "bag", path)
-    report([*map(str, recordings), *told("leaves"), "--output", str(folder() / "report"), "--target", "50"])
+    report([*map(str, recordings), "--output", str(folder() / "report"), "--target", "50"])
     photograph(f"{(folder() / 'report' / 'report.html').as_uri()}#t=40", "report", 1800)
 
 

@@ -98,7 +98,9 @@ def _by_cause(rows: Sequence[Row]) -> Iterator[Sequence[str]]:
 
 def _with_best(figure: str, rows: Sequence[Row]) -> str:
     digits = 0 if figure == "excess_percent" else 1
-    return "; ".join(f"{row['case']} {row[figure]:.{digits}f} ({row[AT_BEST[figure]]:.{digits}f})" for row in rows)
+    best = [row[AT_BEST[figure]] for row in rows]  # none of an axle that slides
+    shown = ["–" if each is None else f"{each:.{digits}f}" for each in best]
+    return "; ".join(f"{row['case']} {row[figure]:.{digits}f} ({each})" for row, each in zip(rows, shown, strict=True))
 
 
 def _times(rows: Sequence[Row]) -> Iterator[Sequence[str]]:

@@ -44,7 +44,7 @@ WHITE, WANDERING = 720.0, 34.0
 n T^4, or that of errors which wander, over the time that they last and T^3. At the part u of the time a position weighs
 360 (u^2 - u + 1/6)/T^2: the mean square of that is 720/T^4, the one of its integral, twice, 240/7."""
 
-FAR, FORESEEN, RUNS_OFF = 4.0, 2.0, 10.0
+FAR, FORESEEN, RUNS_OFF = 5.0, 2.0, 15.5
 """Deviations by the hypothesis nearest count as no more than so many standard deviations. Of the product of one and the
 next so much is foreseen each time; what is more is summed up, and above the last runs off (Page 1954). Errors that come
 by chance, however large, do not follow each other so, and those that wander are foreseen."""
