@@ -52,8 +52,8 @@ function shared(onChange = () => {}) {
 
 // A chart below `host`; it is drawn by draw(spec) with {title, x: {label, range, sign}, y: {range}, lines: [{label, kind, x, y}],
 // bands: [{from, to, kind, label}], marks: [{x, y, kind, label}], events: [{x, kind, label}]}; null in a line is a gap.
-// cursor(x) marks the present; `onPick` hears of a place clicked. The wheel, a drag, + and - zoom, Shift and a drag or the
-// arrows pan, a double click or 0 shows all again.
+// cursor(x) marks the present; `onPick` hears of a place clicked. The wheel, a drag, + and - zoom, Shift and a drag, a
+// swipe to the side or the arrows pan, a double click or 0 shows all again.
 function chart(host, { view = shared(), onPick = null } = {}) {
   const figure = host.appendChild(element("figure", { class: "chart" })), caption = figure.appendChild(element("figcaption"));
   const area = figure.appendChild(element("div", { class: "area" }));
@@ -168,7 +168,8 @@ function chart(host, { view = shared(), onPick = null } = {}) {
     wrap.addEventListener("keydown", press);
     plot.over.addEventListener("wheel", (event) => {
       event.preventDefault();
-      scale(event.deltaY < 0 ? 1 / ZOOM_STEP : ZOOM_STEP, plot.posToVal(event.offsetX, "x"));
+      if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) pan(event.deltaX / plot.over.clientWidth); // a swipe to the side
+      else scale(event.deltaY < 0 ? 1 / ZOOM_STEP : ZOOM_STEP, plot.posToVal(event.offsetX, "x"));
     }, { passive: false });
     plot.over.addEventListener("click", (event) => onPick?.(plot.posToVal(event.offsetX, "x")));
   }

@@ -152,6 +152,11 @@ def test_values_under_the_pointer_zoom_and_keyboard(hour: str) -> None:
         before = shown_range(page, 1)
         page.keyboard.press("ArrowRight")
         page.wait_for_function("(was) => [...drawn][1].plot.scales.x.min > was", arg=before[0])
+        before = shown_range(page, 1)
+        page.mouse.wheel(100, 0)
+        page.wait_for_function("(was) => [...drawn][1].plot.scales.x.min > was", arg=before[0])
+        low, high = shown_range(page, 1)
+        assert high - low == pytest.approx(before[1] - before[0]), "to the side it does not zoom"
         page.keyboard.press("0")
         page.wait_for_function("[...drawn][1].plot.scales.x.min === 0")
         page.mouse.move(box["x"] + 100, box["y"] + 50)
