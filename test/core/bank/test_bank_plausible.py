@@ -100,16 +100,19 @@ def test_a_wheel_that_slides_a_little_by_turns_is_caught(seed: int, slip: float)
     assert min((each.t_ns - S) / S for each in estimates if each.withheld) < BRAKE_S + 5.0
 
 
-@pytest.mark.parametrize("every", [3, 5, 10])
+@pytest.mark.parametrize("every", [2, 3, 5, 10])
 @pytest.mark.parametrize(("slip", "more"), [(0.1, 2), (0.2, 5)])
 def test_a_wheel_that_is_heard_seldom_is_caught(slip: float, more: int, every: int) -> None:
-    """Down to one position a second, within so many that are off; what is off by far may first be a step."""
+    """Down to one position a second, within so many that are off; what is off by far may first be a step.
+
+    It creeps from 1 s behind the brake's opening on, and estimates tell so twice a second.
+    """
     for seed in range(4):
         _, speeds = truth(0.03)
         state, estimates = followed(wheel(speeds, np.random.default_rng(seed), slip), 0.5, every)
         assert state.counts[Outcome.SLIDING] > 0, seed
         first = min((each.t_ns - S) / S for each in estimates if each.withheld)
-        assert BRAKE_S + 1.0 < first <= BRAKE_S + 2.0 + more * every * H
+        assert BRAKE_S + 1.0 < first <= BRAKE_S + 2.5 + more * every * H
 
 
 @pytest.mark.parametrize(("lasts_s", "every"), [(0.1, 10), (0.1, 1), (0.25, 1)])

@@ -49,7 +49,7 @@ FAR, FORESEEN, RUNS_OFF = 5.0, 2.0, 15.5
 next so much is foreseen each time; what is more is summed up, and above the last runs off (Page 1954). Errors that come
 by chance, however large, do not follow each other so, and those that wander are foreseen."""
 
-BURST_NS = 300_000_000
+BURST_NS = 150_000_000
 """Positions not believed that follow each other sooner have one cause, as a signal that is reflected."""
 
 GAIN_MPS2, BRAKED_NS = 0.1, 3 * S
