@@ -6,37 +6,23 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The report in a real browser: by what it says and what its charts hold."""
+"""The report in a real browser: what it says, and how it is used."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 import seen
-from slowing import TRUTH, record
-from test_report_brakings import journey
-
-from adhesion_node.report.__main__ import main
+from reports import an_hour, shown_range, two_runs
 
 browser = pytest.importorskip("browser", reason="playwright, of the extra `test`, is not installed")
 
 
 pytestmark = pytest.mark.usefixtures("chromium")
 
-CUT_OFF = (
-    "[...document.querySelectorAll('.scroll')].filter((each) => each.scrollWidth > 680).map((each) => each.innerText)"
-)
-"""The tables that are wider than the paper."""
-
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the address of a report of two runs, the second without truth: 80 m/s, 2 m/s^2 slower each second."""
-    tmp_path = tmp_path_factory.mktemp("report")
-    bags = [str(record(tmp_path / "with")), str(record(tmp_path / "without", *TRUTH))]
-    assert main([*bags, "--output", str(tmp_path / "report"), "--target", "180"]) == 0
-    return (tmp_path / "report" / "report.html").as_uri()
+    return two_runs(tmp_path_factory.mktemp("report"))
 
 
 def test_the_report_draws_every_chart_of_every_run(report: str) -> None:
@@ -78,18 +64,7 @@ def test_the_report_needs_nothing_but_itself(report: str) -> None:
 
 @pytest.fixture(scope="module")
 def hour(tmp_path_factory: pytest.TempPathFactory) -> str:
-    """Return the address of a report of seven brakings in an hour; in the second one the rail gets worse."""
-    tmp_path = tmp_path_factory.mktemp("hour")
-    bag = str(journey(tmp_path / "hour", 7))
-    assert main([bag, "--output", str(tmp_path / "report"), "--target", "60"]) == 0
-    return (tmp_path / "report" / "report.html").as_uri()
-
-
-def shown_range(page: Any, chart: int) -> list[float]:
-    found: list[float] = page.evaluate(
-        "(i) => { const s = [...drawn][i].plot.scales.x; return [s.min, s.max]; }", chart
-    )
-    return found
+    return an_hour(tmp_path_factory.mktemp("hour"))
 
 
 def test_the_headline_is_of_all_brakings_and_each_has_a_row(hour: str) -> None:
@@ -192,118 +167,11 @@ def test_a_slider_that_moves_long_leaves_the_address_time(hour: str) -> None:
         assert troubles == []
 
 
-def test_a_band_has_its_own_name(hour: str) -> None:
-    """Before: the name stood left of its band, or half of it was cut off, as the axes aligned their numbers."""
-    with browser.open_page() as (page, _):
-        page.goto(hour)
-        page.get_by_role("button", name="600.0 s", exact=True).click()
-        page.wait_for_function("() => [...drawn][2].plot.scales.x.min === 595")
-        bands, written = page.evaluate(
-            """() => {
-              const { plot } = [...drawn][2], { ctx } = plot, { fillText } = ctx, written = [];
-              ctx.fillText = (text, x, y) => {
-                const { actualBoundingBoxLeft: left, actualBoundingBoxRight: right } = ctx.measureText(text);
-                written.push([text, x - left, x + right]);
-                fillText.call(ctx, text, x, y);
-              };
-              plot.batch(() => plot.redraw());
-              const at = (x) => plot.valToPos(x, "x", true);
-              return [runs[0].bands.map(({ from, to, label }) => [label, at(from), at(to)]), written];
-            }"""
-        )
-        names = {label for label, *_ in bands}
-        drawn = [each for each in written if each[0] in names]
-        assert drawn
-        for name, left, right in drawn:
-            assert any(name == label and from_ <= left and right <= to for label, from_, to in bands), name
-
-
-def test_the_marks_of_a_legend_follow_the_scheme(hour: str) -> None:
-    """Before: in the colours that the page was opened in, pale on paper."""
-    with browser.open_page() as (page, _):
-        page.goto(hour)
-        for scheme in ("light", "dark"):
-            page.emulate_media(color_scheme=scheme)
-            page.wait_for_function(
-                """() => inks.clear() || [...drawn].every(({ plot: { root, series } }) => {
-                  const marks = [...root.closest(".chart").querySelectorAll(".u-marker")].slice(1);
-                  return marks.every((mark, i) => getComputedStyle(mark).borderTopColor === series[i + 1].stroke());
-                })"""
-            )
-
-
-def test_a_legend_has_values_under_the_pointer_alone(hour: str) -> None:
-    """Before: "permitted: –" beside a permitted speed, as the pointer was elsewhere."""
-    with browser.open_page() as (page, _):
-        page.goto(f"{hour}#t=610")
-        legend = page.locator("figure.chart").nth(1).locator(".u-legend")
-        resting = legend.inner_text()
-        assert "identified" in resting
-        assert "–" not in resting
-        assert "time" not in resting
-        page.locator(".u-over").nth(1).hover()
-        page.wait_for_function("(was) => document.querySelectorAll('.u-legend')[1].innerText !== was", arg=resting)
-        assert "time, s" in legend.inner_text()
-
-
-def test_the_numbers_of_an_axis_are_whole(hour: str) -> None:
-    """Before: of 10,000 m the first figure was cut off."""
-    with browser.open_page() as (page, _):
-        page.goto(hour)
-        for size, longest in page.evaluate(
-            "[...drawn].filter((made) => made.plot).map(({ plot }) => [plot.axes[1]._size,"
-            " Math.max(...plot.axes[1]._values.map((text) => {"
-            " plot.ctx.font = plot.axes[1].font[0]; return plot.ctx.measureText(text).width / uPlot.pxRatio; }))])"
-        ):
-            assert size >= longest + 15.0, "ticks and their gap take 15 pixels"
-
-
 def test_a_phone_scrolls_to_columns_as_wide_as_their_heads(hour: str) -> None:
     """Before: one of ten columns on a phone had its head in seven lines."""
     with browser.open_page(**browser.LOOKS["phone"]) as (page, _):
         page.goto(hour)
         assert page.locator("table").nth(1).locator("thead").bounding_box()["height"] <= 100.0
-
-
-def test_no_line_bridges_where_it_does_not_hold(hour: str) -> None:
-    """Before: a prior went on, dotted, through what was identified, as other lines have values within its gap."""
-    with browser.open_page() as (page, _):
-        page.goto(hour)
-        page.evaluate(
-            """() => {
-              const made = [...drawn][1], dense = Array.from({ length: 201 }, (_, i) => i / 10);
-              made.draw({ title: "gap", x: { label: "time, s", range: [0, 20] }, y: { range: [0, 2] }, lines: [
-                { label: "dense", kind: "truth", x: dense, y: dense.map(() => 0.2) },
-                { label: "with a gap", kind: "sbi", x: [0, 4, 8, 12, 16, 20], y: [1, 1, null, null, 1, 1] }] });
-            }"""
-        )
-        page.wait_for_function("[...drawn][1].plot.scales.x.max === 20")
-        ends = page.evaluate("[0, 4, 15].map((x) => [...drawn][1].plot.valToPos(x, 'x'))")
-        over = page.locator(".u-over").nth(1).bounding_box()
-        picture, yellow = seen.look(page), (138, 109, 0)
-        inside, outside = (
-            picture.part((over["x"] + from_, over["y"], over["x"] + to, over["y"] + over["height"]))
-            for from_, to in ((ends[1] + 5.0, ends[2]), (ends[0], ends[1]))
-        )
-        assert (outside == yellow).all(axis=-1).sum() > 20
-        assert not (inside == yellow).all(axis=-1).any()
-
-
-def test_the_curves_are_shown_to_where_the_braking_ended(report: str) -> None:
-    """Before: on a rail worse than the worst case the chart ended before the train did."""
-    with browser.open_page() as (page, _):
-        page.goto(f"{report}#t=12")
-        assert shown_range(page, 0)[1] >= page.evaluate("runs[0].moments.at(-1).place")
-
-
-def test_gaps_are_gaps(hour: str) -> None:
-    with browser.open_page() as (page, _):
-        page.goto(hour)
-        between = page.evaluate(
-            "(() => { const u = [...drawn][2].plot, k = u.series.findIndex((s) => s.label === 'estimated');"
-            " return u.data[0].map((x, i) => [x, u.data[k][i]]).filter(([x, y]) => y === null).length; })()"
-        )
-        assert between == 6
 
 
 @pytest.mark.parametrize("look", browser.LOOKS)
@@ -314,39 +182,4 @@ def test_the_report_can_be_used_by_everybody(hour: str, look: str) -> None:
         browser.assert_accessible(page)
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "columns are cut off"
         seen.assert_readable(seen.look(page))
-        assert troubles == []
-
-
-def test_paper_has_both_runs_one_below_the_other_in_readable_letters(report: str) -> None:
-    """Before: the second run was cut off, and the letters of the axes were 3 to 5 points high."""
-    with browser.open_page() as (page, troubles):
-        page.goto(f"{report}#t=12")
-        browser.turn(page, "print")
-        boxes = [run.bounding_box() for run in page.locator("section.run").all()]
-        assert boxes[1]["y"] >= boxes[0]["y"] + boxes[0]["height"]
-        for canvas in page.locator("figure.chart canvas").all():
-            box = canvas.bounding_box()
-            assert box["x"] + box["width"] <= 690.0
-            assert box["width"] > 300.0
-        assert page.locator("#time").inner_text() == "12.0 s"
-        picture = seen.look(page)
-        for told in ("with, without", "CRH3 of Xie et al. 2019", "2023-11-14 22:13:20 UTC"):
-            assert picture.has(told), told
-        assert all(button.is_visible() for button in page.locator("td button").all()), "when each braking began"
-        page.evaluate("dispatchEvent(new Event('afterprint'))")
-        assert troubles == []
-
-
-@pytest.mark.parametrize("look", ["light", "dark"])
-def test_paper_is_drawn_for_at_once(hour: str, look: str) -> None:
-    """Before: Firefox printed charts as wide as the screen, of a dark page in pale lines; tables were cut off."""
-    with browser.open_page(**browser.LOOKS[look]) as (page, troubles):
-        page.goto(hour)
-        widths, line, paper = page.evaluate(
-            "dispatchEvent(new Event('beforeprint')),"
-            " [[...document.querySelectorAll('canvas')].map((each) => each.width), ink('truth'), ink('paper')]"
-        )
-        assert set(widths) == {680}
-        assert (line, paper) == ("rgb(17, 17, 17)", "rgb(255, 255, 255)")
-        assert page.evaluate(CUT_OFF) == []
         assert troubles == []
