@@ -16,7 +16,7 @@ from typing import Any
 POLICY = "default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'"
 """What a page may do: nothing but what stands in it."""
 
-_CHARTS = ("uplot.js", "chart.js")
+_CHARTS = ("language.js", "uplot.js", "chart.js")
 STYLES = {
     "report": ("uplot.css", "style.css"),
     "fleet": ("uplot.css", "style.css", "fleet.css"),

@@ -135,3 +135,26 @@ def test_gaps_are_gaps(hour: str) -> None:
             " return u.data[0].map((x, i) => [x, u.data[k][i]]).filter(([x, y]) => y === null).length; })()"
         )
         assert between == 6
+
+
+@pytest.mark.parametrize("language", ["de-DE", "C"])
+def test_numbers_are_written_alike_whatever_the_browser_speaks(hour: str, language: str) -> None:
+    """Before: "0,05" along an axis and "0.05" below it, and no chart at all in a WebKitGTK without a language."""
+    with browser.open_page() as (page, _):
+        page.add_init_script(f"Object.defineProperty(Navigator.prototype, 'language', {{ get: () => '{language}' }})")
+        page.goto(hour)
+        page.wait_for_function("() => drawn.size > 1")
+        written = page.evaluate(
+            """() => {
+              const written = [];
+              for (const { plot } of drawn) {
+                const { ctx } = plot, { fillText } = ctx;
+                ctx.fillText = (text, ...where) => { written.push(text); fillText.call(ctx, text, ...where); };
+                plot.batch(() => plot.redraw());
+              }
+              return written;
+            }"""
+        )
+        decimals = [text for text in written if text.startswith("0") and len(text) > 1]
+        assert decimals
+        assert all(text.startswith("0.") for text in decimals)
