@@ -21,6 +21,7 @@ from ..core.physics.braking import BrakingCurve
 from ..core.physics.train import KMH
 from ..report.ahead import SHOWN, ahead
 from ..report.found.regimes import IN_WORDS
+from ..run.results.known import kind_of
 from ..web.creep import creep_part
 from ..web.fit import number, numbers, rounded
 from ..wire.topic import Topic
@@ -134,9 +135,12 @@ class View:
         if alarming and message != before.get("message"):
             self._event("fault", now["message"])
         if self._parts["train"] is not None and self._awaited:
-            known = {"mu", "mu_lower"} <= self._mu.keys()
-            self._parts["adhesion"] = dict(self._mu) if known else None
-            self._append("history", "t", SPACING_S, {**self._parts["train"], "regime": regime.lower(), **self._mu})
+            found: dict[str, Any] | None = None
+            if {"mu", "mu_lower"} <= self._mu.keys():
+                found = {**self._mu, "kind": kind_of(self._mu["mu"], self._mu["mu_lower"], regime)}
+            self._parts["adhesion"] = found
+            row = {**self._parts["train"], "regime": regime.lower(), **(found or self._mu)}
+            self._append("history", "t", SPACING_S, row)
             # What is withheld is not published: the next estimate must not be shown with this one's numbers.
             self._mu = {name: value for name, value in self._mu.items() if name == "true_mu"}
             self._awaited = False

@@ -5,7 +5,7 @@
 // colour, in style.css: lines are told by their dashes where there is no colour.
 
 const LOOKS = {
-  truth: { width: 2.2 }, identified: { points: 4 }, nominal: {},  atleast: { arrows: true }, prior: { dash: [2, 4] }, bound: { dash: [7, 4] },
+  truth: { width: 2.2 }, identified: { points: 4 }, known: {}, nominal: {}, atleast: { arrows: true }, prior: { dash: [2, 4] }, bound: { dash: [7, 4] },
   fixed: { dash: [2, 3], width: 2.2 }, run: { width: 2.2 }, permitted: { width: 2.2 }, warning: { dash: [10, 3] }, sbi: { dash: [5, 3] },
   ebi: { dash: [9, 3, 2, 3] },
 };

@@ -7,7 +7,8 @@
 const FIXED_MU = 0.0726, SHOWN_S = 180, BEHIND_M = 1500, STALE_S = 2, SILENT_S = 1, RETRY_MS = 1000, EVENTS_SHOWN = 14, GAP_S = 5;
 const STATE = "adhesion/state", MU = "adhesion/mu", CURVE = "adhesion/braking_curve", STATUS = "atp/status", POSITION = "position";
 const LIMITS = { permitted: "permitted", warning: "warning", sbi: "service brake", ebi: "emergency brake" };
-const KIND_OF = { adhesion_limited: "identified", brake_limited: "atleast" };
+// What μ̂ is, and its line.
+const KINDS = { prior: "prior", known: "known, nothing claimed", atleast: "≥, the brake limits", identified: "identified μ̂" };
 const byId = (id) => document.getElementById(id);
 const drawDial = dial(byId("dial")), way = chart(byId("way")), course = chart(byId("adhesion")), slip = chart(byId("creep-chart"));
 const number = (value, digits, unit = "") => (value === null || value === undefined ? "–" : value.toFixed(digits) + unit);
@@ -97,17 +98,18 @@ function bandsOf(history) {
 function toldOf(adhesion, estimator) {
   if (adhesion === null) return `nothing is known of μ${age(MU) === Infinity ? " yet" : `: the last value is ${age(MU).toFixed(0)} s old`}`;
   const bound = `at least ${number(adhesion.mu_lower, 4)}${estimator?.confidence ? ` (${Number(estimator.confidence) * 100} %)` : ""}`;
-  return { identified: `identified μ̂ ${number(adhesion.mu, 4)}, ${bound}`, atleast: `μ ≥ ${number(adhesion.mu, 4)}, which the brake uses; ${bound}` }[KIND_OF[estimator?.regime]] ??
-    `not identified; prior ${number(adhesion.mu, 4)}, not claimed; ${bound}`;
+  const mu = number(adhesion.mu, 4);
+  return { identified: `identified μ̂ ${mu}, ${bound}`, atleast: `μ ≥ ${mu}, which the brake uses; ${bound}`, known: `μ̂ ${mu}, ${bound}`,
+           prior: `not identified; prior ${mu}, not claimed; ${bound}` }[adhesion.kind];
 }
 
-function drawGauge(adhesion, kind, end) {
+function drawGauge(adhesion, end) {
   const share = (value) => `${(100 * Math.min(Math.max(value / end, 0), 1)).toFixed(2)}%`, gauge = byId("gauge");
   const mark = (value, name, label) => element("span", { class: `at ${name}`, style: `left:${share(value)}`, title: `${label} ${value}` });
   const step = end > 0.3 ? 0.1 : 0.05, ticks = Array.from({ length: Math.floor(end / step + 1e-6) + 1 }, (_, i) => i * step);
   const parts = [element("span", { class: "scale" }), mark(FIXED_MU, "fixed", "fixed worst case")];
   if (adhesion !== null) {
-    const low = Math.min(adhesion.mu_lower, adhesion.mu), high = kind === "atleast" ? end : adhesion.mu;
+    const { kind } = adhesion, low = Math.min(adhesion.mu_lower, adhesion.mu), high = kind === "atleast" ? end : adhesion.mu;
     parts.push(element("span", { class: `span ${kind}`, style: `left:${share(low)};width:calc(${share(high)} - ${share(low)})` }), mark(adhesion.mu_lower, "bound", "at least"), mark(adhesion.mu, kind, kind));
     if (adhesion.true_mu !== undefined) parts.push(mark(adhesion.true_mu, "truth", "true"));
   }
@@ -115,15 +117,15 @@ function drawGauge(adhesion, kind, end) {
 }
 
 function drawAdhesion() {
-  const adhesion = fresh(MU, state.adhesion), estimator = fresh(STATE, state.estimator), { history } = state, kind = KIND_OF[estimator?.regime] ?? "prior";
+  const adhesion = fresh(MU, state.adhesion), estimator = fresh(STATE, state.estimator), { history } = state;
   say("regime", `Adhesion: ${estimator?.words ?? "not known"}`);
   say("mu", toldOf(adhesion, estimator));
-  const [t, mu, bound, truth] = columns(history, "t", ["mu", "mu_lower", "true_mu"], GAP_S), regimes = new Map(history.map((row) => [row.t, row.regime]));
+  const [t, mu, bound, truth] = columns(history, "t", ["mu", "mu_lower", "true_mu"], GAP_S), kinds = new Map(history.map((row) => [row.t, row.kind]));
   const values = [FIXED_MU, ...mu, ...truth].filter((value) => value !== null), end = Math.max(0.1, Math.ceil(1.15 * Math.max(...values) / 0.05) * 0.05);
-  drawGauge(adhesion, kind, end);
-  const until = Math.max(t.at(-1) ?? 0, 30), from = Math.max(until - SHOWN_S, 0), of = (name) => mu.map((value, i) => ((KIND_OF[regimes.get(t[i])] ?? "prior") === name ? value : null));
+  drawGauge(adhesion, end);
+  const until = Math.max(t.at(-1) ?? 0, 30), from = Math.max(until - SHOWN_S, 0), of = (kind) => mu.map((value, i) => (kinds.get(t[i]) === kind ? value : null));
   const lines = [{ label: `fixed worst case ${FIXED_MU}`, kind: "fixed", x: [from, until], y: [FIXED_MU, FIXED_MU] }, { label: "at least", kind: "bound", x: t, y: bound },
-    { label: "prior", kind: "prior", x: t, y: of("prior") }, { label: "≥, the brake limits", kind: "atleast", x: t, y: of("atleast") }, { label: "identified μ̂", kind: "identified", x: t, y: of("identified") }];
+    ...Object.entries(KINDS).map(([kind, label]) => ({ label, kind, x: t, y: of(kind) }))];
   if (truth.some((value) => value !== null)) lines.splice(1, 0, { label: "true", kind: "truth", x: t, y: truth });
   course.draw({ title: "Adhesion coefficient", x: { label: "time, s", range: [from, until] }, y: { range: [0, end] }, lines, bands: bandsOf(history),
                 events: state.events.map((event) => ({ x: event.t, kind: event.kind })) });

@@ -49,14 +49,12 @@ function curveChart(run, moment, wide) {
            marks: [{ x: moment.place, y: moment.speed, kind: "run", label: "" }] };
 }
 
-function told({ regime, mu }) {
-  if (mu === null) return "nothing is known of μ";
-  return { adhesion_limited: `identified μ̂ ${mu.toFixed(4)}`, brake_limited: `μ ≥ ${mu.toFixed(4)}` }[regime] ?? `not identified; prior ${mu.toFixed(4)}`;
-}
+const MU = { identified: "identified μ̂", atleast: "μ ≥", known: "μ̂", prior: "not identified; prior" };
+const told = ({ kind, mu }) => (mu === null ? "nothing is known of μ" : `${MU[kind]} ${mu.toFixed(4)}`);
 
 function readout(moment) {
   const saved = moment.saved_at_least, kept = saved >= 0 ? `saved at least ${number(saved, 0)} m` : `${number(-saved, 0)} m more than the fixed`;
-  const claim = moment.regime === "coasting" || saved === null ? "" : `, ${kept}`;
+  const claim = moment.kind === "prior" || saved === null ? "" : `, ${kept}`;
   return `${number(moment.speed, 1)} km/h, ${told(moment)}, at least ${number(moment.mu_lower, 4)}, ${moment.words}; ` +
     `to ${target} km/h by μ̂ ${number(moment.distance, 0)} m, by the bound ${number(moment.longest, 0)} m${claim}`;
 }

@@ -82,7 +82,7 @@ def test_what_the_nodes_say_reaches_the_browser(
         spin_until(executor, lambda: live.view.parts(0.0)["supervision"] and live.view.parts(0.0)["adhesion"])
         seen = watcher.until(lambda parts: parts["supervision"] and parts["adhesion"] and parts["curves"])
     assert (seen["train"]["speed"], seen["train"]["position"]) == (180.0, 1200.0)
-    assert seen["adhesion"] == {"mu": 0.08, "mu_lower": 0.075}
+    assert seen["adhesion"] == {"mu": 0.08, "mu_lower": 0.075, "kind": "identified"}
     assert (seen["supervision"]["level"], seen["estimator"]["regime"]) == ("WARNING", "adhesion_limited")
     assert (seen["curves"]["safe"]["x"][0], seen["curves"]["safe"]["y"][0]) == (1200.0, 180.0)
 

@@ -53,7 +53,7 @@ def test_an_estimate_is_shown_in_the_units_of_people() -> None:
     estimate(view, 2, mu=0.09)
     parts = view.parts(0.0)
     assert parts["train"] == {"t": 2.0, "position": 160.0, "speed": 288.0}
-    assert parts["adhesion"] == {"mu": 0.09, "mu_lower": pytest.approx(0.085)}
+    assert parts["adhesion"] == {"mu": 0.09, "mu_lower": pytest.approx(0.085), "kind": "identified"}
     assert parts["estimator"]["dropped"] == {"LATE": "2"}
     assert [(row["t"], row["mu"], row["regime"]) for row in parts["history"].rows] == [
         (0.0, 0.08, "adhesion_limited"),

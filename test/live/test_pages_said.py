@@ -25,19 +25,20 @@ pytestmark = pytest.mark.usefixtures("chromium")
 
 
 @pytest.mark.parametrize(
-    ("regime", "kind", "said"),
+    ("regime", "mu_lower", "kind", "said"),
     [
-        ("ADHESION_LIMITED", "identified", "identified μ̂ 0.0945, at least 0.0895 (95 %)"),
-        ("BRAKE_LIMITED", "atleast", "μ ≥ 0.0945, which the brake uses; at least 0.0895 (95 %)"),
-        ("COASTING", "prior", "not identified; prior 0.0945, not claimed; at least 0.0895 (95 %)"),
+        ("ADHESION_LIMITED", 0.0895, "identified", "identified μ̂ 0.0945, at least 0.0895 (95 %)"),
+        ("BRAKE_LIMITED", 0.0895, "atleast", "μ ≥ 0.0945, which the brake uses; at least 0.0895 (95 %)"),
+        ("COASTING", 0.0895, "known", "μ̂ 0.0945, at least 0.0895 (95 %)"),
+        ("COASTING", 0.0200, "prior", "not identified; prior 0.0945, not claimed; at least 0.0200 (95 %)"),
     ],
 )
-def test_only_what_is_identified_is_called_so(regime: str, kind: str, said: str) -> None:
+def test_only_what_is_identified_is_called_so(regime: str, mu_lower: float, kind: str, said: str) -> None:
     """A brake-limited adhesion of 0.0945 was labelled identified while the true one was 0.239, off the scale."""
     with line() as shown:
         shown.view.adhesion("true_mu", 0.239)
         for second in (0, 1, 2):
-            estimate(shown.view, second, mu=0.0945, regime=regime)
+            estimate(shown.view, second, mu=0.0945, regime=regime, mu_lower=mu_lower)
         shown.hear()
         shown.wait(said)
         drawn = {
@@ -46,7 +47,7 @@ def test_only_what_is_identified_is_called_so(regime: str, kind: str, said: str)
                 ".filter((y) => y != null)",
                 label,
             )
-            for name, label in (("identified", "identified"), ("atleast", "≥"), ("prior", "prior"))
+            for name, label in (("identified", "identified"), ("atleast", "≥"), ("known", "known"), ("prior", "prior"))
         }
         assert drawn == {name: [0.0945] * 3 if name == kind else [] for name in drawn}
         assert shown.page.evaluate("course.plot.scales.y.max") >= 0.239

@@ -48,7 +48,7 @@ LEVELS = (
 """Permitted are 180 km/h; warned is from 184, braked from 187, by the emergency brake from 194."""
 
 REGIMES = {
-    "COASTING": ("nothing is claimed", "not identified; prior 0.0800, not claimed; at least 0.0750 (95 %)"),
+    "COASTING": ("nothing is claimed", "μ̂ 0.0800, at least 0.0750 (95 %)"),
     "BRAKE_LIMITED": ("the brake limits", "μ ≥ 0.0800, which the brake uses; at least 0.0750 (95 %)"),
     "ADHESION_LIMITED": ("the adhesion limits", "identified μ̂ 0.0800, at least 0.0750 (95 %)"),
 }

@@ -25,9 +25,11 @@ STATUS = {
 }
 
 
-def estimate(view: View, second: int, mu: float = 0.08, regime: str = "ADHESION_LIMITED") -> None:
+def estimate(
+    view: View, second: int, mu: float = 0.08, regime: str = "ADHESION_LIMITED", mu_lower: float | None = None
+) -> None:
     """What the estimator says each second, in its order."""
     view.adhesion("mu", mu)
-    view.adhesion("mu_lower", mu - 0.005)
+    view.adhesion("mu_lower", mu - 0.005 if mu_lower is None else mu_lower)
     view.train(TrainState(1000 * S + second * S, 80.0 * second, 80.0))
     view.estimated({"regime": regime, "accepted": "9", "dropped.LATE": "2", "confidence": "0.95"}, "all is well")

@@ -97,7 +97,7 @@ def test_a_recording_with_results_is_shown_as_recorded(shown: tuple[Path, dict[s
     adhesion, speed, forces = (lines(run, title) for title in ("Adhesion", "Speed", "Forces"))
     assert adhesion["identified"]["x"] == list(range(20))
     assert adhesion["identified"]["y"] == [None] * 5 + [0.09] * 15
-    assert adhesion["prior, not identified"]["y"] == [0.09] * 5 + [None] * 15
+    assert adhesion["known, nothing claimed"]["y"] == [0.09] * 5 + [None] * 15
     assert [set(adhesion[name]["y"]) for name in ("lower bound", "true")] == [{0.08}, {0.1}]
     assert speed["estimated"]["y"] == pytest.approx([3.6 * (80.0 - 2.0 * second) for second in range(20)], abs=0.006)
     assert forces["brake B"]["y"] == pytest.approx([500.2] * 20, abs=0.05)  # 0.9332 m/s^2 x 536 t
@@ -119,7 +119,7 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     assert replayed["digest"] in page.texts
     adhesion = lines(run, "Adhesion")
     kinds = {"ADHESION_LIMITED": "identified", "BRAKE_LIMITED": "at least, the brake limits"}
-    said = adhesion[kinds.get(replayed["regime_final"], "prior, not identified")]
+    said = adhesion[kinds.get(replayed["regime_final"], "known, nothing claimed")]
     assert said["y"][-1] == pytest.approx(replayed["mu_final"], abs=1e-5)
     (bound,) = (line["y"][-1] for label, line in adhesion.items() if label.startswith("lower bound, "))
     assert bound == pytest.approx(replayed["mu_lower_final"], abs=1e-5)

@@ -124,6 +124,12 @@ def _check_bag(path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize(("name", "told"), [("tunnel_entry", {"track": staged.LEVEL}), ("grade_unknown", {})])
+def test_a_line_is_told_to_be_level_unless_it_is_not(name: str, told: dict[str, str], tmp_path: Path) -> None:
+    assert staged.task_of(name, "", 1, tmp_path).estimator == told
+    assert ("track" in (tmp_path / staged.PARAMS).read_text()) is bool(told)
+
+
 @pytest.mark.parametrize("sensors", ["fix", "full"])
 def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_known_when(
     sensors: str,

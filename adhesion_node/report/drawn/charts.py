@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Regime
 from ...core.physics.train import KMH, Train
 from ..found.distances import FIXED_MU, distances, true_way
 from ..read.run import Run
@@ -22,12 +21,15 @@ from ..read.series import NONE, Series
 NOTHING = 1e-6
 """A chart whose values differ by less is one of zeros: its axis would have the same number at every tick."""
 
+LABELS = {"known": "known, nothing claimed", "atleast": "at least, the brake limits", "identified": "identified"}
+"""What μ̂ is where it is more than a prior."""
+
 
 class Line(NamedTuple):
     """A line of a chart; its kind says how it is drawn.
 
-    "identified" is what was found, "atleast" the lower end of an open interval, "prior" no finding; besides "truth",
-    "bound", "fixed", and "nominal" for what follows from μ̂ whatever that is.
+    What μ̂ is, `kind_of` tells: "identified", "atleast", the lower end of an open interval, "known", "prior"; besides
+    "truth", "bound", "fixed", and "nominal" for what follows from μ̂ whatever that is.
     """
 
     label: str
@@ -66,7 +68,7 @@ def charts(run: Run, target_kmh: float, train: Train) -> Iterator[Chart]:
         Line(worst, "fixed", Series(at, np.full(at.size, FIXED_MU))),
         Line("true", "truth", run.true_mu),
         Line(bound, "bound", run.mu_lower),
-        *_told(run, "prior, not identified", "at least, the brake limits", "identified"),
+        *_told(run, "{}", prior="prior, not identified"),
     )
     yield _chart(
         *("Speed, km/h", 2),
@@ -79,8 +81,7 @@ def charts(run: Run, target_kmh: float, train: Train) -> Iterator[Chart]:
         Line("adhesion F, true", "truth", run.true_mu.map(lambda mu: train.adhesion_force(mu) / 1e3)),
         *(
             line._replace(series=line.series.map(lambda mu: train.adhesion_force(mu) / 1e3))
-            for line in _told(run, "", "adhesion F, at least", "adhesion F, identified")
-            if line.label
+            for line in _told(run, "adhesion F, {}")
         ),
     )
     yield _chart(
@@ -94,7 +95,7 @@ def charts(run: Run, target_kmh: float, train: Train) -> Iterator[Chart]:
         *(f"{to_target} saved, m", 1),
         Line(worst, "fixed", Series(at, np.zeros(at.size))),
         Line("at least, by the lower bound", "bound", Series(at[seen], planned.saved_at_least[seen])),
-        Line("by μ̂, where something is claimed", "nominal", Series(at[seen], planned.saved[seen])),
+        Line("by μ̂, where it is known", "nominal", Series(at[seen], planned.saved[seen])),
     )
 
 
@@ -102,12 +103,9 @@ def _chart(title: str, digits: int, *lines: Line) -> Chart:
     return Chart(title, digits, [line for line in lines if line.series.t_ns.size])
 
 
-def _told(run: Run, prior: str, at_least: str, identified: str) -> list[Line]:
-    """μ̂ as three lines by what it is: each a gap where another one holds, none where it never does."""
-    regimes, lines = run.regimes_at(run.mu.t_ns), []
-    limits = (regimes == Regime.BRAKE_LIMITED.name, regimes == Regime.ADHESION_LIMITED.name)
-    kinds = ((prior, "prior", ~(limits[0] | limits[1])), (at_least, "atleast", limits[0]))
-    for label, kind, holds in (*kinds, (identified, "identified", limits[1])):
+def _told(run: Run, form: str, **further: str) -> Iterator[Line]:
+    """μ̂ as a line of each kind: a gap where another one holds, none where it never does."""
+    for kind, label in {**further, **{kind: form.format(label) for kind, label in LABELS.items()}}.items():
+        holds = run.kinds.values == kind
         series = run.mu._replace(values=np.where(holds, run.mu.values, np.nan))
-        lines.append(Line(label, kind, series if holds.any() else NONE))
-    return lines
+        yield Line(label, kind, series if holds.any() else NONE)

@@ -15,6 +15,7 @@ import numpy as np
 from ...core import Config
 from ...core.physics import braking
 from ...core.physics.train import KMH
+from ...run.results.known import kind_of
 from ..ahead import SHOWN, ahead
 from ..found.brakings import Braking, brakings
 from ..found.distances import FIXED_MU, Distances, distances
@@ -114,7 +115,7 @@ def _moments(run: Run, config: Config, planned: Distances, parts: list[Braking])
             "place": number(run.sign * (place - start_m), 1),
             "mu": number(mu, 5),
             "mu_lower": number(lower, 5),
-            "regime": regimes[k].lower(),
+            "kind": kind_of(mu, lower, regimes[k]),
             "words": IN_WORDS.get(regimes[k], "regime not recorded"),
             "distance": number(planned.identified[i], 1),
             "longest": number(planned.longest[i], 1),

@@ -35,6 +35,7 @@ STYLES: dict[str, dict[str, Any]] = {
     "truth": {"color": BLACK, "lw": 2},
     "identified": {"color": ORANGE, "marker": ".", "lw": 1},
     "nominal": {"color": ORANGE, "lw": 1},
+    "known": {"color": ORANGE, "lw": 1},
     "atleast": {"color": BLUE, "marker": 10, "markevery": 0.03, "lw": 1},  # caret up: open above
     "prior": {"color": GREY, "ls": (0, (1, 3)), "lw": 1.5},
     "bound": {"color": BLUE, "ls": "--"},

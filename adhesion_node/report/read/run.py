@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import Regime
 from ...core.physics.train import Array
+from ...run.results.known import PRIOR, kind_of
 from .creep import CreepCurves
 from .numbers import CONFIDENCE, number
 from .predicted import Curves
-from .series import NONE, Series, Times
+from .series import NONE, Series, Times, in_rows
 
 
 class Run(NamedTuple):
@@ -65,9 +65,16 @@ class Run(NamedTuple):
         return None if math.isnan(told) else told
 
     @property
+    def kinds(self) -> Series:
+        """What μ̂ is at each of its times, by `kind_of`."""
+        t_ns, mu = self.mu
+        columns = (mu, self.mu_lower.exactly(t_ns), self.regimes_at(t_ns))
+        return Series(t_ns, np.array([kind_of(*row) for row in in_rows(*columns)], dtype=np.str_))
+
+    @property
     def learnt(self) -> NDArray[np.bool_]:
-        """At which estimates the train braked and its adhesion could be seen, or that it is enough; shape (n,)."""
-        return np.asarray(self.regimes_at(self.speed.t_ns) != Regime.COASTING.name)
+        """At which estimates more is known of the adhesion than a prior; shape (n,)."""
+        return np.asarray(self.kinds.exactly(self.speed.t_ns, PRIOR) != PRIOR)
 
     def regimes_at(self, t_ns: Times) -> NDArray[Any]:
         """Regimes of the estimates of those times by name; "" where none is recorded."""

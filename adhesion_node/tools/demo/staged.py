@@ -17,6 +17,7 @@ from sim_node.real.sensors.fitted import FITTED
 from sim_node.train.scenario import SCENARIOS
 
 from ...command.written import write_text
+from ...core.physics.track import Grade
 from ...core.physics.train import KMH
 from ...wire.files.parameters import text_of
 from .line import Task
@@ -33,6 +34,9 @@ TARGET_M, STOP_M = 14500.0, 16000.0
 NEARER_M = {"approach": 6300.0}
 """Targets of scenarios that brake too late on purpose."""
 
+LEVEL = "grade -100000 100000 0"
+"""What a paper's line is told to be; of its tunnels, and of a grade where it has one, nothing is."""
+
 
 def task_of(scenario: str, sensors: str, seed: int, folder: Path) -> Task:
     """What the nodes are to do; the files are written into the folder."""
@@ -42,9 +46,11 @@ def task_of(scenario: str, sensors: str, seed: int, folder: Path) -> Task:
 
 
 def _of_paper(scenario: str, seed: int) -> Task:
-    target_mps = SCENARIOS[scenario].end_speed_mps or 0.0
+    target_mps, track = SCENARIOS[scenario].end_speed_mps or 0.0, SCENARIOS[scenario].track
     target_m = NEARER_M.get(scenario, TARGET_M if target_mps else STOP_M)
-    return Task(seed, {"scenario": scenario}, {"target_position_m": target_m, "target_speed_kmh": target_mps / KMH})
+    told = {} if any(isinstance(one, Grade) for one in track.sections) else {"track": LEVEL}
+    monitor = {"target_position_m": target_m, "target_speed_kmh": target_mps / KMH}
+    return Task(seed, {"scenario": scenario}, monitor, told)
 
 
 def _real(scenario: str, sensors: str, seed: int, folder: Path) -> Task:
