@@ -15,6 +15,7 @@ theory where k_A = k_S = 1; contaminated rails have smaller k, so a softer conta
 simulations of traction vehicles running on adhesion limit", Wear 258 (2005) 992-1000, equations 2 to 6 and its table.
 """
 
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -72,15 +73,13 @@ _SPEEDS = np.concatenate([[0.0], np.geomspace(0.3, 110.0, 60)])
 _LEVELS = np.geomspace(0.005, 1.0, 160)
 
 
+@cache
 def _peaks() -> tuple[Array, Array]:
-    speed = np.maximum(_SPEEDS, CREEPING_MPS)[None, :, None]
-    rail = Contact(*(values[:, None, None] for values in contact(_LEVELS)))
-    curves = adhesion(_CREEPS * speed, speed, rail)[0]
-    best = curves.argmax(axis=-1)
-    return curves.max(axis=-1) / _LEVELS[:, None], _CREEPS[best]
-
-
-_PEAK_RATIO, _PEAK_CREEP = _peaks()
+    """Peak over mu0 and its creep; shape (levels, speeds). Level by level: all at once are ten times the cache."""
+    speed = np.maximum(_SPEEDS, CREEPING_MPS)[:, None]
+    curves = (adhesion(_CREEPS * speed, speed, contact(level))[0] for level in _LEVELS)
+    ratios, creeps = zip(*((curve.max(axis=-1), _CREEPS[curve.argmax(axis=-1)]) for curve in curves), strict=True)
+    return np.array(ratios) / _LEVELS[:, None], np.array(creeps)
 
 
 def peak(speed_mps: Array, rail: Contact) -> tuple[Array, Array]:
@@ -96,4 +95,5 @@ def peak(speed_mps: Array, rail: Contact) -> tuple[Array, Array]:
         result: Array = low * (1.0 - a) + high * a
         return result
 
-    return rail.mu0 * look(_PEAK_RATIO), look(_PEAK_CREEP)
+    ratio, creep = _peaks()
+    return rail.mu0 * look(ratio), look(creep)

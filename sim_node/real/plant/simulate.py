@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from . import creep, motion, protection, train, way
 from .journey import GRAVITY, PERIOD_S, Array, Journey
@@ -121,6 +120,8 @@ def _journey(scenario: Scenario, seed: int, trains: train.Train, drawn: way.Way,
 
 def pitch(rest_rad: Array) -> Array:
     """Return how a body follows the pitch at which it would rest: a damped oscillator, samples every `PERIOD_S`."""
+    from scipy.signal import cont2discrete, lfilter  # loads slowly, as `way` says
+
     w, z = PITCH_RADPS, PITCH_DAMPING
     numerator, denominator, _ = cont2discrete(([w * w], [1.0, 2.0 * z * w, w * w]), PERIOD_S)
     return np.asarray(lfilter(numerator.ravel(), denominator, rest_rad))

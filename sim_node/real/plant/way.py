@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from .creep import Contact, contact
 from .journey import Array
@@ -109,6 +108,8 @@ class Ground:
 
 def correlated(count: int, step: float, rng: np.random.Generator) -> Array:
     """Draw a stationary Gauss-Markov sequence of variance 1; `step` in correlation lengths."""
+    from scipy.signal import lfilter  # takes half a second, which a run of the paper's simulator need not wait
+
     keep = np.exp(-step)
     drawn = rng.standard_normal(count)
     drawn[1:] *= np.sqrt(1.0 - keep * keep)

@@ -18,7 +18,6 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from adhesion_node.core.setting import check_settings, setting
 from adhesion_node.wire.topic import Topic
@@ -90,6 +89,8 @@ class TachoPosition:
 
     def measure(self, ride: Ride, time_s: Array, rng: np.random.Generator) -> Measured:
         """Measure the position, m; the pulses begin at a random part of one."""
+        from scipy.integrate import cumulative_trapezoid  # loads slowly, as `plant.way` says
+
         journey = ride.journey
         turned = cumulative_trapezoid(journey.wheel_radps[:, self.axle], journey.time_s, initial=0.0)
         way = ride.at(time_s, turned) * ride.nominal.wheel_radius_m

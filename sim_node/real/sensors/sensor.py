@@ -11,7 +11,6 @@
 from typing import NamedTuple, Protocol
 
 import numpy as np
-from scipy.signal import lfilter
 
 from adhesion_node.wire.topic import Topic
 
@@ -56,6 +55,8 @@ def wander(time_s: Array, std: float, correlation_s: float, rng: np.random.Gener
 
     x(k+1) = a x(k) + std sqrt(1 - a^2) n(k) with a = exp(-period/correlation time).
     """
+    from scipy.signal import lfilter  # loads slowly, as `plant.way` says
+
     keeps = np.exp(-np.diff(time_s[:2]) / correlation_s)[0] if time_s.size > 1 else 0.0
     shocks = rng.standard_normal(time_s.size) * np.sqrt(1.0 - keeps**2)
     shocks[:1] /= np.sqrt(1.0 - keeps**2)
