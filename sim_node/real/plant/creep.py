@@ -20,6 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .compiled import formula
 from .journey import Array
 
 KALKER_SLOPE = 120.0
@@ -55,17 +56,43 @@ def contact(mu0: Array) -> Contact:
 
 def adhesion(sliding_mps: Array, speed_mps: Array, rail: Contact) -> tuple[Array, Array]:
     """Return F/Q, positive where it brakes the train, and its derivative by the sliding speed, s/m."""
-    stretch = np.pi / 4.0 * KALKER_SLOPE / (rail.mu0 * np.maximum(speed_mps, CREEPING_MPS))
-    e = stretch * sliding_mps
-    x, y = rail.k_a * e, rail.k_s * e
+    stretch, tangent, exponent = _arguments(sliding_mps, speed_mps, rail.mu0, rail.k_s, rail.fall_b)
+    force, slope = _curve(sliding_mps, stretch, tangent, np.arctan(tangent), np.exp(exponent), *rail)
+    return force, slope
+
+
+@formula("ddddd->ddd")
+def _arguments(w: float, v: float, mu0: float, k_s: float, b: float, stretch: Array, y: Array, falls: Array) -> None:
+    """What the arc tangent and the exponential are taken of."""
+    stretch[0] = np.pi / 4.0 * KALKER_SLOPE / (mu0 * max(v, CREEPING_MPS))
+    y[0] = k_s * (stretch[0] * w)
+    falls[0] = -b * abs(w)
+
+
+@formula("dddddddddd->dd")
+def _curve(
+    w: float,
+    stretch: float,
+    y: float,
+    arc: float,
+    falls: float,
+    mu0: float,
+    k_a: float,
+    k_s: float,
+    a: float,
+    b: float,
+    force: Array,
+    slope: Array,
+) -> None:
+    x = k_a * (stretch * w)
     q = 1.0 / (1.0 + x * x)
-    shape = x * q + np.arctan(y)
-    falling = (1.0 - rail.fall_a) * np.exp(-rail.fall_b * np.abs(sliding_mps))
-    friction = falling + rail.fall_a
-    rising = stretch * (rail.k_a * (1.0 - x * x) * q * q + rail.k_s / (1.0 + y * y))
-    scale = 2.0 / np.pi * rail.mu0
-    slope = rising * friction - np.sign(sliding_mps) * rail.fall_b * falling * shape
-    return scale * shape * friction, scale * slope
+    shape = x * q + arc
+    falling = (1.0 - a) * falls
+    friction = falling + a
+    rising = stretch * (k_a * (1.0 - x * x) * q * q + k_s / (1.0 + y * y))
+    scale = 2.0 / np.pi * mu0
+    force[0] = scale * shape * friction
+    slope[0] = scale * (rising * friction - np.sign(w) * b * falling * shape)
 
 
 _CREEPS = np.geomspace(2e-4, 1.0, 400)

@@ -22,7 +22,8 @@ from typing import NamedTuple
 import numpy as np
 
 from . import creep
-from .journey import GRAVITY, Array
+from .compiled import formula
+from .journey import GRAVITY, Array, Flags
 from .train import Train
 
 STICKING_MPS = 1e-3
@@ -48,21 +49,75 @@ def step(
     load = train.mass_kg * GRAVITY / rim.shape[1]
     sliding = speed - rim
     mu, slope = creep.adhesion(sliding, speed, rail)
-    force, slope = load * mu, load * slope
-    turning = step_s * (force - brake_n) / (train.wheel_kg + step_s * slope)
-    slope = np.where(
-        turning * np.sign(sliding) > np.abs(sliding), force / np.where(sliding == 0.0, 1.0, sliding), slope
-    )
-    locked = (rim <= 0.0) & (force < brake_n)
-    share = np.where(locked, 1.0, train.wheel_kg / (train.wheel_kg + step_s * slope))
-    free, stiff = share * force + (1.0 - share) * brake_n, share * slope
-    mass = train.mass_kg + step_s * stiff.sum(axis=1, keepdims=True)
-    change = -step_s * (free.sum(axis=1, keepdims=True) + running_n) / mass
-    force = free + stiff * change
-    turned = np.where(locked, 0.0, rim + step_s * (force - brake_n) / train.wheel_kg)
-    stops = speed + change <= STICKING_MPS
-    part = np.where(speed <= 0.0, 0.0, np.where(stops, np.minimum(speed / np.maximum(-change, 1e-300), 1.0), 1.0))
-    after = np.where(stops, 0.0, speed + change)
-    position = position + 0.5 * (speed + after) * part * step_s
-    rim = np.where(stops, 0.0, np.maximum(turned, 0.0))
+    free, stiff, locked = _held(rim, sliding, load, mu, slope, brake_n, train.wheel_kg, step_s)
+    held_n, stiffness = free.sum(axis=1, keepdims=True), stiff.sum(axis=1, keepdims=True)
+    position, after, change, part = _train(position, speed, train.mass_kg, held_n, stiffness, running_n, step_s)
+    force, rim = _wheel(rim, locked, free, stiff, change, after, brake_n, train.wheel_kg, step_s)
     return Motion(position, after, rim), force.sum(axis=1, keepdims=True) * part
+
+
+@formula("dddddddd->dd?")
+def _held(
+    rim: float,
+    sliding: float,
+    load: float,
+    mu: float,
+    slope: float,
+    brake: float,
+    wheel_kg: float,
+    dt: float,
+    free: Array,
+    stiff: Array,
+    locked: Flags,
+) -> None:
+    """The force at the rail once the wheel has turned with it: what it is, and its slope, if the train goes on."""
+    force, slope = load * mu, load * slope
+    turning = dt * (force - brake) / (wheel_kg + dt * slope)
+    if turning * np.sign(sliding) > abs(sliding):
+        slope = force / (1.0 if sliding == 0.0 else sliding)  # the machine may divide before it has compared
+    locked[0] = rim <= 0.0 and force < brake
+    share = 1.0 if locked[0] else wheel_kg / (wheel_kg + dt * slope)
+    free[0], stiff[0] = share * force + (1.0 - share) * brake, share * slope
+
+
+@formula("ddddddd->dddd")
+def _train(
+    position: float,
+    speed: float,
+    mass_kg: float,
+    held: float,
+    stiffness: float,
+    running: float,
+    dt: float,
+    place: Array,
+    after: Array,
+    change: Array,
+    part: Array,
+) -> None:
+    """The train's position and speed after the step, the change of its speed, and the part of the step it moves in."""
+    change[0] = -dt * (held + running) / (mass_kg + dt * stiffness)
+    stops = speed + change[0] <= STICKING_MPS
+    after[0] = 0.0 if stops else speed + change[0]
+    part[0] = min(speed / max(-change[0], 1e-300), 1.0) if stops else 1.0
+    if speed <= 0.0:
+        part[0] = 0.0
+    place[0] = position + 0.5 * (speed + after[0]) * part[0] * dt
+
+
+@formula("d?ddddddd->dd")
+def _wheel(
+    rim: float,
+    locked: bool,
+    free: float,
+    stiff: float,
+    change: float,
+    after: float,
+    brake: float,
+    wheel_kg: float,
+    dt: float,
+    force: Array,
+    turned: Array,
+) -> None:
+    """The force at the rail, and how fast the rim turns after the step."""
+    force[0] = free + stiff * change
+    turned[0] = 0.0 if locked or after <= 0.0 else max(rim + dt * (force[0] - brake) / wheel_kg, 0.0)

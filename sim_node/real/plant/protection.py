@@ -22,7 +22,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .journey import PERIOD_S, Array
+from .compiled import formula
+from .journey import PERIOD_S, Array, Flags
 from .train import Nominal, Train
 
 DEAD_S = 0.07
@@ -76,8 +77,8 @@ class Control(NamedTuple):
     """Of the period before."""
     acceleration_mps2: Array
     """Of the rims, smoothed over some periods."""
-    dumping: NDArray[np.bool_]
-    regaining: NDArray[np.bool_]
+    dumping: Flags
+    regaining: Flags
     since_slide_s: Array
     period: int = 0
 
@@ -91,26 +92,57 @@ def start(rim_mps: Array) -> Control:
 def command(control: Control, rim_mps: Array) -> tuple[Control, Valves]:
     """Return what the valves are told after this period's look at the wheels."""
     before, fall, last, smooth, dumping, regaining, since, period = control
-    limit = np.clip(fall + FALL_GROWTH_MPS2, *FALL_MPS2)
-    reference = np.maximum(rim_mps.max(axis=1, keepdims=True), before - limit * PERIOD_S)
-    fall = fall + ((before - reference) / PERIOD_S - fall) * (PERIOD_S / FALL_MEMORY_S)
-    smooth = 0.5 * smooth + 0.5 * (rim_mps - last) / PERIOD_S
-    sliding = reference - rim_mps
-    expected = sliding - LEAD_S * smooth
-    low, high = (fixed + share * reference for fixed, share in (LOW, HIGH))
-    active = reference > CUT_OFF_MPS
-    dump = active & (sliding > 0.5 * low) & ((expected > high) | (dumping & (smooth < REGAINED_MPS2)))
-    regaining = dump | (regaining & active & (sliding > ROLLING[0] + ROLLING[1] * reference))
-    since = np.where(active & (expected > low), 0.0, since + PERIOD_S)
-    controlled = active & (since < CONTROL_S)
+    reference, fall = _referred(before, fall, rim_mps.max(axis=1, keepdims=True), PERIOD_S)
+    smooth, dump, regaining, since, controlled, slides = _watched(
+        reference, rim_mps, last, smooth, dumping, regaining, since, PERIOD_S
+    )
     groups = np.arange(rim_mps.shape[1])
     turn, within = divmod(period * PERIOD_S, TURN_S)
     listening = controlled.all(axis=1, keepdims=True) & (groups == turn % groups.size)
     dump = dump | (listening & ((within < LISTEN_S) | (smooth > REGAINED_MPS2)))
     pulse = (period + groups) % PULSES[1] < PULSES[0]
-    hold = regaining | (active & (expected > low)) | (controlled & ~pulse)
+    hold = regaining | slides | (controlled & ~pulse)
     valves = np.where(dump, DUMP, np.where(hold, HOLD, APPLY))
     return Control(reference, fall, rim_mps, smooth, dump, regaining, since, period + 1), valves
+
+
+@formula("dddd->dd")
+def _referred(before: float, fall: float, fastest: float, period_s: float, reference: Array, fell: Array) -> None:
+    """The reference speed and how fast it fell lately."""
+    limit = min(max(fall + FALL_GROWTH_MPS2, FALL_MPS2[0]), FALL_MPS2[1])
+    reference[0] = max(fastest, before - limit * period_s)
+    fell[0] = fall + ((before - reference[0]) / period_s - fall) * (period_s / FALL_MEMORY_S)
+
+
+@formula("dddd??dd->d??d??")
+def _watched(
+    reference: float,
+    rim: float,
+    last: float,
+    smooth: float,
+    dumping: bool,
+    regaining: bool,
+    since: float,
+    period_s: float,
+    smoothed: Array,
+    dump: Flags,
+    regains: Flags,
+    after: Array,
+    controlled: Flags,
+    slides: Flags,
+) -> None:
+    """What the wheels of one group show."""
+    smoothed[0] = 0.5 * smooth + 0.5 * (rim - last) / period_s
+    sliding = reference - rim
+    expected = sliding - LEAD_S * smoothed[0]
+    low, high = LOW[0] + LOW[1] * reference, HIGH[0] + HIGH[1] * reference
+    active = reference > CUT_OFF_MPS
+    held = dumping and smoothed[0] < REGAINED_MPS2
+    dump[0] = active and sliding > 0.5 * low and (expected > high or held)
+    regains[0] = dump[0] or (regaining and active and sliding > ROLLING[0] + ROLLING[1] * reference)
+    slides[0] = active and expected > low
+    after[0] = 0.0 if slides[0] else since + period_s
+    controlled[0] = active and after[0] < CONTROL_S
 
 
 class Cylinders:
@@ -126,12 +158,28 @@ class Cylinders:
 
     def step(self, demanded_pa: Array, valves: Valves) -> Array:
         """Move the pressures by one step and return them; the demand is what has reached the groups, shape (A,)."""
-        missing = demanded_pa - self.supply_pa
-        self.supply_pa = self.supply_pa + np.where(
-            missing > 0.0, np.minimum(missing, self._fill), missing * self._released
+        self.supply_pa, self.pressure_pa = _filled(
+            self.supply_pa, self.pressure_pa, demanded_pa, valves, self._fill, self._released, self._empty, self._rise
         )
-        pressure = self.pressure_pa
-        applied = np.minimum(self.supply_pa, pressure + self._rise)
-        held = np.minimum(pressure, self.supply_pa)
-        self.pressure_pa = np.where(valves == DUMP, pressure * self._empty, np.where(valves == HOLD, held, applied))
         return self.pressure_pa
+
+
+@formula("dddldddd->dd")
+def _filled(
+    supply: float,
+    pressure: float,
+    demanded: float,
+    valve: int,
+    fill: float,
+    released: float,
+    empty: float,
+    rise: float,
+    supplied: Array,
+    filled: Array,
+) -> None:
+    missing = demanded - supply
+    supplied[0] = supply + (min(missing, fill) if missing > 0.0 else missing * released)
+    if valve == DUMP:
+        filled[0] = pressure * empty
+    else:
+        filled[0] = min(pressure if valve == HOLD else pressure + rise, supplied[0])

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from .compiled import formula
 from .journey import Array
 
 
@@ -141,10 +142,19 @@ def stack(trains: list[Train]) -> Train:
 
 def brake_n(train: Train, cylinder_pa: Array, speed_mps: Array) -> Array:
     """Return the brake force of the groups at their rims while the wheels turn."""
-    return train.pad_n_per_pa * (1.0 + train.fade * (np.minimum(speed_mps / FADE_MPS, 1.0) - 0.5)) * cylinder_pa
+    return np.asarray(_brake_n(train.pad_n_per_pa, train.fade, cylinder_pa, speed_mps))
 
 
 def resistance_n(nominal: Nominal, train: Train, speed_mps: Array) -> Array:
     """Return the running resistance; shape of the speed."""
-    c0, c1, c2 = nominal.resistance
-    return train.resistance * (c0 + (c1 + c2 * speed_mps) * speed_mps)
+    return np.asarray(_resistance_n(train.resistance, *nominal.resistance, speed_mps))
+
+
+@formula("dddd->d")
+def _brake_n(pad: float, fade: float, cylinder_pa: float, speed_mps: float, force: Array) -> None:
+    force[0] = pad * (1.0 + fade * (min(speed_mps / FADE_MPS, 1.0) - 0.5)) * cylinder_pa
+
+
+@formula("ddddd->d")
+def _resistance_n(factor: float, c0: float, c1: float, c2: float, speed_mps: float, force: Array) -> None:
+    force[0] = factor * (c0 + (c1 + c2 * speed_mps) * speed_mps)

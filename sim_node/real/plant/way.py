@@ -90,8 +90,9 @@ class Ground:
     def contact(self, front_m: Array) -> Contact:
         """Return what the groups meet, (R, A), of trains whose fronts are at (R, 1)."""
         low, share = self._at(front_m - self._offsets)
-        values = self._contact[low] + share[..., None] * (self._contact[low + 1] - self._contact[low])
-        mu0, *shape = np.moveaxis(values, -1, 0)
+        first = self._contact.take(low, axis=0)
+        values = first + share[..., None] * (self._contact.take(low + 1, axis=0) - first)
+        mu0, *shape = (values[..., i] for i in range(values.shape[-1]))
         return Contact(mu0 * self._cleaned, *shape)
 
     def grade(self, front_m: Array) -> Array:
