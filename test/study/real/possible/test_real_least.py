@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tasks import computed_here
 
 from adhesion_node.command.running import Running
 from adhesion_node.core.physics.train import GRAVITY, Array
@@ -232,7 +233,8 @@ def test_a_curve_counts_on_no_rise_of_the_rail() -> None:
 def test_a_case_has_bounds_where_its_sensors_are_honest(tmp_path: Path) -> None:
     names = "wet gnss", "wet gnss_doppler", "wet gnss_wheels", "dry gnss", "patches gnss", "wet tacho"
     cases = [next(case for case in chosen(name) if case.name == name) for name in names]
-    found = least(cases, Running(tmp_path))
+    with computed_here():
+        found = least(cases, Running(tmp_path))
     errors, excesses = zip(*(found[case] for case in cases), strict=True)
     positions, speeds, wheels, *_ = errors
     assert wheels < speeds < 0.7 * positions
