@@ -22,7 +22,7 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import GRAVITY, Array
 from .free import either
 from .gear.brake import BrakeSeen
-from .gear.wheels import BRAKE_BELOW, UNLEARNT, told
+from .gear.wheels import BRAKE_BELOW, FILLED_NS, UNLEARNT, told
 from .judging import judged
 from .kernels import weighing
 from .labels.kinds import FREE, FREE_STD
@@ -240,9 +240,9 @@ def _pressures(config: Config, brake: BrakeSeen, measurement: Measurement) -> tu
 
 def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> Braking:
     """What the brake does from now on."""
-    share = memory.wheels.share(now_ns)
+    share, held = memory.wheels.share(now_ns), memory.wheels.share(now_ns, FILLED_NS)
     applied = config.train.specific_brake(brake.applied_pa)
-    sliding = share if share is not None and share >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
+    sliding = held if held is not None and held >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
     fills = config.pressure_kind == "demanded" and brake.applied_pa < brake.demanded_pa
     filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
     slid = told(share, brake.has_slid(now_ns), memory.wheels.fell(now_ns))

@@ -19,7 +19,7 @@ from ..intake.samples import Measurement
 from .following import followed
 from .layout import POSITION, SPEED
 from .memory import Memory
-from .motion import Foreseen
+from .motion import Foreseen, white_variance
 from .sensors.plausible import Course
 
 if TYPE_CHECKING:
@@ -35,6 +35,10 @@ FIRST_SIGMA, MEAN_SIGMA, ALIKE_SIGMA = 2.5, 2.3, 3.5
 
 ABRUPT = 0.6
 """Share of it that the position before may have been off: what grows is motion."""
+
+SOON_S, GROWN_SIGMA = 0.5, 2.2
+"""Time within which positions that lie behind are sooner a step than an axle's, and standard deviations by which the
+newest of them may lie further behind than the first."""
 
 BACK = 0.3
 """A step takes the one before back if it is as large to within this share: what reflects a signal passes by."""
@@ -85,6 +89,24 @@ class Stepping(NamedTuple):
     def doubts(self, config: Config) -> bool:
         """Whether the positions may have stepped far: until that is known they tell nothing."""
         return self.is_far(config) and self._waits(config)
+
+    def may_be(self, config: Config, measurement: Measurement) -> bool:
+        """Whether the newest position lies off as the first did and more have to: till then it tells nothing.
+
+        An axle that slides falls behind, too. So where they lie behind they must come soon, or another sensor tell the
+        speed, and the newest must not have fallen further behind.
+        """
+        if self.before is None or len(self.off_m) == 1 or not (measurement.has_position and self._waits(config)):
+            return False
+        if self.off_m[-1] > 0.0:
+            return True
+        elapsed_s = (measurement.t_ns - self.since[0].t_ns) / S
+        if elapsed_s > SOON_S and not any(each.all_speeds or each.wheels for each in self.since):
+            return False
+        bank, declared_m = self.before.bank, math.sqrt(measurement.variance_m2)
+        white = float(bank.weight @ white_variance(bank, declared_m, self.before.coarse.std_m))
+        error_m = GROWN_SIGMA * math.sqrt(2.0 * white + (bank.std_of(SPEED) * elapsed_s) ** 2)
+        return self.off_m[-1] > self.off_m[0] - error_m
 
     def _waits(self, config: Config) -> bool:
         """Whether more positions have to say that they have stepped."""

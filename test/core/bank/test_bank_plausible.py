@@ -56,12 +56,13 @@ def gauss_markov(count: int, rng: np.random.Generator, std: float, lasts_s: floa
     return error
 
 
-def followed(positions: Array, std: float, every: int = 1) -> tuple[State, list[Estimate]]:
-    """By one of so many positions."""
+def followed(positions: Array, std: float, every: int = 1, speeds: Array | None = None) -> tuple[State, list[Estimate]]:
+    """By one of so many positions, and the speed beside it."""
     state, estimates = init(CONFIG, 1), []
     for index, position in tuple(enumerate(positions))[::every]:
         pressure = FULL_PA if BRAKE_S <= index * H < RELEASE_S else 0.0
-        measurement = Measurement(S + round(index * H * 1e9), float(position), std**2, pressure)
+        beside = None if speeds is None else float(speeds[index])
+        measurement = Measurement(S + round(index * H * 1e9), float(position), std**2, pressure, beside)
         state, estimate = step(CONFIG, state, measurement)
         estimates += [] if estimate is None else [estimate]
     return state, estimates
@@ -113,6 +114,20 @@ def test_a_wheel_that_is_heard_seldom_is_caught(slip: float, more: int, every: i
         assert state.counts[Outcome.SLIDING] > 0, seed
         first = min((each.t_ns - S) / S for each in estimates if each.withheld)
         assert BRAKE_S + 1.0 < first <= BRAKE_S + 2.5 + more * every * H
+
+
+@pytest.mark.parametrize("size_m", [-8.0, -4.0, 8.0])
+@pytest.mark.parametrize(("every", "with_speed"), [(1, False), (2, False), (5, False), (5, True), (10, True)])
+def test_a_step_of_the_positions_is_no_sliding_wheel(size_m: float, every: int, with_speed: bool) -> None:
+    """Before: two of them in a row, five times a second or less, were, until the brake was released."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        places, speeds = truth(0.08)
+        errors = gauss_markov(places.size, rng, 1.0, 60.0) + 0.1 * rng.standard_normal(places.size)
+        stepped = size_m * (np.arange(places.size) * H > BRAKE_S + 6.0)
+        state, estimates = followed(places + errors + stepped, 2.0, every, speeds if with_speed else None)
+        assert not state.counts[Outcome.SLIDING]
+        assert not any(each.withheld for each in estimates)
 
 
 @pytest.mark.parametrize(("lasts_s", "every"), [(0.1, 10), (0.1, 1), (0.25, 1)])

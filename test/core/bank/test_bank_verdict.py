@@ -111,6 +111,16 @@ def limits(kind: int, used: float, told: float = 0.0, config: Config = CONFIG) -
     return found(config, memory, NOTHING, NOTHING).regime
 
 
+def test_wheels_that_roll_say_that_no_rail_limits_whatever_the_brake_lacks() -> None:
+    """Pads that fade by a quarter or more look like a rail that gives less, and no wheel slides."""
+    bank = bank_of([SMOOTH], spread=0.0)
+    bank.mean[:, MU] = 0.5 * FULL
+    memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(FULL), 3)
+    assert found(CONFIG, memory, NOTHING, NOTHING).regime is Regime.ADHESION_LIMITED
+    rolling = memory._replace(wheels=WheelsSeen((1.0,) * 4, 0, 0.03, (None,) * 4, (10 * S,) * 4))
+    assert found(CONFIG, rolling, NOTHING, NOTHING).regime is Regime.COASTING
+
+
 def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well() -> None:
     config = replace(CONFIG, brake_std=0.1, mass_std=0.0, rotating_mass_std=0.0)
     assert limits(SMOOTH, 0.79, config=config) is Regime.ADHESION_LIMITED

@@ -185,6 +185,25 @@ def test_an_axle_whose_slides_fall_between_samples_counts_as_sliding() -> None:
         assert wheels.share((100 + index) * S) == 0.25
 
 
+def test_axles_that_protection_lets_roll_in_turns_use_no_more_than_the_rail_gives() -> None:
+    """Each of four slides for 1 s in 10, and is then pressed again slowly: the rail gives 0.03 all the time.
+
+    Before: those that had slid longer than 3 s ago counted as using what the whole brake asks for.
+    """
+    memory: Memory | None = None
+    shares = []
+    for index in range(600):
+        t_ns, braked_s = S + index * 100 * MS, max(0.1 * (index - 200), 0.0)
+        speed = 40.0 - 9.8 * 0.035 * braked_s
+        slides = (braked_s > 0.0) & ((braked_s - 2.5 * np.arange(4)) % 10.0 < 1.0)
+        wheels = (sample(t_ns, speed, np.where(slides, 0.15, 0.003), EVEN),)
+        where = 4.0 * index - 0.5 * 9.8 * 0.035 * braked_s**2
+        measured = Measurement(t_ns, where, 0.04, 410e3 * (braked_s > 0.0), wheels=wheels)
+        memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
+        shares.append(memory.braking.share)
+    assert min(shares[300:]) == 1.0
+
+
 def test_standing_wheels_are_no_judges() -> None:
     wheels = coasted(EVEN)
     assert wheels.after(CONFIG, WheelSample(50 * S, (0.0,) * 4), 0.0, 0.1, True) == wheels

@@ -109,8 +109,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     part, error = mu / max(demanded, 1e-6), config.brake_error
     if share is not None and share >= SLIDES_FROM:
         return Regime.ADHESION_LIMITED
-    if share is not None and share < BRAKE_BELOW and part > 1.0 - HELD_BACK * error:
-        return Regime.BRAKE_LIMITED
+    if share is not None and share < BRAKE_BELOW:
+        return Regime.BRAKE_LIMITED if part > 1.0 - HELD_BACK * error else Regime.COASTING
     alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides
     dumped = memory.braking.told > 0.0 and (part < 1.0 - error or not alone)
     if slides > CLAIMED and (part < 1.0 - 2.0 * error or dumped):

@@ -27,8 +27,12 @@ S = 1_000_000_000
 SLID_NS, FRESH_NS = 3 * S, S
 """An axle counts as sliding so long, as its protection lets it roll in between; so long may wheels not be heard."""
 
+FILLED_NS = 15 * S
+"""For so long behind a slide an axle that rolls uses no more than those that slide: its protection fills the cylinder
+slowly, and lets go of it again."""
+
 SLID_SAMPLES = 16
-"""And for so many samples where they come seldom, as slides fall between them."""
+"""An axle counts as sliding for so many samples where they come seldom, as slides fall between them."""
 
 LEARNT = 0.05
 """Share of a new sample in what is learnt of a radius."""
@@ -203,11 +207,11 @@ class WheelsSeen(NamedTuple):
         since_ns = t_ns if self.agree_ns is None else self.agree_ns
         return self._replace(agree_ns=since_ns, fell_ns=self.fell_ns if t_ns - since_ns < AGREE_NS else None)
 
-    def share(self, now_ns: int) -> float | None:
+    def share(self, now_ns: int, late_ns: int = SLID_NS) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
         if not self.slid_ns:
             return None
-        counts_ns = at_least(SLID_NS, SLID_SAMPLES, self.every_ns)
+        counts_ns = at_least(late_ns, SLID_SAMPLES, self.every_ns)
         slid = [each is not None and now_ns - each < counts_ns for each in self.slid_ns]
         rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
         known = sum(one or other for one, other in zip(slid, rolled, strict=True))
