@@ -47,7 +47,7 @@ PLACES = (("position",), ("lat", "lon"), ("speed",))
 """Columns of which a log has one group at least, beside the time."""
 
 OPTIONAL = (
-    *("position", "lat", "lon", "height", "variance"),
+    *("date", "position", "lat", "lon", "height", "variance"),
     *(*PRESSURES, "speed", "speed_std", "acceleration"),
 )
 """All columns but the time and the axles."""
@@ -62,7 +62,7 @@ FAMILIES = {
 UNITS: Mapping[str, Sequence[str]] = {
     **{"time": tuple(TIME_UNITS), "position": tuple(POSITION_UNITS), "speed": tuple(SPEED_UNITS)},
     **{"pressure": tuple(PRESSURE_UNITS), "acceleration": tuple(ACCELERATION_UNITS), "wheel": WHEEL_UNITS},
-    **{"lat": ("deg",), "lon": ("deg",), "height": ("m",), "variance": ("m2",)},
+    **{"lat": ("deg",), "lon": ("deg",), "height": ("m",), "variance": ("m2",), "date": ()},
 }
 """By family, the first one where nothing is said; the last ones by column, of which there is no other."""
 

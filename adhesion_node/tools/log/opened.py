@@ -22,6 +22,7 @@ from .cell.numbers import FORMATS, NO_TIME, time_formats, time_unit, times_ns
 from .cell.suffixed import unit_in, without_units
 from .cell.units import kind_of, known
 from .columns import Columns, columns_of, in_doubt, units_told
+from .dated import date_of, with_dates, without_date
 from .format import Format
 from .idle import require_meaning
 from .text import SAMPLE, Block, blocks, names_of, understood
@@ -52,8 +53,11 @@ def open_log(path: Path, form: Format) -> Source:
         names = names_of(path, form)
         rows = blocks(path, form, names)
     columns = columns_of(names, str(path), form)
-    told = units_told(columns, names, form)
     first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
+    date, named = date_of(first.cells, columns, form), columns
+    first, rows = with_dates(first, date, named), (with_dates(block, date, named) for block in rows)
+    columns = without_date(columns, is_used=date is not None)
+    told = units_told(columns, names, form)
     behind = dict(_behind_numbers(first.cells, columns, told))
     first, rows = _bare(first, behind), (_bare(block, behind) for block in rows)
     absolute = frozenset(ours for ours, text in told.items() if kind_of(text, ours) == "absolute")

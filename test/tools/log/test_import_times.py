@@ -54,6 +54,34 @@ def test_times_as_recorders_write_them(importing: Import, written: str, options:
     assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S for i in range(30)]
 
 
+@pytest.mark.parametrize(
+    ("day", "clock", "options"),
+    [
+        ("%d.%m.%Y", "%H:%M:%S,%f", []),
+        ("%m/%d/%y", "%I:%M:%S %p", []),
+        ("%Y-%m-%d", "%H:%M:%S.%f", ["--time-zone", "UTC"]),
+        ("%d%m%y", "%H%M%S", ["--date", "date", "--time-format", "%d%m%y %H%M%S"]),
+    ],
+)
+def test_a_date_in_a_column_of_its_own_is_that_of_the_time(
+    importing: Import, day: str, clock: str, options: list[str]
+) -> None:
+    moments = pd.Timestamp("2024-11-21 23:59:50") + pd.to_timedelta(range(20), unit="s")
+    rows = ride()[:200:10].assign(time=moments.strftime(clock), Date=moments.strftime(day))
+    assert importing(text(rows, ";"), *options) == 0, importing.errors
+    assert [sample.t_ns for sample in importing.positions()] == moments.as_unit("ns").asi8.tolist()
+
+
+@pytest.mark.parametrize(
+    ("clock", "date"), [("%H:%M:%S", "of a Thursday"), ("%Y-%m-%d %H:%M:%S", "2020-01-01"), ("%H:%M:%S", "17")]
+)
+def test_a_column_that_is_no_date_of_the_time_is_not_read(importing: Import, clock: str, date: str) -> None:
+    moments = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(range(20), unit="s")
+    assert importing(text(ride()[:200:10].assign(time=moments.strftime(clock), date=date))) == 0, importing.errors
+    first_ns = importing.positions()[0].t_ns
+    assert first_ns == (29_703 * S if clock == "%H:%M:%S" else 1_732_176_903 * S)
+
+
 @pytest.mark.parametrize(("unit", "per_s"), [("s", 1), ("ms", 10**3), ("us", 10**6), ("ns", 10**9)])
 def test_times_since_1970_tell_their_unit(importing: Import, unit: str, per_s: int) -> None:
     begin = 1_732_176_903
