@@ -116,6 +116,10 @@ class Format:
     """Lines above the header."""
     units: Sequence[str] | None = None
     """Cells of the line of units between the header and the first row, where there is one."""
+    units_at: int = 0
+    """Which line below the header that is."""
+    below: int = 0
+    """Lines below the header that are no rows: units, comments, types."""
     told: Mapping[str, str] = field(default_factory=dict)
     """Units of columns, as the log itself names them; an option counts more."""
     absolute: frozenset[str] = frozenset()

@@ -6,9 +6,33 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A header in the midst of a log, as where a recorder was started anew, or logs were joined."""
+"""What is no row of a log: lines of units, comments and types below the header, and the header in the midst again."""
 
+import re
 from collections.abc import Sequence
+
+from .cell.units import known
+from .format import UNITS
+
+_NUMBERED = re.compile("[+-]?[.,]?[0-9](?!/[a-z])")  # 1/min is a unit
+
+
+def is_head(cells: Sequence[str]) -> bool:
+    """Return whether a line below the header is no row of measurements: units, comments or types, without a number.
+
+    >>> is_head(["s", "1/min"]), is_head(["GPS clock", ""]), is_head(["", ""]), is_head(["n/a", "0.5"])
+    (True, True, False, False)
+    """
+    return any(map(str.isalpha, "".join(cells))) and not any(map(_NUMBERED.match, cells))
+
+
+def how_many_units(cells: Sequence[str]) -> int:
+    """Return how many of the cells are units of anything.
+
+    >>> how_many_units(["[s]", "km/h", "bar"]), how_many_units(["double", "double", "double"])
+    (3, 0)
+    """
+    return sum(any(known(cell, family) for family in UNITS) for cell in cells)
 
 
 def is_header(cells: Sequence[str], names: Sequence[str]) -> bool:

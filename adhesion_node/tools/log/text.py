@@ -14,7 +14,7 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import islice
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,7 +24,7 @@ from .cell.decimals import decimal_sign
 from .cell.suffixed import number_in
 from .cell.units import meant
 from .format import PLACES, Format
-from .headers import is_header, require_same
+from .headers import how_many_units, is_head, is_header, require_same
 
 DELIMITERS = (",", ";", "\t", "|")
 
@@ -53,8 +53,6 @@ NO_HEADER = "has no header line: begin with the names of the columns, their quot
 
 BROKEN = "quotes are not closed in this line: close them, or take the line break out of a name of the header"
 
-_NUMBERED = re.compile("[+-]?[.,]?[0-9](?!/[a-z])")  # 1/min is a unit
-
 
 class Refusal(NamedTuple):
     """A row that cannot be used: its line, why, for counting, and the whole message."""
@@ -78,14 +76,17 @@ def understood(path: Path, form: Format) -> Format:
     if not any(map(str.strip, lines)):
         raise ValueError(f"{path}: {NO_HEADER}")
     delimiter, header = _header(lines, form)
-    rows = [cells for text in lines[header + 1 :] if (cells := _cells(text, delimiter))]
-    first = rows[0] if len(rows) > 1 else []
-    decimal, is_sure = decimal_sign(number_in(cell) for cells in rows for cell in cells)
+    rows = {n: cells for n, text in enumerate(lines[header + 1 :], 1) if (cells := _cells(text, delimiter))}
+    heads = dict(takewhile(lambda row: is_head(row[1]), islice(rows.items(), max(len(rows) - 1, 0))))
+    units = max(heads, key=lambda n: how_many_units(heads[n]), default=0)
+    decimal, is_sure = decimal_sign(number_in(cell) for cells in rows.values() for cell in cells)
     return replace(
         form,
         delimiter=delimiter,
         skip_rows=header,
-        units=first if any(map(str.isalpha, "".join(first))) and not any(map(_NUMBERED.match, first)) else None,
+        units=heads.get(units),
+        units_at=units,
+        below=max(heads, default=0),
         decimal=form.decimal or decimal,
         thousands=is_sure and form.decimal in (None, decimal),
     )
@@ -102,7 +103,7 @@ def names_of(path: Path, form: Format) -> list[str]:
 
 def blocks(path: Path, form: Format, names: Sequence[str]) -> Iterator[Block]:
     """Yield the rows below the header. A line is a row: an unclosed quote spoils its own line only."""
-    first = (form.skip_rows or 0) + 1 + (form.units is not None)
+    first = (form.skip_rows or 0) + 1 + form.below
     numbered = islice(enumerate(_lines(path, form), start=1), first, None)
     while lines := list(islice(numbered, BLOCK)):
         yield _block(path, form, names, lines)

@@ -45,7 +45,10 @@ def read_as(form: Format) -> str:
     """Say how a log was understood, and what says otherwise."""
     header = (form.skip_rows or 0) + 1
     text = f"{form.encoding}, delimiter {form.delimiter!r}, decimal {form.decimal!r}, header in line {header}"
-    text += f", line {header + 1} left out as units" if form.units is not None else ""
+    if form.below > 1:
+        text += f", lines {header + 1} to {header + form.below} left out, units in line {header + form.units_at}"
+    elif form.below:
+        text += f", line {header + 1} left out as units"
     time = (
         f"times in {form.time_unit}" if form.time_format is None else f"times {form.time_format!r} of {form.time_zone}"
     )

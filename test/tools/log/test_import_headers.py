@@ -6,14 +6,16 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A header in the midst of a log, as of logs that were joined: what is below is never read as other columns."""
+"""Lines that are no rows: units, comments and types below the header, and the header in the midst again."""
 
 from __future__ import annotations
 
 import pandas as pd
 import pytest
 from test_import_csv import Import, importing
-from test_import_log import ride, text
+from test_import_log import read_as, ride, text
+
+from adhesion_node.wire.topics import SPEED
 
 __all__ = ["importing"]
 
@@ -61,3 +63,24 @@ def test_a_name_with_a_line_break_is_told_with_its_line(importing: Import) -> No
 def test_a_signal_to_a_row_is_told_as_such(importing: Import) -> None:
     assert importing(text(ride().melt("time"))) == 2
     assert "a signal to a row is not read, give each a column of its own; else name one with" in importing.errors[0]
+
+
+@pytest.mark.parametrize(
+    ("below", "left_out"),
+    [
+        (["s,m,km/h,bar", "GPS clock,odometer,radar,BC 1"], "lines 2 to 3 left out, units in line 2"),
+        (["double,double,double,double", "[s],[m],[km/h],[bar]"], "lines 2 to 3 left out, units in line 3"),
+        (["", "s,m,km/h,bar"], "lines 2 to 3 left out, units in line 3"),
+        (["GPS clock,,,BC 1", "double,,,", "s,m,km/h,bar"], "lines 2 to 4 left out, units in line 4"),
+    ],
+)
+def test_units_are_found_beside_comments_and_types(
+    importing: Import, capsys: pytest.CaptureFixture[str], below: list[str], left_out: str
+) -> None:
+    rows = ride().assign(
+        speed=lambda ours: ours["speed"] * 3.6, brake_pressure=lambda ours: ours["brake_pressure"] / 1e5
+    )
+    header, *written = text(rows).splitlines()
+    assert importing("\n".join([header, *below, *written])) == 0, importing.errors
+    assert SPEED.read(importing.messages("speed")[0]).speed_mps == pytest.approx(50.0)
+    assert any(left_out in line for line in read_as(importing, capsys))
