@@ -23,6 +23,7 @@ from .cell.suffixed import unit_in, without_units
 from .cell.units import kind_of, known
 from .columns import Columns, columns_of, in_doubt, units_told
 from .dated import date_of, with_dates, without_date
+from .encoded import is_parquet
 from .format import Format
 from .idle import require_meaning
 from .text import SAMPLE, Block, blocks, names_of, understood
@@ -43,7 +44,7 @@ class Source(NamedTuple):
 
 def open_log(path: Path, form: Format) -> Source:
     """Look how a log is written. Raises ValueError when it is empty or a column is missing."""
-    if path.suffix.lower() in (".parquet", ".pq"):
+    if is_parquet(path):
         refuse(form, ["encoding", "delimiter", "decimal", "skip_rows"], "a Parquet file is no text: leave it out")
         table = _parquet(path)
         names, rows = list(table), iter([Block(table.set_axis(table.index + 1), [])])

@@ -8,7 +8,6 @@
 
 """The text of a CSV log: how it is written, guessed from its beginning, and its cells as blocks of columns."""
 
-import codecs
 import csv
 import re
 from collections import Counter
@@ -23,25 +22,17 @@ import pandas as pd
 from .cell.decimals import decimal_sign
 from .cell.suffixed import number_in
 from .cell.units import meant
+from .encoded import encoding_of
+from .encoded import lines as file_lines
 from .format import PLACES, Format
 from .headers import how_many_units, is_head, is_header, require_same
 
 DELIMITERS = (",", ";", "\t", "|")
 
-_BOOK = b"\xd0\xcf\x11\xe0"
-ARCHIVES = ((b"PK\x03\x04", "a zip file or a workbook"), (b"\x1f\x8b", "compressed"), (_BOOK, "a workbook"))
-"""How files begin that are no text, and what they are."""
-
 MISSING = frozenset(
     (*("nan", "null", "n/a", "na", "none", "n.a.", "#n/a", "#nv", "<null>", "(null)", "\\n"), *("-", "--", "---"))
 )
 """What stands in a cell without a value, however it is written."""
-
-UTF_16 = ((slice(1, 4, 2), "utf-16-le"), (slice(0, 4, 2), "utf-16-be"))
-"""Where the zeros stand in Latin letters of 16 bits."""
-
-MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-"""Byte order marks and what they say of the encoding."""
 
 SAMPLE = 300
 """Lines from which it is guessed how a log is written."""
@@ -71,8 +62,8 @@ class Block(NamedTuple):
 
 def understood(path: Path, form: Format) -> Format:
     """Return the format with encoding, delimiter, decimal sign and header line guessed where they are not given."""
-    form = replace(form, encoding=form.encoding or _encoding(path))
-    lines = list(islice(_lines(path, form), SAMPLE))
+    form = replace(form, encoding=form.encoding or encoding_of(path))
+    lines = list(islice(file_lines(path, form.encoding), SAMPLE))
     if not any(map(str.strip, lines)):
         raise ValueError(f"{path}: {NO_HEADER}")
     delimiter, header = _header(lines, form)
@@ -94,9 +85,12 @@ def understood(path: Path, form: Format) -> Format:
 
 def names_of(path: Path, form: Format) -> list[str]:
     """Return the names in the header of a log whose format is understood."""
-    names = _cells(next(islice(_lines(path, form), form.skip_rows or 0, None), ""), form.delimiter or ",")
+    names = _cells(next(islice(file_lines(path, form.encoding), form.skip_rows or 0, None), ""), form.delimiter or ",")
     if not any(re.search(r"[^\W\d]", name) for name in names):
-        broken = next((n for n, text in enumerate(islice(_lines(path, form), SAMPLE), 1) if text.count('"') % 2), None)
+        broken = next(
+            (n for n, text in enumerate(islice(file_lines(path, form.encoding), SAMPLE), 1) if text.count('"') % 2),
+            None,
+        )
         raise ValueError(f"{path}: {NO_HEADER}" if broken is None else f"{path}:{broken}: {BROKEN}")
     return names
 
@@ -104,7 +98,7 @@ def names_of(path: Path, form: Format) -> list[str]:
 def blocks(path: Path, form: Format, names: Sequence[str]) -> Iterator[Block]:
     """Yield the rows below the header. A line is a row: an unclosed quote spoils its own line only."""
     first = (form.skip_rows or 0) + 1 + form.below
-    numbered = islice(enumerate(_lines(path, form), start=1), first, None)
+    numbered = islice(enumerate(file_lines(path, form.encoding), start=1), first, None)
     while lines := list(islice(numbered, BLOCK)):
         yield _block(path, form, names, lines)
 
@@ -150,39 +144,6 @@ def _cells(text: str, delimiter: str) -> list[str]:
         return split(text, delimiter) if text.strip() else []
     except csv.Error:
         return []
-
-
-def _lines(path: Path, form: Format) -> Iterator[str]:
-    # A broken byte must not end the import: it becomes a character that no number has.
-    with path.open(encoding=form.encoding, errors="replace") as file:
-        yield from file
-
-
-def _encoding(path: Path) -> str:
-    """That of the byte order mark; else UTF-8 where all of the file is, else that of Western Windows.
-
-    Raises ValueError for what is no text.
-    """
-    decoder = codecs.getincrementaldecoder("utf-8")()
-    with path.open("rb") as file:
-        head = file.read(4)
-        for mark, encoding in MARKS:
-            if head.startswith(mark):
-                return encoding
-        for begins, what in ARCHIVES:
-            if head.startswith(begins):
-                raise ValueError(f"{path}: is {what}, no text: unpack it, or save it as CSV")
-        for places, encoding in UTF_16:
-            if head[places] == b"\0\0":
-                return encoding
-        try:
-            decoder.decode(head)
-            while piece := file.read(1 << 20):
-                decoder.decode(piece)
-            decoder.decode(b"", final=True)
-        except UnicodeDecodeError:
-            return "cp1252"
-    return "utf-8"
 
 
 def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:

@@ -101,19 +101,6 @@ def test_a_decimal_comma_that_is_the_delimiter_too_is_told(importing: Import) ->
     assert "or is it the decimal sign, too? Then export with ';'" in importing.errors[0]
 
 
-@pytest.mark.parametrize(
-    ("begins", "what"),
-    [
-        (b"PK\x03\x04\x14", "a zip file or a workbook"),
-        (b"\x1f\x8b\x08", "compressed"),
-        (b"\xd0\xcf\x11\xe0", "a workbook"),
-    ],
-)
-def test_what_is_no_text_is_told(importing: Import, begins: bytes, what: str) -> None:
-    assert importing(begins + text(ride()).encode()) == 2
-    assert importing.errors == [f"import_csv: FILE: is {what}, no text: unpack it, or save it as CSV"]
-
-
 @pytest.mark.parametrize("missing", ["NaN", "null", "n/a", "NA", "-"])
 def test_what_stands_for_no_value_is_none(importing: Import, missing: str) -> None:
     """The rest of such a row is kept, as of a receiver that is slower than the rows."""
