@@ -59,7 +59,7 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
     if not (axles or any(set(group) <= set(used) for group in PLACES)):
         lacks = "has neither position, lat and lon, speed nor wheels"
         by_signal = any(name.casefold() in VALUES for name in header)
-        remedy = "a signal to a row is not read, give each a column of its own; else " if by_signal else ""
+        remedy = "a signal to a row? --signal COL --value COL; else " if by_signal else ""
         remedy += "name one with --position COL, or --lat COL and --lon COL, or --speed COL, or --wheel-speeds COL"
         raise ValueError(f"{source}: columns {_listed(header)}: {lacks}: {remedy}")
     if {"brake_pipe", "brake_demand"} <= set(used):

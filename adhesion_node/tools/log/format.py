@@ -105,6 +105,11 @@ class Format:
 
     named: Mapping[str, str]
     axles: Sequence[str] = ()
+    where: Sequence[str] = ()
+    """Which rows are read, COLUMN=VALUE."""
+    signal: str | None = None
+    """The column with the name of the signal, where a row has one signal."""
+    value: str | None = None
     asked: argparse.Namespace | None = None
     """What options ask for that may mean nothing for a log (idle.py)."""
     encoding: str | None = None

@@ -11,6 +11,7 @@
 import re
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,14 +19,16 @@ import numpy as np
 import pandas as pd
 
 from ...command.checks import refuse
-from .cell.numbers import FORMATS, NO_TIME, time_formats, time_unit, times_ns
+from .cell.numbers import FORMATS, NO_TIME, is_clock, time_formats, time_unit, times_ns
 from .cell.suffixed import unit_in, without_units
 from .cell.units import kind_of, known
+from .chosen import chosen, several, with_rows
 from .columns import Columns, columns_of, in_doubt, units_told
 from .dated import date_of, with_dates, without_date
 from .encoded import is_parquet
 from .format import Format
 from .idle import require_meaning
+from .signals import signals_of, spread
 from .text import SAMPLE, Block, blocks, names_of, understood
 
 ZONED = re.compile(r"(Z|[T ]\d\d.*[+-]\d\d(:?\d\d)?)$")
@@ -40,6 +43,8 @@ class Source(NamedTuple):
     blocks: Iterator[Block]
     notes: list[str]
     """How a date is read that may be read otherwise."""
+    trains: list[str]
+    """What rows of one time differ by, where some are left out."""
 
 
 def open_log(path: Path, form: Format) -> Source:
@@ -47,14 +52,19 @@ def open_log(path: Path, form: Format) -> Source:
     if is_parquet(path):
         refuse(form, ["encoding", "delimiter", "decimal", "skip_rows"], "a Parquet file is no text: leave it out")
         table = _parquet(path)
-        names, rows = list(table), iter([Block(table.set_axis(table.index + 1), [])])
-        form = replace(form, decimal=".")
+        names, form = list(table), replace(form, decimal=".")
+        blocks_of = partial(iter, [Block(table.set_axis(table.index + 1), [])])
     else:
         form = understood(path, form)
         names = names_of(path, form)
-        rows = blocks(path, form, names)
+        blocks_of = partial(blocks, path, form, names)
+    rows = chosen(blocks_of(), names, form.where, str(path))
+    if signals := signals_of(blocks_of(), names, form, str(path)):
+        names = [*signals.rest, *signals.columns]
     columns = columns_of(names, str(path), form)
+    rows = with_rows(spread(rows, signals, columns) if signals else rows)
     first = next(rows, Block(pd.DataFrame(columns=names, dtype=object), []))
+    trains = [] if signals else [*several(first.cells, columns)]
     date, named = date_of(first.cells, columns, form), columns
     first, rows = with_dates(first, date, named), (with_dates(block, date, named) for block in rows)
     columns = without_date(columns, is_used=date is not None)
@@ -69,8 +79,9 @@ def open_log(path: Path, form: Format) -> Source:
         told.pop("time", None)  # [UTC] or [hh:mm:ss]: dates are in no unit
     require_meaning(timed, columns)
     columns = columns._replace(doubts=tuple(in_doubt(told, form)))
+    timed = replace(timed, sort=timed.sort or (signals is not None and not is_clock(timed.time_format)))
     notes = [] if form.time_format else list(_read_otherwise(first.cells[columns.names["time"]], timed))
-    return Source(timed, columns, _again(first, rows), notes)
+    return Source(timed, columns, _again(first, rows), notes, trains)
 
 
 def _behind_numbers(cells: pd.DataFrame, columns: Columns, told: dict[str, str]) -> Iterator[tuple[str, str]]:

@@ -60,11 +60,6 @@ def test_a_name_with_a_line_break_is_told_with_its_line(importing: Import) -> No
     assert said.startswith("import_csv: FILE:2: quotes are not closed in this line: close them, or take the line break")
 
 
-def test_a_signal_to_a_row_is_told_as_such(importing: Import) -> None:
-    assert importing(text(ride().melt("time"))) == 2
-    assert "a signal to a row is not read, give each a column of its own; else name one with" in importing.errors[0]
-
-
 @pytest.mark.parametrize(
     ("below", "left_out"),
     [

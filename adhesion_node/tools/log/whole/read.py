@@ -57,10 +57,11 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
             tell(each)
     rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
     rows, notes = in_zone(over_midnight(rows, timed), timed)
-    rows, shared = together(rows.sort_values("t_ns", kind="stable") if form.sort else rows)
+    rows, shared = together(rows.sort_values("t_ns", kind="stable") if timed.sort else rows)
     rows, refused = rising(rows, str(path), has_dates(timed))
     for each in refused:
         tell(each)
+    doubts = (*source.columns.doubts, *(source.trains if refused else []))
     rows, held = without_held(rows)
     rows, wrapped = unwrapped(rows, form)
     notes += source.notes + digits + shared + held + wrapped
@@ -75,4 +76,4 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         rows, form, note = demanded(rows, form)
         notes.append(note)
     stds, coarse = stds_of(rows, form)
-    return Log(form, source.columns, rows, (*notes, *coarse), stds)
+    return Log(form, source.columns._replace(doubts=doubts), rows, (*notes, *coarse), stds)
