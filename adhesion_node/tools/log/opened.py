@@ -31,7 +31,7 @@ from .idle import require_meaning
 from .signals import signals_of, spread
 from .text import SAMPLE, Block, blocks, names_of, understood
 
-ZONED = re.compile(r"(Z|[T ]\d\d.*[+-]\d\d(:?\d\d)?)$")
+ZONED = re.compile(r"(Z|UTC|GMT|[T ]\d\d.*[+-]\d\d(:?\d\d)?)$")
 """How a date ends that names its zone, behind the time of the day."""
 
 
@@ -109,7 +109,7 @@ def _timed(form: Format, cells: "pd.Series[Any]") -> Format:
     sample = [str(cell) for cell in cells.head(SAMPLE)]
     written = "ISO8601" if form.time_unit == "iso" else next(iter(time_formats(sample)), None)
     unit = None if written else form.time_unit or form.told.get("time") or time_unit(sample, form.decimal or ".")
-    zone = "UTC" if written == "ISO8601" and any(map(ZONED.search, sample)) else form.time_zone
+    zone = "UTC" if written and any(map(ZONED.search, sample)) else form.time_zone
     return replace(form, time_format=written, time_unit=unit, time_zone=zone)
 
 

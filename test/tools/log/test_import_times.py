@@ -42,6 +42,9 @@ S = 10**9
         ("%m/%d/%y %H:%M:%S", [], 1_732_176_903 * S),
         ("%d/%m/%y %H:%M:%S,%f", [], 1_732_176_903 * S),
         ("%d.%m.%Y, %H:%M:%S", [], 1_732_176_903 * S),
+        ("%Y-%m-%d %H:%M:%S.%f UTC", ["--time-zone", "Europe/Berlin"], 1_732_176_903 * S),
+        ("%d.%m.%Y %H:%M:%S GMT", ["--time-zone", "Europe/Berlin"], 1_732_176_903 * S),
+        ("%M:%S.%f", [], 903 * S),
         ("%d.%m.%Y %H:%M:%S:000", [], 1_732_176_903 * S),
         ("%H:%M:%S:000", [], 29_703 * S),
         ("%Hh%Mm%S %d-%b-%Y", ["--time-format", "%Hh%Mm%S %d-%b-%Y"], 1_732_176_903 * S),
@@ -125,12 +128,6 @@ def test_a_clock_of_whole_seconds_is_told(importing: Import) -> None:
     assert importing(text(rows.assign(time=rows.time.astype(int)))) == 1
     assert importing.errors[0].endswith("rows share a time: log it with the fraction of the second")
     assert importing.summary["written"] == 60
-
-
-def test_the_clock_goes_on_after_midnight(importing: Import) -> None:
-    assert importing("time,speed\n23:59:59.9,1\n00:00:00.0,1\n00:00:00.1,1\n") == 0
-    times = [SPEED.read(message).t_ns for message in importing.messages("speed")]
-    assert np.diff(times).tolist() == [S // 10, S // 10]
 
 
 def test_the_end_of_summer_time_is_no_step_of_the_clock(importing: Import) -> None:

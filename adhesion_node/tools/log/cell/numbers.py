@@ -29,8 +29,8 @@ NO_TIME = -1
 END_OF_STAMPS_NS = 2**31 * 10**9
 """A ROS stamp holds whole seconds in 31 bits: until 2038."""
 
-CLOCK = "%H:%M:%S.%f"
-"""The time of the day alone."""
+CLOCK, OF_HOUR = "%H:%M:%S.%f", "%M:%S.%f"
+"""The time of the day alone, and that of the hour, which has a fraction: as a spreadsheet shows times."""
 
 _DAYS = (
     *("%d.%m.%Y", "%d.%m.%y", "%d/%m/%Y", "%m/%d/%Y", "%d-%m-%Y", "%Y/%m/%d", "%Y%m%d"),
@@ -42,13 +42,19 @@ FORMATS = (
     "ISO8601",
     *(f"{day} {CLOCK}" for day in _DAYS),
     CLOCK,
+    OF_HOUR,
     *(f"{day} %I:%M:%S.%f %p" for day in ("%m/%d/%Y", "%d/%m/%Y", "%m/%d/%y", "%d/%m/%y", "%d-%b-%y", "%Y-%m-%d")),
     *("%b %d %Y %I:%M:%S.%f %p", "%I:%M:%S.%f %p"),
 )
 """Formats of dates that are tried, in this order; a fraction of the second may be missing, its sign be a comma."""
 
-_LIKE = ((r",\s+", " "), (",", "."), (r"(:[0-9]{2}:[0-9]{2}):(?=[0-9]{3}(?![0-9]))", r"\g<1>."))
-"""What a date may have otherwise: a comma before the next part or the fraction, and a colon before milliseconds."""
+_LIKE = (
+    (r"\s*(?:UTC|GMT)$", ""),
+    (r",\s+", " "),
+    (",", "."),
+    (r"(:[0-9]{2}:[0-9]{2}):(?=[0-9]{3}(?![0-9]))", r"\g<1>."),
+)
+"""What a date may have otherwise: UTC, a comma before the next part or the fraction, a colon before milliseconds."""
 
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """Times from this number on are counted in such units since 1970."""
@@ -157,7 +163,7 @@ def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
     if form in FORMATS:
         for written, meant in _LIKE:
             text = text.str.replace(written, meant, regex=True)
-    if form in FORMATS[1:]:
+    if form in FORMATS[1:] and form != OF_HOUR:
         text = text.str.replace(r"^(.*:[0-9]+)(?=$| *[AaPp][Mm]$)", r"\g<1>.0", regex=True)
     if is_clock(form):
         form, text = f"%Y-%m-%d {form}", "1970-01-01 " + text

@@ -8,15 +8,20 @@
 
 """The times of a log: of a clock that goes on after midnight, written in digits alone, or in a zone."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pandas as pd
 
-from ..cell.numbers import has_dates, is_clock
-from ..format import Format
+from ....core.physics.train import Array
+from ..cell.numbers import END_OF_STAMPS_NS, has_dates, is_clock
+from ..format import TIME_UNITS, Format
 
 DAY_NS, S = 86_400 * 10**9, 10**9
+
+REGULAR = 5.0
+"""Usual steps up to which a row is missing at most where a counter begins anew."""
 
 
 def in_digits(rows: pd.DataFrame, form: Format, asked: Format) -> tuple[pd.DataFrame, Format, list[str]]:
@@ -38,12 +43,27 @@ def in_digits(rows: pd.DataFrame, form: Format, asked: Format) -> tuple[pd.DataF
     return rows.assign(t_ns=of_day_ns), replace(form, time_format="%H%M%S.%f", time_unit=None), [note]
 
 
-def over_midnight(rows: pd.DataFrame, form: Format) -> pd.DataFrame:
-    """The times of a clock go on after midnight."""
-    if is_clock(form.time_format) and not form.sort:
-        days = np.cumsum(np.diff(rows["t_ns"], prepend=rows["t_ns"].iloc[:1]) < -DAY_NS / 2)
-        rows["t_ns"] += days * DAY_NS
-    return rows
+def going_on(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
+    """The times of a clock go on after midnight, or the hour, and those of a counter where it begins anew."""
+    t_ns = rows["t_ns"].to_numpy()
+    steps = np.diff(t_ns)
+    if form.sort or has_dates(form) or not (steps < 0).any():
+        return rows, []
+    if is_clock(form.time_format):
+        period_ns = DAY_NS if re.search("%[HIXT]", form.time_format or "") else 3600 * S
+        begins, notes = steps < -period_ns / 2, []
+    else:
+        begins, period_ns = steps < 0, _period_ns(steps, TIME_UNITS[form.time_unit or "s"])
+        notes = [f"time: a counter up to {period_ns / S:.10g} s began anew: it goes on"] * (period_ns > 0)
+    return rows.assign(t_ns=t_ns + period_ns * np.append(0, np.cumsum(begins))), notes
+
+
+def _period_ns(steps: Array, unit_ns: int) -> int:
+    """After what a counter began anew, so that no step is longer than `REGULAR` usual ones; 0 for nothing known."""
+    longest = REGULAR * float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
+    periods = (DAY_NS, 7 * DAY_NS, *(2**bits * unit_ns for bits in (16, 31, 32)))
+    behind = {period: steps[steps < 0] + period for period in periods if period < END_OF_STAMPS_NS}
+    return next((period for period, each in behind.items() if ((each > 0) & (each <= longest)).all()), 0)
 
 
 def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:

@@ -20,7 +20,7 @@ from ..format import Format
 from ..opened import open_log
 from ..rows import measured
 from ..text import Refusal
-from .clock import in_digits, in_zone, over_midnight
+from .clock import going_on, in_digits, in_zone
 from .held import without_held
 from .pipe import demanded
 from .rising import rising
@@ -56,7 +56,8 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
         for each in refused:
             tell(each)
     rows, timed, digits = in_digits(pd.concat(parts), source.form, form)
-    rows, notes = in_zone(over_midnight(rows, timed), timed)
+    rows, counted = going_on(rows, timed)
+    rows, notes = in_zone(rows, timed)
     rows, shared = together(rows.sort_values("t_ns", kind="stable") if timed.sort else rows)
     rows, refused = rising(rows, str(path), has_dates(timed))
     for each in refused:
@@ -64,7 +65,7 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     doubts = (*source.columns.doubts, *(source.trains if refused else []))
     rows, held = without_held(rows)
     rows, wrapped = unwrapped(rows, form)
-    notes += source.notes + digits + shared + held + wrapped
+    notes += source.notes + digits + counted + shared + held + wrapped
     notes += [f"{name}: {said}" for name, said in read_as.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
