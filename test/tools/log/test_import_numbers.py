@@ -40,7 +40,7 @@ def test_thousands_are_read_where_the_decimal_sign_is_sure_and_that_is_said(
     assert f"brake_pressure: '300{separator}000' is read as 300000" in read_as(importing, capsys)
 
 
-@pytest.mark.parametrize("separator", ["'", "\u2019", "\u00a0", "\u2009", "\u202f"])
+@pytest.mark.parametrize("separator", ["'", " ", "\u2019", "\u00a0", "\u2009", "\u202f"])
 @pytest.mark.parametrize("decimal", [".", ","])
 def test_thousands_apart_by_no_decimal_sign_are_read(importing: Import, separator: str, decimal: str) -> None:
     """As Switzerland and France write them."""

@@ -11,6 +11,9 @@
 import re
 from collections.abc import Iterable
 
+NO_DECIMAL = re.compile("(?<=[0-9])['\u2019 \u00a0\u2009\u202f](?=[0-9]{3}(?![0-9]))")
+"""What stands between groups of thousands and is no decimal sign: apostrophes and spaces."""
+
 _GROUP = "[+-]?[1-9][0-9]{0,2}"
 _SURE = {
     sign: re.compile(
@@ -29,8 +32,10 @@ def decimal_sign(cells: Iterable[str]) -> tuple[str, bool]:
 
     >>> decimal_sign(["20,5", "1.250,5"]), decimal_sign(["1.000", "0.1"]), decimal_sign(["20,000"]), decimal_sign(["7"])
     ((',', True), ('.', True), (',', False), ('.', False))
+    >>> decimal_sign(["1 250,5"])
+    (',', True)
     """
-    texts = list(cells)
+    texts = [NO_DECIMAL.sub("", cell) for cell in cells]
     for looks in (_SURE, _UNSURE):
         commas, points = (sum(map(bool, map(number.fullmatch, texts))) for number in looks.values())
         if commas or points:

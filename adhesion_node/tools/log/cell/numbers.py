@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from ....core.physics.train import Array
 from ..format import EXCEL_1970, TIME_UNITS, Format
+from .decimals import NO_DECIMAL
 
 Flags = NDArray[np.bool_]
 Rows = NDArray[np.intp]
@@ -61,9 +62,6 @@ _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 
 _EPOCH, _END = (pd.Timestamp(seconds, unit="s", tz="UTC") for seconds in (0, 2**31))
 
-_NO_DECIMAL = re.compile("(?<=[0-9])['\u2019\u00a0\u2009\u202f](?=[0-9]{3}(?![0-9]))")
-"""What stands between groups of thousands and is no decimal sign: apostrophes and narrow spaces."""
-
 _NUMBER = r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?"
 
 
@@ -83,7 +81,7 @@ def numbers(cells: "pd.Series[Any]", decimal: str, thousands: bool = False) -> A
         read = cells.to_numpy(dtype=np.float64, na_value=np.nan)
     else:
         text, separator = cells.astype(str).str.replace("\u2212", "-", regex=False), "." if decimal == "," else ","
-        text = text.str.replace(_NO_DECIMAL, "", regex=True)
+        text = text.str.replace(NO_DECIMAL, "", regex=True)
         in_groups = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{separator}][0-9]{{3}})+[{decimal}][0-9]+")
         in_groups |= grouped(text, decimal) & thousands
         text = text.mask(in_groups, text.str.replace(separator, "", regex=False))

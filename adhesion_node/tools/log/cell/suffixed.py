@@ -17,7 +17,7 @@ import pandas as pd
 from ..format import FAMILIES
 from .units import known
 
-_NUMBER_AND_UNIT = re.compile(r"([+-]?[0-9.,'\u2019\u00a0\u2009\u202f]*[0-9](?:[eE][+-]?[0-9]+)?)\s*([^\s0-9.,:+-].*)")
+_NUMBER_AND_UNIT = re.compile(r"([+-]?[0-9.,' \u2019\u00a0\u2009\u202f]*[0-9](?:[eE][+-]?[0-9]+)?)\s*([^\s0-9.,:+-].*)")
 
 
 def unit_in(cells: "pd.Series[Any]", column: str) -> str | None:
