@@ -16,6 +16,7 @@ from typing import Any
 from ...core.physics.train import CRH3
 from ...wire.files.train import read_train
 from ...wire.settings.shared import AMBIENT
+from .cell.units import known
 from .format import (
     ACCELERATION_UNITS,
     OPTIONAL,
@@ -64,12 +65,22 @@ def format_of(options: argparse.Namespace) -> Format:
     return Format(**{field.name: given[field.name] for field in fields(Format) if field.name in given})
 
 
+def _spelt(family: str) -> Callable[[str], str]:
+    """What an option takes for a unit: as it is called here, or as headers have it, km/h."""
+    return lambda text: known(text, family) or text
+
+
 def _text_options(add: Callable[..., Any]) -> None:
     add("--encoding", metavar="NAME", help=f"such as cp1252, {_GUESSED}")
     add("--delimiter", metavar="CHAR", help=f"between two cells, \\t for a tab, {_GUESSED}")
     add("--decimal", choices=[".", ","], help=f"decimal sign, {_GUESSED}")
     add("--skip-rows", type=int, metavar="N", help=f"lines above the header, {_GUESSED}")
-    add("--time-unit", choices=[*TIME_UNITS, "iso"], help=f"of times that are numbers, {_GUESSED}; iso: dates")
+    add(
+        "--time-unit",
+        type=_spelt("time"),
+        choices=[*TIME_UNITS, "iso"],
+        help=f"of times that are numbers, {_GUESSED}; iso: dates",
+    )
     strptime = "such as '%%d.%%m.%%Y %%H:%%M:%%S.%%f'"
     add("--time-format", metavar="FORMAT", help=f"of dates, {strptime}, {_GUESSED}")
     add(
@@ -84,10 +95,10 @@ def _text_options(add: Callable[..., Any]) -> None:
 def _unit_options(add: Callable[..., Any]) -> None:
     turned = "down: the chainage falls as the train runs, and is turned"
     add("--direction", choices=["up", "down"], default="up", help=turned)
-    add("--position-unit", choices=list(POSITION_UNITS), help=f"{_TOLD} m; variance is in m^2")
+    add("--position-unit", type=_spelt("position"), choices=list(POSITION_UNITS), help=f"{_TOLD} m; variance is in m^2")
     std = "of all positions, without a variance (default: 0.5, of latitude and longitude unknown; by coarse steps)"
     add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
-    add("--pressure-unit", choices=list(PRESSURE_UNITS), help=f"{_TOLD} pa")
+    add("--pressure-unit", type=_spelt("pressure"), choices=list(PRESSURE_UNITS), help=f"{_TOLD} pa")
     add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="of all pressures")
     air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
     add("--ambient-pressure", dest=AMBIENT.name, type=float, default=AMBIENT.default, metavar="PA", help=air)
@@ -95,9 +106,9 @@ def _unit_options(add: Callable[..., Any]) -> None:
     add("--pipe-released", type=float, metavar="P", help=released)
     full = f"of the cylinders that a full brake by the pipe demands, gauge (default: {CRH3.full_pressure_pa:g})"
     add("--full-pressure", dest="full_pressure_pa", type=float, metavar="PA", help=full)
-    add("--speed-unit", choices=list(SPEED_UNITS), help=f"{_TOLD} mps")
-    add("--acceleration-unit", choices=list(ACCELERATION_UNITS), help=f"{_TOLD} mps2")
-    add("--wheel-unit", choices=WHEEL_UNITS, help=f"{_TOLD} radps; mps and kmh: of the rim")
+    add("--speed-unit", type=_spelt("speed"), choices=list(SPEED_UNITS), help=f"{_TOLD} mps")
+    add("--acceleration-unit", type=_spelt("acceleration"), choices=list(ACCELERATION_UNITS), help=f"{_TOLD} mps2")
+    add("--wheel-unit", type=_spelt("wheel"), choices=WHEEL_UNITS, help=f"{_TOLD} radps; mps and kmh: of the rim")
     radius = f"of the wheels, for those (default: {CRH3.wheel_radius_m:g})"
     add("--wheel-radius", dest="wheel_radius_m", type=float, metavar="M", help=radius)
     add(

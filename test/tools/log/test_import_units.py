@@ -32,6 +32,8 @@ TOLD: list[tuple[str, str]] = [
     ("suffixes", "time_ms,position_ft,speed_kmh,brake_pressure_Bar\n"),
     ("strokes", "time/ms,position / ft,speed/(km/h),brake_pressure/bar\n"),
     ("words", "time in ms,position in ft,speed in km/h,brake_pressure in bar\n"),
+    ("commas", '"time, ms","position, ft","speed, km/h","brake_pressure, bar"\n'),
+    ("Cyrillic letters", "time (мс),position (ft),speed (км/ч),brake_pressure (бар)\n"),
     ("blanks", "time ms,position ft,Speed KMH,brake_pressure bar\n"),
     ("full stops", "time.ms,position.ft,speed.km/h,brake_pressure.bar\n"),
     ("wide brackets", "time（ms）,position【ft】,speed（km/h）,brake_pressure［bar］\n"),
@@ -57,6 +59,13 @@ def test_units_that_the_log_names_count_and_are_said(
     import_csv.main([str(importing.log), "--dry-run"])
     said = "units that the log names: time in ms, position in ft, brake_pressure in bar, speed in kmh; otherwise: "
     assert said + "--time-unit, --position-unit, --pressure-unit, --speed-unit" in capsys.readouterr().out
+
+
+def test_an_option_takes_a_unit_as_headers_have_it(importing: Import) -> None:
+    assert (
+        importing("time,speed,brake_pressure\n1,36,0\n2,36,0\n", "--speed-unit", "km/h", "--pressure-unit", "Bar") == 0
+    )
+    assert SPEED.read(importing.messages("speed")[0]).speed_mps == pytest.approx(10.0)
 
 
 def test_a_column_is_named_with_its_unit_or_without(importing: Import) -> None:

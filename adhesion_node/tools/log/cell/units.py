@@ -15,28 +15,29 @@ from collections.abc import Sequence
 from ..format import FAMILIES, UNITS
 
 _SPELT = {
-    "s": ("sec", "second", "seconds", "sekunden"),
-    "ms": ("msec", "millisecond", "milliseconds"),
+    "s": ("sec", "second", "seconds", "sekunden", "с"),
+    "ms": ("msec", "millisecond", "milliseconds", "мс"),
     "us": ("μs", "microseconds"),
     "ns": ("nanoseconds",),
-    "min": ("minute", "minutes", "minuten"),
-    "h": ("hour", "hours", "std"),
-    "m": ("metre", "metres", "meter", "meters"),
-    "km": ("kilometre", "kilometres", "kilometer", "kilometers"),
+    "min": ("minute", "minutes", "minuten", "мин"),
+    "h": ("hour", "hours", "std", "ч"),
+    "m": ("metre", "metres", "meter", "meters", "м"),
+    "km": ("kilometre", "kilometres", "kilometer", "kilometers", "км"),
     "ft": ("feet", "foot"),
-    "mps": ("m/s", "ms", "ms-1", "m/sec"),
-    "kmh": ("km/h", "kph", "kmph", "km/hr", "kmh-1"),
+    "mps": ("m/s", "ms", "ms-1", "m/sec", "м/с"),
+    "kmh": ("km/h", "kph", "kmph", "km/hr", "kmh-1", "км/ч"),
     "mph": ("mi/h", "miles/h"),
     "kn": ("kt", "kts", "knot", "knots", "knoten"),
-    "pa": ("pascal", "n/m2"),
-    "kpa": ("kn/m2",),
+    "pa": ("pascal", "n/m2", "па"),
+    "kpa": ("kn/m2", "кпа"),
+    "bar": ("бар",),
     "mbar": ("hpa",),
-    "mpa": ("n/mm2",),
+    "mpa": ("n/mm2", "мпа"),
     "psi": ("lbf/in2",),
-    "kgcm2": ("kgf/cm2", "kg/cm2", "kp/cm2", "at"),
-    "mps2": ("m/s2", "ms-2", "m/s/s"),
-    "radps": ("rad/s", "rads-1", "rad/sec"),
-    "rpm": ("1/min", "min-1", "r/min", "u/min", "rev/min"),
+    "kgcm2": ("kgf/cm2", "kg/cm2", "kp/cm2", "at", "кгс/см2"),
+    "mps2": ("m/s2", "ms-2", "m/s/s", "м/с2"),
+    "radps": ("rad/s", "rads-1", "rad/sec", "рад/с"),
+    "rpm": ("1/min", "min-1", "r/min", "u/min", "rev/min", "об/мин"),
     "deg": ("°", "degree", "degrees"),
 }
 """How units are written; in `min^-1` and `m s⁻²` what raises and what divides is left out."""
@@ -48,9 +49,19 @@ _WITH_KIND = {kind: re.compile(rf"(.+?)[(_]*(?:{ends})\.?") for kind, ends in _K
 _BRACKETS = re.compile(r"(.*?)(?:\s*/|\s+in)?[\s_]*[\[(<{（【［]\s*(.*?)\s*[\])>}）】］]+")
 
 _MARKS = tuple(
-    map(re.compile, (r"(.+)_(.+)$", r"(.+?)\s*/\s*(.+)$", r"(.+)\s+in\s+(.+)$", r"(.+)[\s.](.+)$", r"(.+?)\s(.+)$"))
+    map(
+        re.compile,
+        (
+            r"(.+)_(.+)$",
+            r"(.+?)\s*/\s*(.+)$",
+            r"(.+?)\s*[,，]\s*(.+)$",
+            r"(.+)\s+in\s+(.+)$",
+            r"(.+)[\s.](.+)$",
+            r"(.+?)\s(.+)$",
+        ),
+    )
 )
-"""What stands between a name and its unit without brackets: `p_bar`, `v/km/h` (DIN 1313), `v in km/h`, `v km/h`."""
+"""What stands between a name and its unit where no brackets are: `p_bar`, `v/km/h` (DIN), `v, km/h`, `v in km/h`."""
 
 
 def known(text: str, column: str) -> str | None:
