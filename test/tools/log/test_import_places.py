@@ -19,13 +19,15 @@ __all__ = ["importing"]
 
 
 @pytest.mark.parametrize("header", ["position", "position [km]"])
-@pytest.mark.parametrize("form", ["{km}+{m:07.3f}", "km {km}+{m:07.3f}", "DK{km} + {m:07.3f}", "{hm:.1f}+{rest:06.3f}"])
+@pytest.mark.parametrize(
+    "form", ["{km}+{m:07.3f}", "km {all:.6f}", "km {km}+{m:07.3f}", "DK{km} + {m:07.3f}", "{hm:.1f}+{rest:06.3f}"]
+)
 def test_chainage_as_kilometres_and_metres(
     importing: Import, capsys: pytest.CaptureFixture[str], form: str, header: str
 ) -> None:
     rows = ride()
     at_m = rows.position + 12_000.0
-    cells = [form.format(km=int(x // 1e3), m=x % 1e3, hm=(x // 100) / 10, rest=x % 100) for x in at_m]
+    cells = [form.format(km=int(x // 1e3), m=x % 1e3, hm=(x // 100) / 10, all=x / 1e3, rest=x % 100) for x in at_m]
     assert importing(text(rows.assign(position=cells).rename(columns={"position": header}))) == 0, importing.errors
     assert [sample.position_m for sample in importing.positions()] == pytest.approx(at_m.tolist(), abs=1e-6)
     assert any(f"position: {cells[0]!r} is read as 13" in line for line in read_as(importing, capsys))

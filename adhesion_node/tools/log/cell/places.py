@@ -15,11 +15,14 @@ import pandas as pd
 
 _NUMBER = "[0-9]+(?:[.,][0-9]+)?"
 
-_CHAINAGE = tuple(
-    re.compile(rf"(?:[A-Z]{{0,2}}K|km)?\s*(?P<sign>-?)(?P<km>{km})\s*\+\s*(?P<m>{m}(?:[.,][0-9]+)?)", re.IGNORECASE)
-    for km, m in (("[0-9]+", "[0-9]{3}"), ("[0-9]+[.,][0-9]", "[0-9]{1,3}"))
+_CHAINAGE = (
+    re.compile(rf"km\s*(?P<sign>-?)(?P<km>{_NUMBER})", re.IGNORECASE),
+    *(
+        re.compile(rf"(?:[A-Z]{{0,2}}K|km)?\s*(?P<sign>-?)(?P<km>{km})\s*\+\s*(?P<m>{m}(?:[.,][0-9]+)?)", re.IGNORECASE)
+        for km, m in (("[0-9]+", "[0-9]{3}"), ("[0-9]+[.,][0-9]", "[0-9]{1,3}"))
+    ),
 )
-"""12+345.6 and DK12+345.6; from a hectometre on 12,3+45.6. Two digits behind a whole number may be of a station."""
+"""km 12.345; 12+345.6, DK12+345.6; from a hectometre on 12,3+45.6. Two digits behind a whole number: of a station?"""
 
 
 def _angles(letters: str, digits: int) -> tuple[re.Pattern[str], ...]:
@@ -63,7 +66,7 @@ def number_of(cell: str, column: str, unit: str) -> float | None:
         return None
     sign = -1.0 if letters in ("S", "W") or parts.get("sign") == "-" else 1.0
     if column == "position":
-        return sign * round(1e3 * read["km"] + read["m"], 9) / (1e3 if unit == "km" else 1.0)
+        return sign * round(1e3 * read["km"] + read.get("m", 0.0), 9) / (1e3 if unit == "km" else 1.0)
     return sign * round(read["d"] + read.get("m", 0.0) / 60.0 + read.get("s", 0.0) / 3600.0, 12)
 
 
