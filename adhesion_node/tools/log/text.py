@@ -45,6 +45,9 @@ NO_HEADER = "has no header line: begin with the names of the columns, their quot
 BROKEN = "quotes are not closed in this line: close them, or take the line break out of a name of the header"
 
 
+_COMMENT = re.compile(r"\s*#(?![0-9])")
+
+
 class Refusal(NamedTuple):
     """A row that cannot be used: its line, why, for counting, and the whole message."""
 
@@ -86,7 +89,7 @@ def understood(path: Path, form: Format) -> Format:
 def names_of(path: Path, form: Format) -> list[str]:
     """Return the names in the header of a log whose format is understood."""
     names = _cells(next(islice(file_lines(path, form.encoding), form.skip_rows or 0, None), ""), form.delimiter or ",")
-    if not any(re.search(r"[^\W\d]", name) for name in names):
+    if not any(re.search(r"[^\W\d]", re.sub("[0-9][eE][+-]?[0-9]", "", name)) for name in names):
         broken = next(
             (n for n, text in enumerate(islice(file_lines(path, form.encoding), SAMPLE), 1) if text.count('"') % 2),
             None,
@@ -106,6 +109,8 @@ def blocks(path: Path, form: Format, names: Sequence[str]) -> Iterator[Block]:
 def _block(path: Path, form: Format, names: Sequence[str], lines: Iterable[tuple[int, str]]) -> Block:
     delimiter, at, rows, refused = form.delimiter or ",", [], [], []
     for line, text in lines:
+        if _COMMENT.match(text):
+            continue
         try:
             cells = split(text, delimiter)
         except csv.Error as error:
@@ -139,7 +144,8 @@ def split(text: str, delimiter: str) -> list[str]:
 
 
 def _cells(text: str, delimiter: str) -> list[str]:
-    """The cells of a line; none of one that is blank or broken."""
+    """The cells of a line; none of one that is blank or broken. Python writes a header behind the mark of a comment."""
+    text = re.sub(r"^\s*[#%]\s*", "", text)
     try:
         return split(text, delimiter) if text.strip() else []
     except csv.Error:

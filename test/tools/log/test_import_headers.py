@@ -79,3 +79,22 @@ def test_units_are_found_beside_comments_and_types(
     assert importing("\n".join([header, *below, *written])) == 0, importing.errors
     assert SPEED.read(importing.messages("speed")[0]).speed_mps == pytest.approx(50.0)
     assert any(left_out in line for line in read_as(importing, capsys))
+
+
+def test_a_header_and_lines_behind_the_mark_of_a_comment(importing: Import) -> None:
+    """As numpy.savetxt writes a header; what else is a comment is none of the rows."""
+    header, *rows = text(ride()).splitlines()
+    lines = ["# recorder X", f"# {header}", *rows[:300], "# door, opened", *rows[300:], "# end"]
+    assert importing("\n".join(lines)) == 0, importing.errors
+    assert importing.summary["rows"] == 600
+
+
+def test_rows_that_are_numbered_with_a_mark_are_none(importing: Import) -> None:
+    header, *rows = text(ride()).splitlines()
+    assert importing("\n".join([f"#,{header}", *(f"#{i},{row}" for i, row in enumerate(rows))])) == 0, importing.errors
+    assert importing.summary["written"] == 600
+
+
+def test_numbers_alone_are_no_header(importing: Import) -> None:
+    assert importing("0.0e+00,1.0e+03\n1.0E-01,1.1e+03\n") == 2
+    assert "has no header line" in importing.errors[0]
