@@ -55,6 +55,11 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
         if header.count(name) > 1:
             raise ValueError(f"{source}: column {name!r} is there {header.count(name)} times: rename one")
     if len({"lat", "lon"} & set(used)) == 1:
+        ((ours, other),) = ((ours, other) for ours, other in (("lat", "lon"), ("lon", "lat")) if ours in used)
+        if ours in form.named:
+            raise ValueError(
+                f"{source}: {ours} = {used[ours]!r}: a place needs both, name the other with --{other} COL"
+            )
         used = {ours: name for ours, name in used.items() if ours not in ("lat", "lon")}
     if not (axles or any(set(group) <= set(used) for group in PLACES)):
         lacks = "has neither position, lat and lon, speed nor wheels"

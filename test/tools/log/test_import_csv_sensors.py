@@ -128,6 +128,7 @@ def test_bad_cells_are_named(importing: Import, row: str, message: str) -> None:
             "FILE: columns ['time', 'acceleration']: has neither position, lat and lon, speed nor wheels",
         ),
         ("time,lat", [], "FILE: columns ['time', 'lat']: has neither"),
+        ("time,lat,speed", ["--lat", "lat"], "FILE: lat = 'lat': a place needs both, name the other with --lon COL"),
         ("time,speed", ["--wheel-speeds", "a"], "FILE: column 'a' is missing: it has .*--wheel-speeds COL"),
         ("time,speed,a,a", ["--wheel-speeds", "a"], "FILE: column 'a' is there 2 times"),
         ("time,speed", ["--wheel-radius", "0"], "wheel-radius = 0.0: give a radius of 0.01 to 5 m"),
