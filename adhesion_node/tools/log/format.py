@@ -10,11 +10,9 @@
 
 import argparse
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime
-from typing import Any
-from zoneinfo import ZoneInfo, ZoneInfoNotFoundError
+from zoneinfo import ZoneInfo
 
 from ...core.intake.samples import (
     MAX_ACCELERATION_MPS2,
@@ -26,6 +24,7 @@ from ...core.intake.samples import (
 from ...core.physics.train import CRH3, KMH
 from ...wire.line import ATMOSPHERE_PA, MAX_ABSOLUTE_PA, MIN_ABSOLUTE_PA, Line
 from ...wire.messages.refused import MAX_WHEEL_RADPS
+from .named import NO_TEXT, NO_ZONE, decodes, require, require_format
 
 TIME_UNITS = {"s": 10**9, "ms": 10**6, "us": 10**3, "ns": 1, "min": 60 * 10**9, "h": 3600 * 10**9}
 TIME_UNITS |= {"excel": 86_400 * 10**9}
@@ -36,6 +35,9 @@ EXCEL_1970 = 25_569
 
 POSITION_UNITS = {"m": 1.0, "km": 1e3, "ft": 0.3048}
 PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757, "kgcm2": 98066.5}
+SHARES = {"percent": 0.01, "full": 1.0}
+"""Units of pressures that are parts of a full brake's; `full` is that of a flag, too, true or false."""
+
 SPEED_UNITS = {"mps": 1.0, "kmh": KMH, "mph": 0.44704, "kn": 1852.0 / 3600.0}
 ACCELERATION_UNITS = {"mps2": 1.0, "g": 9.80665, "mg": 9.80665e-3}
 WHEEL_UNITS = ("radps", "rpm", "mps", "kmh")
@@ -61,7 +63,7 @@ FAMILIES = {
 
 UNITS: Mapping[str, Sequence[str]] = {
     **{"time": tuple(TIME_UNITS), "position": tuple(POSITION_UNITS), "speed": tuple(SPEED_UNITS)},
-    **{"pressure": tuple(PRESSURE_UNITS), "acceleration": tuple(ACCELERATION_UNITS), "wheel": WHEEL_UNITS},
+    **{"pressure": (*PRESSURE_UNITS, *SHARES), "acceleration": tuple(ACCELERATION_UNITS), "wheel": WHEEL_UNITS},
     **{"lat": ("deg",), "lon": ("deg",), "height": ("m",), "variance": ("m2",), "date": ()},
 }
 """By family, the first one where nothing is said; the last ones by column, of which there is no other."""
@@ -159,10 +161,10 @@ class Format:
         if self.skip_rows is not None and self.skip_rows < 0:
             raise ValueError(f"skip-rows = {self.skip_rows}: give the number of lines above the header")
         if self.encoding is not None:
-            _require(_decodes, _NO_TEXT, "encoding", self.encoding, "such as utf-8, cp1252 or utf-16")
+            require(decodes, NO_TEXT, "encoding", self.encoding, "such as utf-8, cp1252 or utf-16")
         if self.time_format is not None:
-            _require_format(self.time_format)
-        _require(ZoneInfo, _NO_ZONE, "time-zone", self.time_zone, "such as UTC or Europe/Berlin")
+            require_format(self.time_format)
+        require(ZoneInfo, NO_ZONE, "time-zone", self.time_zone, "such as UTC or Europe/Berlin")
         std = self.position_std_m
         least, most = MIN_VARIANCE_M2**0.5, MAX_VARIANCE_M2**0.5
         if std is not None and not least <= std <= most:
@@ -186,14 +188,23 @@ class Format:
 
     def offset(self, column: str) -> float:
         """What is added to the numbers of a column in SI: the pressure of the air to those above it."""
-        is_gauge = column in PRESSURES and self.pressure_is_gauge and column not in self.absolute
-        return self.ambient_pressure_pa if is_gauge else 0.0
+        is_gauge = self.pressure_is_gauge and column not in self.absolute
+        return self.ambient_pressure_pa if column in PRESSURES and (is_gauge or self.is_share(column)) else 0.0
+
+    def is_share(self, column: str) -> bool:
+        """Whether a pressure is told as a part of a full brake's."""
+        return column in PRESSURES and self.unit(column) in SHARES
+
+    def pascals(self, column: str) -> float:
+        """What one unit of a pressure is in Pa."""
+        unit = self.unit(column)
+        return SHARES[unit] * self.full_pressure_pa if unit in SHARES else PRESSURE_UNITS[unit]
 
     def factors(self) -> Mapping[str, float]:
         """What one unit of a column is in SI, where it is not 1."""
         return {
             "position": POSITION_UNITS[self.unit("position")],
-            **{name: PRESSURE_UNITS[self.unit(name)] for name in PRESSURES},
+            **{name: self.pascals(name) for name in PRESSURES},
             **{name: SPEED_UNITS[self.unit(name)] for name in ("speed", "speed_std")},
             "acceleration": ACCELERATION_UNITS[self.unit("acceleration")],
             "wheel_speed": wheel_units(self.wheel_radius_m)[self.unit("wheel_speed")],
@@ -203,29 +214,3 @@ class Format:
 def wheel_units(radius_m: float) -> Mapping[str, float]:
     """What one of each of `WHEEL_UNITS` is in rad/s."""
     return dict(zip(WHEEL_UNITS, (1.0, math.pi / 30.0, 1.0 / radius_m, KMH / radius_m), strict=True))
-
-
-def _decodes(encoding: str) -> None:
-    b"a".decode(encoding, "replace")
-
-
-def _require_format(time_format: str) -> None:
-    try:
-        datetime.strptime("", time_format)
-    except ValueError as error:
-        if "does not match" not in str(error):
-            raise ValueError(f"time-format = {time_format!r}: {error}; give one such as %d.%m.%Y %H:%M:%S.%f") from None
-
-
-_NO_TEXT = (LookupError, UnicodeError)
-"""What is raised for an encoding that is none, or none of text."""
-
-_NO_ZONE = (ZoneInfoNotFoundError, ValueError, OSError)
-"""What `ZoneInfo` raises for a name that is none, or a folder."""
-
-
-def _require(find: Callable[[str], Any], errors: Any, name: str, value: str, such_as: str) -> None:
-    try:
-        find(value)
-    except errors:
-        raise ValueError(f"{name} = {value!r}: there is none of this name; give one {such_as}") from None

@@ -22,6 +22,7 @@ from .format import (
     OPTIONAL,
     POSITION_UNITS,
     PRESSURE_UNITS,
+    SHARES,
     SPEED_UNITS,
     TIME_UNITS,
     WHEEL_UNITS,
@@ -98,13 +99,13 @@ def _unit_options(add: Callable[..., Any]) -> None:
     add("--position-unit", type=_spelt("position"), choices=list(POSITION_UNITS), help=f"{_TOLD} m; variance is in m^2")
     std = "of all positions, without a variance (default: 0.5, of latitude and longitude unknown; by coarse steps)"
     add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
-    add("--pressure-unit", type=_spelt("pressure"), choices=list(PRESSURE_UNITS), help=f"{_TOLD} pa")
+    add("--pressure-unit", type=_spelt("pressure"), choices=[*PRESSURE_UNITS, *SHARES], help=f"{_TOLD} pa")
     add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="of all pressures")
     air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
     add("--ambient-pressure", dest=AMBIENT.name, type=float, default=AMBIENT.default, metavar="PA", help=air)
     released = "of the brake pipe while released, in the unit of pressures (default: its 9th decile as the train runs)"
     add("--pipe-released", type=float, metavar="P", help=released)
-    full = f"of the cylinders that a full brake by the pipe demands, gauge (default: {CRH3.full_pressure_pa:g})"
+    full = f"of the cylinders that a full brake demands, by the pipe or as a share (default: {CRH3.full_pressure_pa:g})"
     add("--full-pressure", dest="full_pressure_pa", type=float, metavar="PA", help=full)
     add("--speed-unit", type=_spelt("speed"), choices=list(SPEED_UNITS), help=f"{_TOLD} mps")
     add("--acceleration-unit", type=_spelt("acceleration"), choices=list(ACCELERATION_UNITS), help=f"{_TOLD} mps2")

@@ -17,9 +17,9 @@ import numpy as np
 import pandas as pd
 
 from .cell.marks import marks
-from .cell.numbers import NO_TIME, Flags, grouped, numbers, times_ns
+from .cell.numbers import NO_TIME, Flags, grouped, in_flags, numbers, times_ns
 from .cell.places import PARTS, in_numbers, with_letters
-from .format import LIMITS, Format
+from .format import LIMITS, PRESSURES, Format
 from .opened import Source
 from .text import Refusal
 
@@ -31,6 +31,8 @@ NO_NUMBER = (
 )
 
 NO_VALUE = "it stands for no value: leave such cells empty, the rest of the row is read then"
+
+FLAG = "; or true and false, of a full brake, with --pressure-unit full"
 
 IN_GROUPS = "is it in groups of thousands? Export it without them; or is the --decimal another?"
 
@@ -94,7 +96,8 @@ def _rows(cells: pd.DataFrame, log: Source, source: str) -> tuple[pd.DataFrame, 
     _refuse_times(refuse, t_ns == NO_TIME, theirs["time"], form)
     rows: dict[str, Any] = {"t_ns": t_ns}
     for name, kind in kinds.items():
-        read = numbers(theirs[name], decimal, form.thousands)
+        cells_read = in_flags(theirs[name]) if form.is_share(kind) else theirs[name]
+        read = numbers(cells_read, decimal, form.thousands)
         bad = filled[name] & np.isnan(read)
         if bad.any():
             refuse(bad & grouped(theirs[name], decimal), "not_a_number", name, lambda _: IN_GROUPS)
@@ -138,7 +141,7 @@ def _out_of_range(read: Any, least: float, most: float, remedy: str) -> Callable
 
 
 def _no_number(name: str, _: int) -> str:
-    return NO_NUMBER + PARTS.get(name, "")
+    return NO_NUMBER + PARTS.get(name, "") + (FLAG if name in PRESSURES else "")
 
 
 def _filled(cells: "pd.Series[Any]") -> Flags:

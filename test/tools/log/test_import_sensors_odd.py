@@ -30,11 +30,11 @@ __all__ = ["importing"]
         (1e-2, "is it in mbar? --pressure-unit mbar: 3 bar"),
         (
             1.0 / 6894.757,
-            "is it in psi? --pressure-unit psi: 3 bar; per cent of a full brake are not read: give its pressure",
+            "is it in psi? --pressure-unit psi: 3 bar; or of a full brake? --pressure-unit percent",
         ),
         (
             100.3 / 3e5,
-            "is it in kpa or psi? --pressure-unit kpa: 1 bar; --pressure-unit psi: 6.9 bar; per cent of a full",
+            "is it in kpa or psi? --pressure-unit kpa: 1 bar; --pressure-unit psi: 6.9 bar; or of a full brake?",
         ),
     ],
 )
@@ -105,7 +105,9 @@ def test_a_demand_that_is_a_share_is_said(importing: Import) -> None:
     pressed = rows.brake_pressure / 1e5
     log = text(rows.assign(brake_pressure=pressed, brake_demand=(pressed > 0.1) * 1.0))
     assert importing(log, "--pressure-unit", "bar") == 1
-    assert any("a share of a full brake is not read" in odd for odd in importing.summary["odd"])
+    assert any(
+        "is it a share of a full brake? Name its column brake_demand [full]" in odd for odd in importing.summary["odd"]
+    )
 
 
 @pytest.mark.parametrize("name", ["brake_pressure", "brake_demand", "brake_pipe"])

@@ -94,7 +94,7 @@ def test_an_option_counts_more_than_the_log_and_that_is_said(importing: Import) 
             ["--speed-unit", "mps"],
             "speed is said to be in 'furlongs', an unknown unit, and read in mps: ",
         ),
-        ("brake_pressure (%)", "5", ["--pressure-unit", "bar"], "say which with --pressure-unit pa, kpa, bar, mbar, "),
+        ("brake_pressure (V)", "5", ["--pressure-unit", "bar"], "say which with --pressure-unit pa, kpa, bar, mbar, "),
         ("height [ft]", "100", [], "height is said to be in 'ft', an unknown unit, and read in m: convert it"),
     ],
 )

@@ -91,6 +91,18 @@ def numbers(cells: "pd.Series[Any]", decimal: str, thousands: bool = False) -> A
     return np.where(np.isfinite(read), read, np.nan)
 
 
+def in_flags(cells: "pd.Series[Any]") -> "pd.Series[Any]":
+    """Return cells with the number of what is true or false.
+
+    >>> in_flags(pd.Series(["TRUE", "off", "", "0.5"])).tolist()
+    ['1', '0', '', '0.5']
+    """
+    if not (pd.api.types.is_bool_dtype(cells) or cells.dtype == object):
+        return cells
+    flags = {**dict.fromkeys(("true", "on", "yes"), "1"), **dict.fromkeys(("false", "off", "no"), "0")}
+    return cells.map(lambda cell: flags.get(str(cell).casefold(), cell))
+
+
 def grouped(cells: "pd.Series[Any]", decimal: str) -> Flags:
     """Return which cells look like whole numbers in groups of thousands.
 

@@ -35,6 +35,7 @@ _SPELT = {
     "mpa": ("n/mm2", "мпа"),
     "psi": ("lbf/in2",),
     "kgcm2": ("kgf/cm2", "kg/cm2", "kp/cm2", "at", "кгс/см2"),
+    "percent": ("%", "prozent", "pct", "процент"),
     "mps2": ("m/s2", "ms-2", "m/s/s", "м/с2"),
     "radps": ("rad/s", "rads-1", "rad/sec", "рад/с"),
     "rpm": ("1/min", "min-1", "r/min", "u/min", "rev/min", "об/мин"),

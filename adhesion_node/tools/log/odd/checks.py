@@ -107,18 +107,18 @@ def _pressures(log: Log) -> Iterator[str]:
         least, most = gauge.min(), gauge.max()
         yield from _other_unit(name, most, log.form)
         if name == "brake_demand" and _is_share(log, most):
-            yield "brake_demand goes up to 1: a share of a full brake is not read: give its pressure in the cylinders"
+            yield "brake_demand goes up to 1: is it a share of a full brake? Name its column brake_demand [full]"
         if 80e3 < least < 108e3:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
 
     if "brake_pipe" in log.columns.names and log.form.pipe_released is not None:
-        released_pa = log.form.pipe_released * PRESSURE_UNITS[log.form.unit("brake_pipe")]
+        released_pa = log.form.pipe_released * log.form.pascals("brake_pipe")
         yield from _other_unit("brake_pipe", released_pa, log.form)
 
 
 def _is_share(log: Log, most_pa: float) -> bool:
     """Whether a demand up to 1 in its unit, which no header names, is far below what the cylinders get."""
-    most = most_pa / PRESSURE_UNITS[log.form.unit("brake_demand")]
+    most = most_pa / log.form.pascals("brake_demand")
     told = "brake_demand" in log.form.told or "brake_pressure" not in log.rows
     return not told and abs(most - 1.0) < 1e-6 and log.rows["brake_pressure"].max() - ATMOSPHERE_PA > 2.0 * most_pa
 
@@ -127,12 +127,12 @@ def _other_unit(name: str, most_pa: float, form: Format) -> Iterator[str]:
     """A greatest pressure that no brake has: each unit in which it were one, with what it would be."""
     if SILENT < most_pa < WEAKEST_PA or most_pa > FULL_PA[1]:
         read_in = form.unit(name)
-        most = most_pa / PRESSURE_UNITS[read_in]
+        most = most_pa / form.pascals(name)
         would_be = {unit: most * pa for unit, pa in PRESSURE_UNITS.items() if FULL_PA[0] < most * pa <= FULL_PA[1]}
         cures = "; ".join(f"--pressure-unit {unit}: {pa / 1e5:.2g} bar" for unit, pa in would_be.items())
-        share = "per cent of a full brake are" if PERCENT[0] < most < PERCENT[1] else "a share of a full brake is"
-        is_share = most_pa < WEAKEST_PA and (PERCENT[0] < most < PERCENT[1] or most <= 1.0)
-        cure = f"; {share} not read: give its pressure" if is_share else ""
+        share = "percent" if PERCENT[0] < most < PERCENT[1] else "full"
+        is_share = most_pa < WEAKEST_PA and (share == "percent" or most <= 1.0)
+        cure = f"; or of a full brake? --pressure-unit {share}" if is_share else ""
         cure += "; or are they counts, of tenths? Divide them" if most_pa > FULL_PA[1] else ""
         units = " or ".join(would_be) or "another unit"
         yield f"{name} is {most:.6g} {read_in} at most: is it in {units}? {cures}{cure}"

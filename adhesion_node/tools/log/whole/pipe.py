@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import pandas as pd
 
-from ..format import PRESSURE_UNITS, Format
+from ..format import PRESSURE_UNITS, SHARES, Format
 from .moving import moves
 
 FULL_DROP_PA = 1.5e5
@@ -25,6 +25,10 @@ RELEASED_PA = 2e5, 1.2e6
 def demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, str]:
     """The rows with the demand that the pressure of the brake pipe is, and from where on it is released."""
     pipe, unit = rows["brake_pipe"] - form.ambient_pressure_pa, form.unit("brake_pipe")
+    if unit in SHARES:
+        raise ValueError(
+            f"brake_pipe is said to be in {unit}: it falls for a brake, give its pressure; or --demand COL?"
+        )
     scale = PRESSURE_UNITS[unit]
     released = pipe[moves(rows)].quantile(0.9) if form.pipe_released is None else form.pipe_released * scale
     if form.pipe_released is not None and not RELEASED_PA[0] <= released <= RELEASED_PA[1]:

@@ -16,7 +16,7 @@ import pandas as pd
 
 from ..cell.numbers import has_dates
 from ..columns import Columns
-from ..format import Format
+from ..format import PRESSURES, Format
 from ..opened import open_log
 from ..rows import measured
 from ..text import Refusal
@@ -76,5 +76,10 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     if "brake_pipe" in rows:
         rows, form, note = demanded(rows, form)
         notes.append(note)
+    notes += [
+        f"{name}: a full brake is {form.full_pressure_pa:g} Pa in the cylinders, --full-pressure"
+        for name in PRESSURES
+        if name in source.columns.names and form.is_share(name)
+    ]
     stds, coarse = stds_of(rows, form)
     return Log(form, source.columns._replace(doubts=doubts), rows, (*notes, *coarse), stds)
