@@ -33,7 +33,7 @@ TIME_UNITS |= {"excel": 86_400 * 10**9}
 EXCEL_1970 = 25_569
 """The day of a spreadsheet on which the epoch begins."""
 
-POSITION_UNITS = {"m": 1.0, "km": 1e3, "ft": 0.3048}
+POSITION_UNITS = {"m": 1.0, "km": 1e3, "ft": 0.3048, "cm": 0.01, "mm": 1e-3, "mi": 1609.344}
 PRESSURE_UNITS = {"pa": 1.0, "kpa": 1e3, "bar": 1e5, "mbar": 1e2, "mpa": 1e6, "psi": 6894.757, "kgcm2": 98066.5}
 SHARES = {"percent": 0.01, "full": 1.0}
 """Units of pressures that are parts of a full brake's; `full` is that of a flag, too, true or false."""

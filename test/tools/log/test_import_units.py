@@ -61,6 +61,16 @@ def test_units_that_the_log_names_count_and_are_said(
     assert said + "--time-unit, --position-unit, --pressure-unit, --speed-unit" in capsys.readouterr().out
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("cm", 0.01), ("mm", 0.001), ("mi", 1609.344), ("ft", 0.3048)])
+def test_units_of_places_are_read_and_told(importing: Import, unit: str, metres: float) -> None:
+    rows = ride().assign(position=ride().position / metres)
+    assert importing(text(rows.rename(columns={"position": f"position [{unit}]"}))) == 0, importing.errors
+    assert [sample.position_m for sample in importing.positions()] == pytest.approx(ride().position.tolist())
+    importing.output = importing.output.with_name("without")
+    importing(text(rows))
+    assert any(f"--position-unit {unit}" in odd for odd in importing.summary["odd"])
+
+
 def test_an_option_takes_a_unit_as_headers_have_it(importing: Import) -> None:
     assert (
         importing("time,speed,brake_pressure\n1,36,0\n2,36,0\n", "--speed-unit", "km/h", "--pressure-unit", "Bar") == 0
