@@ -138,6 +138,8 @@ class Format:
     time_zone: str = "UTC"
     """Of dates that name none."""
     sort: bool = False
+    hold: bool = False
+    """Whether a pressure that a row does not tell is that of the last one which did."""
     direction: str = "up"
     """Whether the chainage rises as the train runs, or falls: `down`."""
     position_unit: str | None = None

@@ -23,7 +23,7 @@ AXLES = "wheel_speeds"
 OF = {
     **dict.fromkeys(("position_unit", "direction"), ("position",)),
     "position_std_m": ("position", "lat"),
-    **dict.fromkeys(("pressure_unit", "pressure_kind", "ambient_pressure_pa"), PRESSURES),
+    **dict.fromkeys(("hold", "pressure_unit", "pressure_kind", "ambient_pressure_pa"), PRESSURES),
     **dict.fromkeys(("pipe_released", "full_pressure_pa"), ("brake_pipe",)),
     "speed_unit": ("speed", "speed_std"),
     "acceleration_unit": ("acceleration",),

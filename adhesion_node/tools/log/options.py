@@ -90,6 +90,7 @@ def _text_options(add: Callable[..., Any]) -> None:
         default="UTC",
         help="of dates that name none, such as Europe/Berlin",
     )
+    add("--hold", action="store_true", help="pressures are written where they change alone: as they were in between")
     add("--sort", action="store_true", help="sort the rows by time")
 
 

@@ -120,6 +120,11 @@ def test_a_pressure_that_is_written_where_it_changes_alone_is_told(importing: Im
     assert importing(text(rows.assign(**{name: pressure.where(pressure.diff() != 0.0)}))) == 1
     (odd,) = importing.summary["odd"]
     assert odd.startswith(f"{name} has a value in 2 of 600 rows, each another than before, and none for 39.9 s: is it ")
+    importing.output = importing.output.with_name("held")
+    assert "--hold" in odd
+    assert importing(text(rows.assign(**{name: pressure.where(pressure.diff() != 0.0)})), "--hold") == 0
+    topic = "brake_pressure" if name == "brake_pressure" else "brake_demand"
+    assert len(importing.messages(topic)) == 600
 
 
 @pytest.mark.parametrize("every", [10, 100])

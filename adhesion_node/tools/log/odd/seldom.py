@@ -35,5 +35,5 @@ def seldom(log: Log, t_s: Array) -> Iterator[str]:
             yield (
                 f"{theirs} has a value in {known.sum()} of {len(t_s)} rows, each another than before, and none "
                 f"for {gaps_s.max():.3g} s: is it written where it changes alone? After {oldest_s:g} s it is unknown: "
-                f"write it in every row, or name another column with {option(theirs)} COL"
+                f"--hold where it is as it was, or name another column with {option(theirs)} COL"
             )

@@ -20,6 +20,7 @@ from ..format import PRESSURES, Format
 from ..opened import open_log
 from ..rows import measured
 from ..text import Refusal
+from .changes import between_changes
 from .clock import going_on, in_digits, in_zone
 from .held import without_held
 from .pipe import demanded
@@ -63,9 +64,10 @@ def read_log(path: Path, form: Format, tell: Callable[[Refusal], None]) -> Log:
     for each in refused:
         tell(each)
     doubts = (*source.columns.doubts, *(source.trains if refused else []))
+    rows, on_change = between_changes(rows) if form.hold else (rows, [])
     rows, held = without_held(rows)
     rows, wrapped = unwrapped(rows, form)
-    notes += source.notes + digits + counted + shared + held + wrapped
+    notes += source.notes + digits + counted + shared + on_change + held + wrapped
     notes += [f"{name}: {said}" for name, said in read_as.items()]
     if form.direction == "down" and "position" in rows:
         rows["position"] = -rows["position"]
