@@ -187,6 +187,21 @@ def test_a_date_without_a_zone_is_in_the_one_that_is_told(importing: Import) -> 
     assert pd.Timestamp(importing.positions()[0].t_ns) == pd.Timestamp("2024-11-20 23:00:00")
 
 
+def test_a_clock_without_summer_time_is_told(importing: Import) -> None:
+    """In Berlin summer time began at 2 on 31 March 2024."""
+    moments = pd.Timestamp("2024-03-31 01:59:30") + pd.to_timedelta(ride().time, unit="s")
+    assert importing(text(ride().assign(time=moments)), "--time-zone", "Europe/Berlin") == 1
+    stamps = (moments - pd.Timedelta(hours=1)).array.as_unit("ns").asi8.tolist()
+    assert [sample.t_ns for sample in importing.positions()] == stamps
+    assert importing.summary["odd"] == [
+        "300 rows from 2024-03-31 02:00:00 on are at times that Europe/Berlin has not, as summer time begins: has the "
+        "clock none? --time-zone Etc/GMT-1"
+    ]
+    importing.output = importing.output.with_name("fixed")
+    assert importing(text(ride().assign(time=moments)), "--time-zone", "Etc/GMT-1") == 0
+    assert [sample.t_ns for sample in importing.positions()] == stamps
+
+
 @pytest.mark.parametrize(("begins", "utc"), [("02:59:30", "01:59:30"), ("01:59:30", "23:59:30")])
 def test_the_hour_that_is_there_twice_joins_the_rows(importing: Import, begins: str, utc: str) -> None:
     """In Berlin summer time ended at 3 on 27 October 2024."""

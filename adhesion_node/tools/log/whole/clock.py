@@ -66,19 +66,35 @@ def _period_ns(steps: Array, unit_ns: int) -> int:
     return next((period for period, each in behind.items() if ((each > 0) & (each <= longest)).all()), 0)
 
 
-def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str]]:
-    """The times of a zone as UTC; of an hour that is there twice, where the rows do not tell, that which joins them."""
+def in_zone(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, list[str], list[str]]:
+    """The times of a zone as UTC, what was done, and what is odd.
+
+    Of an hour that is there twice, where the rows do not tell, it is that which joins them; one that is not there is
+    that of a clock without summer time, which goes on by an hour less.
+    """
     if form.time_zone == "UTC" or not has_dates(form):
-        return rows, []
-    local, zone = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone
+        return rows, [], []
+    local, zone, missing = pd.DatetimeIndex(rows["t_ns"].to_numpy()), form.time_zone, pd.Timedelta(hours=1)
     try:
-        utc = local.tz_localize(zone, ambiguous="infer", nonexistent="shift_forward")
+        utc = local.tz_localize(zone, ambiguous="infer", nonexistent=missing)
     except Exception:  # an hour that is there twice; of pandas before 3 no ValueError. What else is wrong fails again
         either = (np.full(len(local), summer) for summer in (True, False))
-        both = [local.tz_localize(zone, ambiguous=summer, nonexistent="shift_forward") for summer in either]
+        both = [local.tz_localize(zone, ambiguous=summer, nonexistent=missing) for summer in either]
         utc = min(both, key=lambda each: np.max(np.abs(np.diff(each.asi8)), initial=0))
     rows["t_ns"] = utc.as_unit("ns").asi8
-    return rows, [f"time: local of {zone}"]
+    is_none = utc.tz_localize(None) != local
+    odd = [_no_such_time(local[is_none], zone)] if is_none.any() else []
+    return rows, [f"time: local of {zone}"], odd
+
+
+def _no_such_time(local: pd.DatetimeIndex, zone: str) -> str:
+    """Say that times are not there in a zone, and which has them: the one without summer time."""
+    winter_h = (local[0] - pd.Timedelta(days=1)).tz_localize(zone).utcoffset() / pd.Timedelta(hours=1)
+    fixed = f"Etc/GMT{-winter_h:+.0f}" if winter_h == round(winter_h) else "the zone without it"
+    return (
+        f"{len(local)} rows from {local[0]} on are at times that {zone} has not, as summer time begins: has the clock "
+        f"none? --time-zone {fixed}"
+    )
 
 
 def moment(t_ns: int) -> str:
