@@ -49,7 +49,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add("--signal", metavar="COL", help="name of the column of names, where a row has one signal, when not 'signal'")
     add("--value", metavar="COL", help="name of the column of its values, when not 'value'")
     rows = "read the rows alone that have this value in this column, such as those of one train; may be repeated"
-    add("--where", metavar="COL=VALUE", nargs="+", action="extend", default=[], help=rows)
+    add("--where", metavar="COL=VALUE", action="append", default=[], help=rows)
     _text_options(parser.add_argument_group("how the log is written").add_argument)
     _unit_options(parser.add_argument_group("what its numbers are").add_argument)
 

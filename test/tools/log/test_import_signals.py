@@ -15,6 +15,7 @@ import pytest
 from test_import_csv import Import, importing
 from test_import_log import ride, text
 
+from adhesion_node.tools import import_csv
 from adhesion_node.wire.topics import BRAKE_PRESSURE, SPEED
 
 __all__ = ["importing"]
@@ -74,6 +75,7 @@ def trains() -> pd.DataFrame:
 def test_the_rows_of_one_train_are_chosen(importing: Import) -> None:
     assert importing(text(trains()), "--where", "Train=12") == 0, importing.errors
     assert [sample.position_m for sample in importing.positions()] == (ride()["position"] + 7e3).tolist()
+    assert import_csv.main(["--where", "train=12", "--dry-run", str(importing.log)]) == 0
 
 
 def test_a_train_that_comes_late_in_the_log_is_read_as_it_is_written(importing: Import) -> None:
