@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from .signals import interrupted
 from .streams import open_closed_streams
-from .written import write_text
+from .written import require_folder, write_text
 
 Item = TypeVar("Item")
 
@@ -164,6 +164,7 @@ def _worked(
     complete(parser)
     options = parser.parse_args(args)
     try:
+        require_folder(getattr(options, "json", None) or "-", getattr(options, "output", None))
         return work(options)
     except ValueError as error:
         return complain(parser.prog, error, BAD_INPUT)

@@ -8,6 +8,8 @@
 
 """Files that are written: where the system names none for its error, as on a full disk, the error names the file."""
 
+import errno
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,6 +24,13 @@ def naming(path: str | Path) -> Iterator[None]:
         if error.filename is None:
             error.filename = str(path)
         raise
+
+
+def require_folder(path: str, made: str | None) -> None:
+    """Raise FileNotFoundError where the folder of a file is not there, nor the one that is made: before the work."""
+    folder = Path(path).parent
+    if not folder.is_dir() and (made is None or Path(made) not in (folder, *folder.parents)):
+        raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
 
 
 def write_text(path: str | Path, text: str) -> None:

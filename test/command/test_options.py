@@ -17,7 +17,7 @@ from pathlib import Path
 
 import pytest
 
-from adhesion_node.command.options import DONE, FAILED, run_tool
+from adhesion_node.command.options import DONE, FAILED, json_option, run_tool
 from adhesion_node.command.written import write_text
 
 
@@ -95,3 +95,21 @@ def test_a_full_disk_names_the_file_and_what_to_do(capsys: pytest.CaptureFixture
     assert run_tool(argparse.ArgumentParser("tool"), work, []) == FAILED
     told = "tool: /dev/full: No space left on device: make room, or name a place on another disk\n"
     assert capsys.readouterr().err == told
+
+
+def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    worked: list[argparse.Namespace] = []
+
+    def work(options: argparse.Namespace) -> int:
+        worked.append(options)
+        return DONE
+
+    def tables(*options: str) -> int:
+        parser = argparse.ArgumentParser("tables", parents=[json_option()])
+        parser.add_argument("--output")
+        return run_tool(parser, work, ["--json", str(tmp_path / "no" / "x"), *options])
+
+    assert tables() == FAILED
+    assert not worked
+    assert tables("--output", str(tmp_path / "no")) == DONE  # a folder that the work makes
+    assert "No such file or directory: name one that is there" in capsys.readouterr().err
