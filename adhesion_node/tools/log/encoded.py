@@ -22,7 +22,7 @@ from typing import IO, Any
 PACKED: dict[bytes, Callable[[Path, Any], Any]] = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ": lzma.open}
 """What unpacks a file that begins so."""
 
-_BROKEN = (EOFError, zlib.error, lzma.LZMAError, gzip.BadGzipFile)
+_BROKEN = (EOFError, zlib.error, lzma.LZMAError, OSError)
 
 NO_TEXT = (
     (b"PK\x03\x04", "is a zip file or a workbook, no text: unpack it, or save it as CSV"),
@@ -89,6 +89,8 @@ def _opened(path: Path) -> Iterator[IO[Any]]:
         with path.open("rb") if unpack is None else unpack(path, "rb") as file:
             yield file
     except _BROKEN as error:
+        if isinstance(error, OSError) and error.errno is not None:  # of the system; without a number it is the packer's
+            raise
         raise ValueError(f"{path}: is packed, and cannot be unpacked ({error}): copy it anew, or unpack it") from None
 
 
