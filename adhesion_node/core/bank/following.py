@@ -57,8 +57,8 @@ PITCH_MEAN, PITCH_STD, BIAS_STD = 0.09, 0.04, 0.012
 def _with_position(memory: Memory, measurement: Measurement, predicted: Foreseen | None) -> Memory:
     """Take a position in; the first one places the train, with what there is of slow error in it."""
     declared, bank = math.sqrt(measurement.variance_m2), memory.bank
-    off = None if predicted is None else predicted.stds
-    course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked, off)
+    off, tells = (None, False) if predicted is None else (predicted.stds, predicted.tells)
+    course = memory.course.after(measurement.t_ns, measurement.position_m, memory.braked, off, tells)
     if (predicted is not None and predicted.bank is not None) or memory.is_placed:
         white = white_variances(declared, memory.coarse.std_m)
         *beliefs, total = weighing.placed(*bank[:4], white, measurement.position_m, CLIPPED)

@@ -118,12 +118,12 @@ class Foreseen(NamedTuple):
     bank: Bank | None = None
     """What was foreseen."""
     tells: bool = True
-    """Whether it tells of the train: while positions may have stepped they do not."""
+    """Whether it tells of a sliding wheel: while positions may have stepped they do not."""
 
     @property
-    def stds(self) -> float | None:
-        """In standard deviations by the hypothesis nearest; None where it tells nothing."""
-        return math.copysign(self.nearest, self.metres) if self.tells else None
+    def stds(self) -> float:
+        """In standard deviations by the hypothesis nearest."""
+        return math.copysign(self.nearest, self.metres)
 
 
 def foreseen(

@@ -116,6 +116,15 @@ def test_a_wheel_that_is_heard_seldom_is_caught(slip: float, more: int, every: i
         assert BRAKE_S + 1.0 < first <= BRAKE_S + 2.5 + more * every * H
 
 
+def test_a_position_that_may_have_stepped_adds_nothing_and_is_the_one_before_the_next() -> None:
+    """Before: the next was held against the one before the pause, and a receiver's was taken for a sliding wheel's."""
+    course = plausible.UNBRAKED
+    for index, (off, tells) in enumerate(((2.9, True), (0.9, False), (2.4, True), (4.2, True))):
+        course = course.after(S + index * S // 10, 0.0, True, off, tells)
+    assert course.running == pytest.approx(max(0.9 * 2.4 - plausible.FORESEEN, 0.0) + 2.4 * 4.2 - plausible.FORESEEN)
+    assert not course.runs_off
+
+
 @pytest.mark.parametrize("size_m", [-8.0, -4.0, 8.0])
 @pytest.mark.parametrize(("every", "with_speed"), [(1, False), (2, False), (5, False), (5, True), (10, True)])
 def test_a_step_of_the_positions_is_no_sliding_wheel(size_m: float, every: int, with_speed: bool) -> None:

@@ -70,26 +70,29 @@ class Course(NamedTuple):
     running: float = 0.0
     """... and how far they run off."""
 
-    def after(self, t_ns: int, position_m: float, braked: bool, off: float | None) -> Course:
-        """With the next position, and how far off it is in standard deviations by the hypothesis nearest, if known."""
+    def after(self, t_ns: int, position_m: float, braked: bool, off: float | None, tells: bool = True) -> Course:
+        """With the next position, and how far off it is in standard deviations by the hypothesis nearest, if known.
+
+        One that does not tell may have stepped: it adds nothing to what runs off.
+        """
         first, end = bisect_left(self.recent, (t_ns - SPAN_NS,)), bisect_left(self.recent, (t_ns,))
         before = self if braked else UNBRAKED
         recent, braked_ns = (*self.recent[first:end], (t_ns, position_m)), before.braked_ns
         if braked_ns is None and braked:
             braked_ns = t_ns
-        return before._replace(recent=recent, braked_ns=braked_ns)._running(t_ns, off)
+        return before._replace(recent=recent, braked_ns=braked_ns)._running(t_ns, off, tells)
 
-    def outlying(self, t_ns: int, off: float | None) -> Course:
+    def outlying(self, t_ns: int, off: float, tells: bool = True) -> Course:
         """With a position that is not believed: such as come soon are of one burst."""
         if t_ns - self.heard_ns < BURST_NS:
             return self._replace(heard_ns=t_ns)
-        return self._running(t_ns, off)
+        return self._running(t_ns, off, tells)
 
-    def _running(self, t_ns: int, off: float | None) -> Course:
+    def _running(self, t_ns: int, off: float | None, tells: bool) -> Course:
         if off is None:
             return self._replace(heard_ns=t_ns)
         off = min(max(off, -FAR), FAR)
-        running = max(self.running + max(off * self.off, 0.0) - FORESEEN, 0.0)
+        running = max(self.running + tells * max(off * self.off, 0.0) - FORESEEN, 0.0)
         return self._replace(heard_ns=t_ns, off=off, running=running)
 
     @property
