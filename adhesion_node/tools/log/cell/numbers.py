@@ -97,7 +97,7 @@ def in_flags(cells: "pd.Series[Any]") -> "pd.Series[Any]":
     >>> in_flags(pd.Series(["TRUE", "off", "", "0.5"])).tolist()
     ['1', '0', '', '0.5']
     """
-    if not (pd.api.types.is_bool_dtype(cells) or cells.dtype == object):
+    if pd.api.types.is_numeric_dtype(cells) and not pd.api.types.is_bool_dtype(cells):
         return cells
     flags = {**dict.fromkeys(("true", "on", "yes"), "1"), **dict.fromkeys(("false", "off", "no"), "0")}
     return cells.map(lambda cell: flags.get(str(cell).casefold(), cell))
