@@ -19,16 +19,16 @@ import numpy as np
 import pandas as pd
 
 from ...command.checks import refuse
+from .block.chosen import chosen, several, with_rows
+from .block.dated import date_of, with_dates, without_date
+from .block.signals import signals_of, spread
 from .cell.numbers import FORMATS, NO_TIME, is_clock, time_formats, time_unit, times_ns
 from .cell.suffixed import unit_in, without_units
 from .cell.units import kind_of, known
-from .chosen import chosen, several, with_rows
 from .columns import Columns, columns_of, in_doubt, units_told
-from .dated import date_of, with_dates, without_date
 from .encoded import is_parquet
 from .format import Format
 from .idle import require_meaning
-from .signals import signals_of, spread
 from .text import SAMPLE, Block, blocks, names_of, understood
 
 ZONED = re.compile(r"(Z|UTC|GMT|[T ]\d\d.*[+-]\d\d(:?\d\d)?)$")

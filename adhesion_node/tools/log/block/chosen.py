@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from .columns import Columns
-from .text import Block
+from ..columns import Columns
+from ..text import Block
 
 SHOWN = 5
 """Values that are listed of a column which has none of those that are asked for."""

@@ -14,9 +14,9 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from .columns import Columns
-from .format import Format
-from .text import BLOCK, Block
+from ..columns import Columns
+from ..format import Format
+from ..text import BLOCK, Block
 
 
 class Signals(NamedTuple):

@@ -12,10 +12,10 @@ from dataclasses import replace
 
 import pandas as pd
 
-from .cell.numbers import NO_TIME, is_clock, time_formats, times_ns
-from .columns import Columns
-from .format import Format
-from .text import SAMPLE, Block
+from ..cell.numbers import NO_TIME, is_clock, time_formats, times_ns
+from ..columns import Columns
+from ..format import Format
+from ..text import SAMPLE, Block
 
 
 def date_of(cells: pd.DataFrame, columns: Columns, form: Format) -> str | None:
