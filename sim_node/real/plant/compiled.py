@@ -7,9 +7,9 @@
 # governing permissions and limitations under the License.
 """Formulas of numbers that become machine code when they are first called, and take arrays as numpy's own do.
 
-The code is kept beside the module, or where that cannot be written in the user's cache. What is kept is told by the
-formula's own file alone: a formula calls nothing, and is given what other files state. The exponential and the arc
-tangent are numpy's, outside of the formulas: those of the compiler differ from them by the last bit.
+The code is not kept, which costs each process a second or two: of two that compile the same formula at once numba keeps
+parts that do not belong together, and who loads them crashes. The exponential and the arc tangent are numpy's, outside
+of the formulas: those of the compiler differ from them by the last bit.
 """
 
 from collections.abc import Callable
@@ -37,10 +37,7 @@ def formula(types: str) -> Callable[[Callable[..., None]], Function]:
 
             numbers = [from_dtype(np.dtype(letter)) for letter in given]
             signature = void(*numbers, *(from_dtype(np.dtype(letter))[:] for letter in returned))
-            try:
-                made: Any = guvectorize([signature], shapes, cache=True)(function)
-            except RuntimeError:  # nothing can be written anywhere: each run compiles anew
-                made = guvectorize([signature], shapes)(function)
+            made: Any = guvectorize([signature], shapes)(function)
             return cast(Function, getattr(made, "ufunc", made))  # numpy's own, without numba's questions at each call
 
         @wraps(function)
