@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 from oracles import specific_resistance
+from scipy.signal import lfilter
 
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.labels.kinds import KINDS
@@ -106,21 +107,25 @@ def braked_run(
     speed_mps: float = 70.0,
     std_m: float = 0.3,
     growth: float = 0.0,
+    *,
+    swing: float = 0.0,
 ) -> tuple[Array, Array, Array]:
     """Times, true (s, v) and measured positions of a train that begins to brake at 5 s.
 
     It runs before that under the traction that holds its speed. The adhesion `mu` grows from then on by the share
-    `growth` a second.
+    `growth` a second, and swings by the share `swing` with a correlation time of 0.7 s.
     """
     rng, fine = np.random.default_rng(seed), 10
-    count = round(seconds / dt_s)
+    count, lasts = round(seconds / dt_s), np.exp(-dt_s / 0.7)
+    drawn = np.random.default_rng(seed + 50).standard_normal(count)
+    swings = swing * lfilter([np.sqrt(1.0 - lasts**2)], [1.0, -lasts], drawn)
     truth = np.zeros((count, 2))
     s, v, h = 0.0, speed_mps, dt_s / fine
     for index in range(count):
         truth[index] = s, v
         for step in range(fine):
             since_s = index * dt_s + step * h - 5.0
-            braked, gives = since_s >= 0.0, mu * float(np.exp(growth * since_s))
+            braked, gives = since_s >= 0.0, mu * float(np.exp(growth * since_s)) * (1.0 + swings[index])
             slowing = 9.8 * (min(gives, FULL) + float(specific_resistance(np.array(v)))) if braked else 0.0
             s, v = s + h * v - 0.5 * h * h * slowing, v - h * slowing
     times = dt_s * np.arange(count, dtype=np.float64)

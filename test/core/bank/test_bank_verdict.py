@@ -186,10 +186,11 @@ def test_the_bound_is_the_mixtures_and_below_its_median() -> None:
         ),
         CONFIG.used_ripple * 0.05,
     )
-    low, bound, high = norm.ppf([0.025, 0.6 * 0.05, 0.975], 0.05, std)
+    low, high = norm.ppf([0.025, 0.975], 0.05, std)
+    bound = norm.ppf(0.6 * 0.05, 0.05, math.hypot(std, 2.0 * CONFIG.used_ripple * 0.05))
     assert (rail.mu, rail.lower) == pytest.approx((0.05, bound), rel=1e-6)
     assert rail.std == pytest.approx((high - low) / 3.92, rel=1e-6)
-    assert low < rail.lower < rail.mu
+    assert 0.0 < rail.lower < rail.mu
 
 
 def test_the_fewer_axles_the_more_one_of_them_takes_away() -> None:
@@ -200,4 +201,4 @@ def test_the_fewer_axles_the_more_one_of_them_takes_away() -> None:
         config = replace(CONFIG, train=replace(CRH3, length_m=length_m))
         rail = found(config, memory_of(bank, Braking(FULL), 3), NOTHING, NOTHING).rail
         assert rail.std == pytest.approx(ripple * rail.mu, rel=0.01)
-        assert rail.lower == pytest.approx((1.0 + norm.ppf(0.6 * 0.05) * ripple) * rail.mu, rel=0.01)
+        assert rail.lower == pytest.approx((1.0 + norm.ppf(0.6 * 0.05) * 5.0**0.5 * ripple) * rail.mu, rel=0.01)

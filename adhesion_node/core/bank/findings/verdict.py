@@ -55,6 +55,10 @@ SLIDES_FROM, CLAIMED = 0.5, 0.8
 HELD_BACK = 3.0
 """Errors of the brake by which less is used than it should give, from which all axles may be held at some creep."""
 
+SURGING = 2.0
+"""Times `used_ripple` by which the adhesion used may swing beside that where slide protection fills slowly or lets go
+of whole bogies. No sensor tells such swings from its own errors in time, so the bound allows for them on any train."""
+
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
 
@@ -77,8 +81,10 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if not memory.braked and memory.brake.known:
         return Findings(Regime.COASTING, before, unfelt(config, bank, before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
-    wanted = (LOW_95, KNOWN_SHARE * (1.0 - config.confidence), 0.5, HIGH_95)
-    low, bound, middle, high = quantiles(bank.weight, used.value, used.std(config, bank), wanted)
+    std, missed = used.std(config, bank), KNOWN_SHARE * (1.0 - config.confidence)
+    low, middle, high = quantiles(bank.weight, used.value, std, (LOW_95, 0.5, HIGH_95))
+    surging = np.hypot(std, SURGING * config.ripple * used.value)
+    bound = float(quantiles(bank.weight, used.value, surging, (missed,)).item())
     rail = Rail(max(middle, 0.0), (high - low) / WIDTH_95, min(max(bound, 0.0), max(middle, 0.0)))
     if not memory.braked:
         free = before
