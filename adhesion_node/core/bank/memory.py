@@ -27,6 +27,7 @@ from .layout import POSITION, Bank
 from .motion import Braking, moved
 from .seeing import Observation, corrected
 from .sensors.coarse import Coarse
+from .sensors.leaping import Leaping
 from .sensors.plausible import Course
 from .sensors.pointing import Pointing
 from .sensors.scatter import LASTING, Coloured, Scatter
@@ -81,6 +82,7 @@ class Memory(NamedTuple):
     slowed_mps: float = 0.0
     """By how much the train was foreseen to slow under the brake, of all brakings."""
     repeating: Repeating = Repeating()
+    leaping: Leaping = Leaping()
     pointing: Pointing = Pointing()
     places: Scatter = Scatter()
     placed_ns: int = -S

@@ -1,0 +1,55 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""A speed that leaps as no train does: from then on its scale is another one, as a radar's over snow."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ...physics.train import GRAVITY, Array
+from ..layout import SCALE, SPEED, Bank
+
+if TYPE_CHECKING:
+    from ...config import Config
+
+S = 1_000_000_000
+
+FAR, WITHIN_S = 3.0, 1.0
+"""Standard deviations by which a speed lies off that has leapt, by every hypothesis and beside all that the brake could
+do since the one before. Where that is so long ago, nothing is told of leaps."""
+
+BACK_S, BACK, BACK_FAR = 5.0, 0.5, 2.0
+"""For so long it may leap back: by more than this share of what it had leapt by, and so many standard deviations."""
+
+
+class Leaping(NamedTuple):
+    """By how much a speed leapt last, and when."""
+
+    by_mps: float = 0.0
+    at_ns: int = 0
+
+    def after(
+        self, config: Config, bank: Bank, t_ns: int, elapsed_s: float, innovation: Array, std: Array
+    ) -> tuple[Leaping, Bank]:
+        """With the next speed, so long after the one before; what it is off by, and may be, shape (H,), each m/s.
+
+        If it has leapt, its scale may be another one by as much.
+        """
+        by_mps, off = float(bank.weight @ innovation), np.abs(innovation)
+        back = t_ns - self.at_ns < BACK_S * S and by_mps * self.by_mps < -BACK * self.by_mps**2
+        braked_mps = GRAVITY * config.train.full_brake * elapsed_s
+        leaps = (off > BACK_FAR * std).all() if back else (off > FAR * std + braked_mps).all()
+        speed = bank.mean_of(SPEED)
+        if not leaps or elapsed_s >= WITHIN_S or speed < config.slowest_mps:
+            return self, bank
+        covariance = bank.covariance.copy()
+        covariance[:, SCALE, SCALE] += (by_mps / speed) ** 2
+        return Leaping(by_mps, t_ns), bank._replace(covariance=covariance)
