@@ -75,7 +75,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         memory, stepping = stepping.taken(config, size_m, rail)
         return _accepted(config, state, measurement, memory, stepping)
     doubted = stepping.doubts(config)
-    off = off._replace(tells=not stepping.may_be(config, measurement))
+    off = off._replace(tells=stepping.tells(config, measurement, off))
     if elsewhere or (measurement.has_position and doubted) or off.nearest > config.gate_sigma:
         if memory.braked and not doubted:  # one that may have stepped far tells nothing
             memory = memory._replace(course=memory.course.outlying(measurement.t_ns, off.stds, off.tells))

@@ -90,7 +90,15 @@ class Stepping(NamedTuple):
         """Whether the positions may have stepped far: until that is known they tell nothing."""
         return self.is_far(config) and self._waits(config)
 
-    def may_be(self, config: Config, measurement: Measurement) -> bool:
+    def tells(self, config: Config, measurement: Measurement, off: Foreseen) -> bool:
+        """Whether a position so far off tells of an axle that slides.
+
+        Where another sensor tells the speed such an axle falls behind, and never runs ahead.
+        """
+        ahead = off.metres > 0.0 and bool(measurement.all_speeds or measurement.wheels)
+        return not (ahead or self._may_be(config, measurement))
+
+    def _may_be(self, config: Config, measurement: Measurement) -> bool:
         """Whether the newest position lies off as the first did and more have to: till then it tells nothing.
 
         An axle that slides falls behind, too. So where they lie behind they must come soon, or another sensor tell the

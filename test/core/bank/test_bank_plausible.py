@@ -17,8 +17,10 @@ import pytest
 from banks import CONFIG, FULL, FULL_PA, S, bank_of
 from oracles import specific_resistance
 
-from adhesion_node.core import Measurement, Outcome, State, init, step
+from adhesion_node.core import Measurement, Outcome, SpeedSample, State, WheelSample, init, step
+from adhesion_node.core.bank.motion import Foreseen
 from adhesion_node.core.bank.sensors import plausible
+from adhesion_node.core.bank.steps import Stepping
 from adhesion_node.core.estimate import Estimate
 from adhesion_node.core.physics.train import Array
 
@@ -137,6 +139,18 @@ def test_a_step_of_the_positions_is_no_sliding_wheel(size_m: float, every: int, 
         state, estimates = followed(places + errors + stepped, 2.0, every, speeds if with_speed else None)
         assert not state.counts[Outcome.SLIDING]
         assert not any(each.withheld for each in estimates)
+
+
+def test_positions_that_run_ahead_of_another_sensor_tell_of_no_sliding_wheel() -> None:
+    """Before: a receiver that ran 0.6 m ahead of a Doppler speed was left out. Alone an axle that rolls again does."""
+    alone = Measurement(S, 100.0, 4.0, FULL_PA)
+    for beside in (
+        alone._replace(speeds=(SpeedSample(S, 40.0, 0.01),)),
+        alone._replace(wheels=(WheelSample(S, (40.0, 39.9)),)),
+    ):
+        assert not Stepping().tells(CONFIG, beside, Foreseen(0.6))
+        assert Stepping().tells(CONFIG, beside, Foreseen(-0.6))
+    assert Stepping().tells(CONFIG, alone, Foreseen(0.6))
 
 
 @pytest.mark.parametrize(("lasts_s", "every"), [(0.1, 10), (0.1, 1), (0.25, 1)])
