@@ -21,10 +21,10 @@ from adhesion_node.core.bank.sensors.leaping import Leaping
 from adhesion_node.core.intake.outcome import Outcome
 from adhesion_node.core.physics.train import Array
 
-STD, NEVER = 0.1, Leaping()
+STD, NEVER = 0.1, Leaping(since_ns=0)
 
 
-def _scale_std(by_mps: float, before: Leaping = NEVER, t_ns: int = S, elapsed_s: float = 0.1) -> float:
+def _scale_std(by_mps: float, before: Leaping = NEVER, t_ns: int = 9 * S, elapsed_s: float = 0.1) -> float:
     """Of a train at 40 m/s, behind a speed that was off by so much."""
     bank = bank_of([HELD, HELD], spread=0.0).with_fresh(SPEED, 40.0, 0.01).with_fresh(SCALE, 0.0, 0.001)
     _, bank = before.after(CONFIG, bank, t_ns, elapsed_s, np.full(2, by_mps), np.full(2, STD))
@@ -37,14 +37,16 @@ def test_a_speed_leaps_that_is_farther_off_than_its_errors_and_the_brake_explain
     assert _scale_std(sign * (3.0 * STD + braked_mps - 1e-3)) == pytest.approx(0.001)
     leapt_mps = 3.0 * STD + braked_mps + 1e-3
     assert _scale_std(sign * leapt_mps) == pytest.approx(np.hypot(leapt_mps / 40.0, 0.001))
-    assert _scale_std(sign * 10.0, elapsed_s=1.0) == pytest.approx(0.001), "the brake could do as much by then"
+    assert _scale_std(sign * 10.0, elapsed_s=1.0) == pytest.approx(0.001), "it was not heard for too long"
+    for before in (Leaping(), Leaping(since_ns=7 * S)):
+        assert _scale_std(sign * 10.0, before) == pytest.approx(0.001), "only just heard, the train may be the one"
 
 
 def test_it_leaps_back_by_less() -> None:
     """But not the same way again, nor by a small part of it, nor long after."""
-    leapt = Leaping(0.5, S)
-    assert _scale_std(-0.27, leapt, 2 * S) == pytest.approx(np.hypot(0.27 / 40.0, 0.001))
-    for by_mps, t_ns in ((0.27, 2 * S), (-0.24, 2 * S), (-0.27, 7 * S)):
+    leapt = Leaping(0.5, 9 * S, 0)
+    assert _scale_std(-0.27, leapt, 10 * S) == pytest.approx(np.hypot(0.27 / 40.0, 0.001))
+    for by_mps, t_ns in ((0.27, 10 * S), (-0.24, 10 * S), (-0.27, 15 * S)):
         assert _scale_std(by_mps, leapt, t_ns) == pytest.approx(0.001)
 
 

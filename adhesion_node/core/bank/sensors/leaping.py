@@ -22,9 +22,9 @@ if TYPE_CHECKING:
 
 S = 1_000_000_000
 
-FAR, WITHIN_S = 3.0, 1.0
+FAR, GAP_S, HEARD_S = 3.0, 1.0, 3.0
 """Standard deviations by which a speed lies off that has leapt, by every hypothesis and beside all that the brake could
-do since the one before. Where that is so long ago, nothing is told of leaps."""
+do since the one before. It must have been heard for so long without such a gap: before, the train may be what leaps."""
 
 BACK_S, BACK, BACK_FAR = 5.0, 0.5, 2.0
 """For so long it may leap back: by more than this share of what it had leapt by, and so many standard deviations."""
@@ -35,6 +35,8 @@ class Leaping(NamedTuple):
 
     by_mps: float = 0.0
     at_ns: int = 0
+    since_ns: int | None = None
+    """Since when it has been heard without a gap."""
 
     def after(
         self, config: Config, bank: Bank, t_ns: int, elapsed_s: float, innovation: Array, std: Array
@@ -43,13 +45,15 @@ class Leaping(NamedTuple):
 
         If it has leapt, its scale may be another one by as much.
         """
+        if self.since_ns is None or elapsed_s >= GAP_S:
+            return self._replace(since_ns=t_ns), bank
         by_mps, off = float(bank.weight @ innovation), np.abs(innovation)
         back = t_ns - self.at_ns < BACK_S * S and by_mps * self.by_mps < -BACK * self.by_mps**2
         braked_mps = GRAVITY * config.train.full_brake * elapsed_s
         leaps = (off > BACK_FAR * std).all() if back else (off > FAR * std + braked_mps).all()
         speed = bank.mean_of(SPEED)
-        if not leaps or elapsed_s >= WITHIN_S or speed < config.slowest_mps:
+        if not leaps or t_ns - self.since_ns < HEARD_S * S or speed < config.slowest_mps:
             return self, bank
         covariance = bank.covariance.copy()
         covariance[:, SCALE, SCALE] += (by_mps / speed) ** 2
-        return Leaping(by_mps, t_ns), bank._replace(covariance=covariance)
+        return self._replace(by_mps=by_mps, at_ns=t_ns), bank._replace(covariance=covariance)
