@@ -25,6 +25,7 @@ from contextlib import contextmanager
 from functools import cache as once
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,8 +36,8 @@ from .checks import at_least, refuse
 Arrays = Mapping[str, NDArray[Any]]
 """A task's result by name."""
 
-CACHE = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "adhesion_node"
-"""Where finished runs are kept unless another folder is named."""
+CACHE = Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")) / "adhesion_node"
+"""Where finished runs are kept unless another folder is named; below "~" where no home is known."""
 
 PACKAGES = Path(__file__).parents[2]
 """The folder that holds the packages."""
@@ -92,6 +93,8 @@ def add_running_options(parser: argparse.ArgumentParser) -> None:
 def running(options: argparse.Namespace) -> Running:
     """Read the options of `add_running_options`. Raises ValueError naming a bad one."""
     at_least(options, workers=1)
+    if options.cache is None and CACHE.parts[0] == "~":
+        raise ValueError("cache: no home folder is known to keep finished runs in: name one with --cache DIR")
     if options.scheduler:
         refuse(options, ["workers"], "the cluster of --scheduler has its own: leave the one or the other out")
     return Running(options.cache or CACHE, options.workers or os.cpu_count() or 1, options.scheduler)
@@ -101,7 +104,7 @@ def run_all(wanted: Sequence[Task], where: Running, *, as_given: bool = False) -
     """Yield the results of all tasks in order; compute those that the cache lacks, heavy ones first or `as_given`."""
     where.cache.mkdir(parents=True, exist_ok=True)
     by_file = {file_name(task): task for task in wanted}
-    missing = [task for file, task in by_file.items() if not (where.cache / file).exists()]
+    missing = [task for file, task in by_file.items() if not _is_kept(where.cache / file)]
     if missing:
         _compute_all(missing if as_given else sorted(missing, key=lambda task: -task.weight), where)
     for task in wanted:
@@ -157,6 +160,15 @@ def file_name(task: Task) -> str:
     return f"{task.name}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
 
+def _is_kept(file: Path) -> bool:
+    """Whether a run is there, and whole: a power cut may have left a part of one."""
+    try:
+        with file.open("rb") as stream, np.load(stream):
+            return True
+    except (OSError, EOFError, ValueError, BadZipFile):
+        return False
+
+
 def load(task: Task, cache: Path) -> dict[str, NDArray[Any]]:
     """Read a task's result from the cache."""
     with np.load(cache / file_name(task)) as stored:
@@ -170,6 +182,7 @@ def save(task: Task, result: Arrays, cache: Path) -> None:
     unfinished = file.with_suffix(f".{os.getpid()}")
     with unfinished.open("wb") as stream:
         np.savez_compressed(stream, **arrays)
+        os.fsync(stream.fileno())
     unfinished.replace(file)
 
 

@@ -14,7 +14,9 @@ stands in that file, and is given every constant as an argument.
 """
 
 from collections.abc import Callable
+from contextlib import suppress
 from typing import Any, TypeVar, cast
+from uuid import uuid4
 
 from numba import njit
 
@@ -26,6 +28,42 @@ def kernel(function: Function) -> Function:
     compiled: Any
     try:
         compiled = njit(cache=True, error_model="numpy")(function)
+        if hasattr(compiled, "_cache"):  # else numba is told to compile nothing
+            compiled._cache._cache_file = _Files(compiled._cache._cache_file)
     except RuntimeError:  # nothing can be written anywhere: each run compiles anew
         compiled = njit(error_model="numpy")(function)
     return cast(Function, compiled)
+
+
+class _Files:
+    """Numba's files of a kernel's code, without which every kernel works.
+
+    A power cut, a full disk or another user may leave files that cannot be read or written: the code is compiled anew.
+    Numba gives the code of a new version the name of the old one's, and lists it before it is written; whoever was
+    stopped in between left a list of the new version that led to the old code. So each code has a name of its own.
+    """
+
+    def __init__(self, files: Any) -> None:
+        self._files = files
+        pattern = files._data_name_pattern
+        files._data_name = lambda number: pattern.format(number=number).replace(".nbc", f".{uuid4().hex[:16]}.nbc")
+
+    def flush(self) -> None:
+        """Forget what is kept."""
+        self._files.flush()
+
+    def load(self, key: Any) -> Any:
+        """What is kept, None if nothing is."""
+        try:
+            return self._files.load(key)
+        except Exception:  # of a file that is cut any may come
+            return None
+
+    def save(self, key: Any, data: Any) -> None:
+        """Keep it, if that can be."""
+        try:
+            self._files.save(key, data)
+        except Exception:  # a list that is cut is begun anew
+            with suppress(OSError):
+                self._files.flush()
+                self._files.save(key, data)

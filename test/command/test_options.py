@@ -87,6 +87,12 @@ def test_what_a_terminal_cannot_show_is_escaped(monkeypatch: pytest.MonkeyPatch)
     assert written.getvalue() == b"\\u03bc of t\\udcff\n"
 
 
+def test_what_is_no_text_is_escaped_in_a_file_too(tmp_path: Path) -> None:
+    """The file was left empty."""
+    write_text(tmp_path / "page", os.fsdecode(b"\xce\xbc of t\xff"))
+    assert (tmp_path / "page").read_text(encoding="utf-8") == "μ of t\\udcff"
+
+
 def test_a_full_disk_names_the_file_and_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
     def work(_: argparse.Namespace) -> int:
         write_text("/dev/full", "text")

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import argparse
 import os
 import signal
 import socket
@@ -123,6 +124,22 @@ def test_a_killed_study_goes_on_where_it_stopped(tmp_path: Path) -> None:
     wanted = [Square(number, str(traces)) for number in (3.0, 2.0, 3.0)]
     assert squares(wanted, Running(cache)) == [9.0, 4.0, 9.0]
     assert {file.name: file.read_text() for file in traces.iterdir()} == {"2": "computed\n", "3": "computed\n"}
+
+
+@pytest.mark.parametrize("left", [b"", b"PK\x03\x04 half a run", bytes(500)])
+def test_a_run_that_a_power_cut_has_left_in_part_is_computed_anew(tmp_path: Path, left: bytes) -> None:
+    (tmp_path / file_name(Square(2.0))).write_bytes(left)
+    assert squares([Square(2.0)], Running(tmp_path)) == [4.0]
+
+
+def test_without_a_home_the_cache_has_to_be_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a user that the system does not know; to import the module was an error."""
+    monkeypatch.setattr(running, "CACHE", Path("~/.cache/adhesion_node"))
+    parser = argparse.ArgumentParser()
+    running.add_running_options(parser)
+    assert running.running(parser.parse_args(["--cache", "here"])).cache == Path("here")
+    with pytest.raises(ValueError, match="name one with --cache"):
+        running.running(parser.parse_args([]))
 
 
 def test_a_cluster_takes_the_place_of_the_workers(tmp_path: Path, dask: LocalCluster) -> None:

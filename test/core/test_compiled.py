@@ -45,11 +45,51 @@ print(normalised(numpy.zeros(4), -numpy.inf)[0])
 """
 
 
-def test_what_is_compiled_is_kept_in_the_cache_that_is_named(tmp_path: Path) -> None:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    shown = subprocess.run([sys.executable, "-c", USE], env=environment, capture_output=True, text=True, check=True)
+def _used(folder: Path, before: str = "") -> None:
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(folder)}
+    used = [sys.executable, "-c", before + USE]
+    shown = subprocess.run(used, env=environment, capture_output=True, text=True, check=True)
     assert float(shown.stdout) == pytest.approx(-1.3862943611)
+
+
+def test_what_is_compiled_is_kept_in_the_cache_that_is_named(tmp_path: Path) -> None:
+    _used(tmp_path)
     assert {path.name.partition("-")[0] for path in tmp_path.rglob("*.nbi")} >= {"weighing.normalised"}
+
+
+@pytest.mark.parametrize(("ending", "kept"), [("nbi", b""), ("nbc", b""), ("nbc", bytes(500))])
+def test_files_that_a_power_cut_has_left_are_written_anew(tmp_path: Path, ending: str, kept: bytes) -> None:
+    """They ended every later start."""
+    _used(tmp_path)
+    cut = list(tmp_path.rglob(f"*.{ending}"))
+    for file in cut:
+        file.write_bytes(kept)
+    _used(tmp_path)
+    assert cut
+    assert not [file for file in cut if file.read_bytes() == kept]
+
+
+def test_a_kernel_works_where_the_disk_is_full(tmp_path: Path) -> None:
+    """No file may have a byte: as on a full disk, an empty one can be made."""
+    _used(tmp_path, "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))")
+    assert not [file for file in tmp_path.rglob("*.nb?") if file.stat().st_size]
+    _used(tmp_path)
+    assert [file for file in tmp_path.rglob("*.nbc") if file.stat().st_size]
+
+
+def test_the_code_of_another_version_has_another_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who was stopped between the list of what is kept and the code itself left the list of one, the other's code."""
+    source, codes = tmp_path / "versions.py", list[set[str]]()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kept"))
+    for version in (1, 22):
+        source.write_text(
+            f"from adhesion_node.core.compiled import kernel\n@kernel\ndef one(x):\n    return x + {version}\n"
+        )
+        used = [sys.executable, "-c", "import versions; print(versions.one(0))"]
+        shown = subprocess.run(used, cwd=tmp_path, capture_output=True, text=True, check=True)
+        assert int(shown.stdout) == version
+        codes.append({file.name for file in tmp_path.rglob("*.nbc")} - (codes[0] if codes else set()))
+    assert [len(each) for each in codes] == [1, 1]
 
 
 def test_a_kernel_works_where_nothing_can_be_kept(monkeypatch: pytest.MonkeyPatch) -> None:

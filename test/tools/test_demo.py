@@ -159,6 +159,19 @@ def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_k
     assert run["mean_relative_error_percent"] == pytest.approx(result["mean_relative_error_percent"], rel=1e-9)
 
 
+def test_where_ros_cannot_start_it_is_said_in_one_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As for a user without a home, for whom it has no folder for its log."""
+
+    def fails(**_: Any) -> None:
+        raise RuntimeError("failed to get the log directory")
+
+    monkeypatch.setattr("rclpy.init", fails)
+    assert demo.main(["--output", str(tmp_path / "demo")]) == 2
+    assert capsys.readouterr().err == "demo: ROS does not start: failed to get the log directory\n"
+
+
 def test_equal_runs_leave_equal_bytes_however_busy_the_machine_is(tmp_path: Path) -> None:
     """The second run is held up for longer than any watchdog waits: 2 s."""
     bags = [tmp_path / "one", tmp_path / "two"]

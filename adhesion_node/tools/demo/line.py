@@ -113,7 +113,10 @@ def executor_of_line() -> Iterator[SingleThreadedExecutor]:
     """
     with own_domain() as domain:
         context = rclpy.Context()
-        rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        try:
+            rclpy.init(context=context, domain_id=domain, signal_handler_options=SignalHandlerOptions.NO)
+        except RuntimeError as error:  # rcl's, as where it has no folder for its log
+            raise ValueError(f"ROS does not start: {error}") from error
         yield from _executing(context)
 
 
