@@ -102,12 +102,13 @@ def test_where_far_less_is_used_than_the_brake_should_give_rolling_wheels_claim_
     assert found(config, memory, NOTHING, NOTHING).regime is regime
 
 
-def limits(kind: int, used: float, told: float = 0.0, config: Config = CONFIG) -> Regime:
+def limits(kind: int, used: float, told: float = 0.0, config: Config = CONFIG, gauged: bool = False) -> Regime:
     """Without wheels, of a train that slows down for this reason by this part of its full brake."""
     bank = bank_of([kind], spread=0.0).with_fresh(ROUGH, 0.0, 0.0)
     bank.mean[:, MU], bank.mean[:, BRAKE] = used * FULL, 1.0
     bank = bank._replace(covariance=1e-8 * bank.covariance)
     memory = memory_of(bank, Braking(used * FULL if kind == HELD else FULL, told=told), 3)
+    memory = memory._replace(brake=memory.brake._replace(gauged=gauged))
     return found(config, memory, NOTHING, NOTHING).regime
 
 
@@ -133,6 +134,14 @@ def test_a_rail_is_said_to_limit_only_where_no_wrong_brake_explains_it_as_well()
     assert limits(SMOOTH, 0.97, told=4.0, config=mean) is Regime.ADHESION_LIMITED, "the slide protection says it"
     assert limits(SMOOTH, 0.91, told=4.0, config=one) is Regime.COASTING, "of one axle, maybe the only one"
     assert limits(SMOOTH, 0.89, told=4.0, config=one) is Regime.ADHESION_LIMITED
+
+
+@pytest.mark.parametrize(("kind", "part"), [("cylinder", 0.7), ("mean", 0.7), ("demanded", 0.8)])
+def test_a_gauge_that_shows_no_slide_protection_at_work_speaks_for_a_weak_brake(kind: str, part: float) -> None:
+    """Of a train a quarter of whose brakes are isolated the rail was said to limit."""
+    config = replace(CONFIG, brake_std=0.1, mass_std=0.0, rotating_mass_std=0.0, pressure_kind=kind)
+    assert limits(SMOOTH, part - 0.01, config=config, gauged=True) is Regime.ADHESION_LIMITED
+    assert limits(SMOOTH, part + 0.01, config=config, gauged=True) is Regime.COASTING
 
 
 def test_a_brake_is_said_to_limit_only_where_it_gives_what_is_demanded() -> None:

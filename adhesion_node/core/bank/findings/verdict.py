@@ -52,6 +52,10 @@ LIKELY = 0.5
 SLIDES_FROM, CLAIMED = 0.5, 0.8
 """Share of sliding axles that leaves no doubt, and the probability from which something is claimed without them."""
 
+DOUBTS, UNDUMPED = 2.0, 3.0
+"""Errors of the brake by which less is used than it should give, from which axles slide that nobody sees; where a gauge
+would show that slide protection lets go of cylinders, and does not, sooner the brake is weak."""
+
 HELD_BACK = 3.0
 """Errors of the brake by which less is used than it should give, from which all axles may be held at some creep."""
 
@@ -119,7 +123,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
         return Regime.BRAKE_LIMITED if part > 1.0 - HELD_BACK * error else Regime.COASTING
     alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides
     dumped = memory.braking.told > 0.0 and (part < 1.0 - error or not alone)
-    if slides > CLAIMED and (part < 1.0 - 2.0 * error or dumped):
+    shows = memory.brake.gauged and config.pressure_kind != "demanded"
+    if slides > CLAIMED and (dumped or part < 1.0 - (UNDUMPED if shows else DOUBTS) * error):
         return Regime.ADHESION_LIMITED
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake
     weak = config.train.full_brake <= SLIPPERY  # a film may give what such a brake asks for, to within its error
