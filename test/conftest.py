@@ -43,7 +43,6 @@ try:
     from adhesion_node.core.bank import BANK
     from adhesion_node.core.estimator import warm_up
     from adhesion_node.core.methods import METHODS
-    from sim_node.real.plant.__main__ import mean
 except ModuleNotFoundError as error:
     missing = error.name or ""
     if missing.startswith(("adhesion_node", "sim_node")):
@@ -103,9 +102,7 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     """Compile the kernels once, before there are workers: in a fresh clone that takes longer than some tests wait."""
     if not hasattr(session.config, "workerinput"):
         with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
-            driven = pool.submit(mean, "tram_dry", 1)
             list(pool.map(warm_up, (Config(method=method, identify_noise=True) for method in (BANK, *METHODS))))
-            driven.result()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -161,7 +161,7 @@ def file_name(task: Task) -> str:
 
 
 def _is_kept(file: Path) -> bool:
-    """Whether a run is there, and whole: a power cut may have left a part of one."""
+    """Whether a run is there; one that is cut, as by a power cut, is not."""
     try:
         with file.open("rb") as stream, np.load(stream):
             return True

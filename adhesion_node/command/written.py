@@ -34,6 +34,6 @@ def require_folder(path: str, made: str | None) -> None:
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write a text into a file; bytes that are none, as of another file's name, are escaped."""
+    """Write a text into a file; bytes that are no text, as of another file's name, are escaped."""
     with naming(path):
         Path(path).write_text(text, encoding="utf-8", errors="backslashreplace")

@@ -13,6 +13,8 @@ after an install waits for the compiler. What is kept is told by the kernel's ow
 stands in that file, and is given every constant as an argument.
 """
 
+import hashlib
+import pickle
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any, TypeVar, cast
@@ -30,7 +32,7 @@ def kernel(function: Function) -> Function:
         compiled = njit(cache=True, error_model="numpy")(function)
         if hasattr(compiled, "_cache"):  # else numba is told to compile nothing
             compiled._cache._cache_file = _Files(compiled._cache._cache_file)
-    except RuntimeError:  # nothing can be written anywhere: each run compiles anew
+    except (RuntimeError, AttributeError):  # nothing can be written anywhere, or numba keeps otherwise: never kept
         compiled = njit(error_model="numpy")(function)
     return cast(Function, compiled)
 
@@ -38,13 +40,13 @@ def kernel(function: Function) -> Function:
 class _Files:
     """Numba's files of a kernel's code, without which every kernel works.
 
-    A power cut, a full disk or another user may leave files that cannot be read or written: the code is compiled anew.
-    Numba gives the code of a new version the name of the old one's, and lists it before it is written; whoever was
-    stopped in between left a list of the new version that led to the old code. So each code has a name of its own.
+    A power cut, a full disk or another user may leave files that cannot be read or written, or a part of the code: it
+    is compiled anew. Numba gives the code of a new version the name of the old one's, and lists it before it is
+    written; whoever was stopped in between left a list that led to the old code. So each code has a name of its own.
     """
 
     def __init__(self, files: Any) -> None:
-        self._files = files
+        self._files, self._dump = files, files._dump
         pattern = files._data_name_pattern
         files._data_name = lambda number: pattern.format(number=number).replace(".nbc", f".{uuid4().hex[:16]}.nbc")
 
@@ -55,15 +57,18 @@ class _Files:
     def load(self, key: Any) -> Any:
         """What is kept, None if nothing is."""
         try:
-            return self._files.load(key)
+            digest, content = self._files.load(key)
+            return pickle.loads(content) if hashlib.sha256(content).digest() == digest else None
         except Exception:  # of a file that is cut any may come
             return None
 
     def save(self, key: Any, data: Any) -> None:
         """Keep it, if that can be."""
-        try:
-            self._files.save(key, data)
-        except Exception:  # a list that is cut is begun anew
-            with suppress(OSError):
+        content = self._dump(data)
+        checked = hashlib.sha256(content).digest(), content
+        with suppress(OSError):
+            try:
+                self._files.save(key, checked)
+            except (EOFError, ValueError, pickle.UnpicklingError):  # a list that is cut is begun anew
                 self._files.flush()
-                self._files.save(key, data)
+                self._files.save(key, checked)

@@ -69,6 +69,16 @@ def test_files_that_a_power_cut_has_left_are_written_anew(tmp_path: Path, ending
     assert not [file for file in cut if file.read_bytes() == kept]
 
 
+def test_code_of_which_a_part_is_lost_is_compiled_anew(tmp_path: Path) -> None:
+    """A block of zeros in its midst: it was run."""
+    _used(tmp_path)
+    for file in tmp_path.rglob("*.nbc"):
+        content = bytearray(file.read_bytes())
+        content[len(content) // 3 : len(content) // 3 + 2000] = bytes(2000)
+        file.write_bytes(content)
+    _used(tmp_path)
+
+
 def test_a_kernel_works_where_the_disk_is_full(tmp_path: Path) -> None:
     """No file may have a byte: as on a full disk, an empty one can be made."""
     _used(tmp_path, "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))")

@@ -197,10 +197,12 @@ def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:
     swing, far = 0.0 if pressed and memory.brake.rising else None, BRAKED_FAR if pressed else SLOW_FAR
     memory = memory._replace(speeds=memory.speeds.after(*sample[:2], told, elapsed_s, swing, far))
     variance = memory.speeds.variance_of(told, elapsed_s) + SPEED_ERROR_MPS**2
-    seen = speed_seen(memory.bank, sample.speed_mps, variance)
-    std = np.sqrt(weighing.variances(seen.slope, memory.bank.covariance) + variance)
-    leaping, bank = memory.leaping.after(config, memory.bank, sample.t_ns, elapsed_s, seen.innovation, std)
-    return memory._replace(leaping=leaping, bank=bank).told(seen, fixes=2)
+    if not memory.misled:  # else it may be a sliding axle's, too, which leaps as it rolls again
+        seen = speed_seen(memory.bank, sample.speed_mps, variance)
+        std = np.sqrt(weighing.variances(seen.slope, memory.bank.covariance) + variance)
+        leaping, bank = memory.leaping.after(config, memory.bank, sample.t_ns, elapsed_s, seen.innovation, std)
+        memory = memory._replace(leaping=leaping, bank=bank)
+    return memory.told(speed_seen(memory.bank, sample.speed_mps, variance), fixes=2)
 
 
 def _felt(config: Config, memory: Memory, felt: Sequence[ImuSample], braking: Braking, elapsed_s: float) -> Memory:

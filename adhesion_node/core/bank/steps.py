@@ -93,9 +93,9 @@ class Stepping(NamedTuple):
     def tells(self, config: Config, measurement: Measurement, off: Foreseen) -> bool:
         """Whether a position so far off tells of an axle that slides.
 
-        Where another sensor tells the speed such an axle falls behind, and never runs ahead.
+        Where another sensor tells the speed with it such an axle falls behind, and never runs ahead.
         """
-        ahead = off.metres > 0.0 and bool(measurement.all_speeds or measurement.wheels)
+        ahead = off.metres > 0.0 and _is_aided(config, measurement)
         return not (ahead or self._may_be(config, measurement))
 
     def _may_be(self, config: Config, measurement: Measurement) -> bool:
@@ -109,7 +109,7 @@ class Stepping(NamedTuple):
         if self.off_m[-1] > 0.0:
             return True
         elapsed_s = (measurement.t_ns - self.since[0].t_ns) / S
-        if elapsed_s > SOON_S and not any(each.all_speeds or each.wheels for each in self.since):
+        if elapsed_s > SOON_S and not any(_is_aided(config, each) for each in self.since):
             return False
         bank, declared_m = self.before.bank, math.sqrt(measurement.variance_m2)
         white = float(bank.weight @ white_variance(bank, declared_m, self.before.coarse.std_m))
@@ -148,3 +148,8 @@ class Stepping(NamedTuple):
         for measurement in self.since:
             memory = followed(config, memory, measurement, rail)
         return memory, Stepping(stepped_m=self.since[-1].position_m, by_m=size_m)
+
+
+def _is_aided(config: Config, measurement: Measurement) -> bool:
+    """Whether another sensor tells the speed beside a position: an axle's own is that of the wheel that slides."""
+    return bool(measurement.wheels or (measurement.all_speeds and config.speed_source != "axle"))

@@ -60,8 +60,8 @@ HELD_BACK = 3.0
 """Errors of the brake by which less is used than it should give, from which all axles may be held at some creep."""
 
 SURGING = 2.0
-"""Times `used_ripple` by which the adhesion used may swing beside that where slide protection fills slowly or lets go
-of whole bogies. No sensor tells such swings from its own errors in time, so the bound allows for them on any train."""
+"""Times the ripple of this train by which the adhesion used may swing more where slide protection fills slowly or lets
+go of whole bogies. No sensor tells that from its own errors in time, so the bound allows for it on any train."""
 
 SPEED_ERROR = np.diag([0.0, SPEED_ERROR_MPS**2])
 
