@@ -57,7 +57,7 @@ class _Files:
     def load(self, key: Any) -> Any:
         """What is kept, None if nothing is."""
         try:
-            digest, content = self._files.load(key)
+            digest, content = self._files.load(key) or (b"", b"")
             return pickle.loads(content) if hashlib.sha256(content).digest() == digest else None
         except Exception:  # of a file that is cut any may come
             return None
@@ -66,9 +66,11 @@ class _Files:
         """Keep it, if that can be."""
         content = self._dump(data)
         checked = hashlib.sha256(content).digest(), content
-        with suppress(OSError):
-            try:
-                self._files.save(key, checked)
-            except (EOFError, ValueError, pickle.UnpicklingError):  # a list that is cut is begun anew
+        try:
+            self._files.save(key, checked)
+        except OSError:
+            return
+        except Exception:  # a list that is cut is begun anew
+            with suppress(OSError):
                 self._files.flush()
                 self._files.save(key, checked)

@@ -57,7 +57,7 @@ def test_what_is_compiled_is_kept_in_the_cache_that_is_named(tmp_path: Path) -> 
     assert {path.name.partition("-")[0] for path in tmp_path.rglob("*.nbi")} >= {"weighing.normalised"}
 
 
-@pytest.mark.parametrize(("ending", "kept"), [("nbi", b""), ("nbc", b""), ("nbc", bytes(500))])
+@pytest.mark.parametrize(("ending", "kept"), [("nbi", b""), ("nbi", bytes(500)), ("nbc", b""), ("nbc", bytes(500))])
 def test_files_that_a_power_cut_has_left_are_written_anew(tmp_path: Path, ending: str, kept: bytes) -> None:
     """They ended every later start."""
     _used(tmp_path)
