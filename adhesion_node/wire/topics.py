@@ -146,7 +146,10 @@ STATE = _result(
     "adhesion/state", "nav_msgs/msg/Odometry", results.ESTIMATED_STATE, "position and speed with their variances"
 )
 BRAKING_CURVE = _curve(
-    "adhesion/braking_curve", curves.SAFE, "full braking to standstill on `mu_lower`: 64 points, joint `train`"
+    "adhesion/braking_curve",
+    curves.SAFE,
+    "full braking to standstill, the safe curve: on what the way ahead surely gives, by methods of windows on "
+    "`mu_lower`; 64 points, joint `train`",
 )
 BRAKING_CURVE_NOMINAL = _curve("adhesion/braking_curve_nominal", curves.NOMINAL, "the same on μ̂")
 
