@@ -74,8 +74,8 @@ function drawWay() {
   const [passed, ...past] = columns(state.passed.filter((row) => row.position < (ahead?.x[0] ?? Infinity)), "position", Object.keys(LIMITS));
   const lines = Object.entries(LIMITS).map(([name, label], i) => ({ label, kind: name, x: [...passed, ...(ahead?.x ?? [])], y: [...past[i], ...(ahead?.[name] ?? [])] }));
   const [x, speed] = columns(state.history, "position", ["speed"]);
-  lines.push({ label: "run", kind: "run", x, y: speed }, { label: "by the lower bound", kind: "bound", ...(curves.safe ?? { x: [], y: [] }) },
-             { label: "by μ̂", kind: "nominal", ...(curves.nominal ?? { x: [], y: [] }) });
+  lines.push({ label: "run", kind: "run", x, y: speed }, { label: "safe curve", kind: "bound", ...(curves.safe ?? { x: [], y: [] }) },
+             { label: "nominal curve, by μ̂", kind: "nominal", ...(curves.nominal ?? { x: [], y: [] }) });
   const shown = [train?.speed ?? 0, ...past[3], ...speed].filter((y) => y !== null), marks = [];
   const ends = [here + 1000, limits?.target_m ?? here, ...(curves.nominal?.x.slice(-1) ?? [])];
   if (train !== null) marks.push({ x: here, y: train.speed, kind: "run", label: "" });

@@ -42,8 +42,8 @@ function extentAt(run, t) {
 function curveChart(run, moment, wide) {
   const lines = Object.entries(moment.limits === null ? {} : LIMITS).map(([kind, label]) => ({ label, kind, x: moment.limits.x, y: moment.limits[kind] }));
   lines.push({ label: `by the fixed ${fixedMu}`, kind: "fixed", ...fixedFrom(run, moment) }, { label: "what the train did", kind: "truth", ...run.path });
-  if (moment.safe) lines.push({ label: "safe: by the lower bound", kind: "bound", ...moment.safe });
-  if (moment.nominal) lines.push({ label: "by μ̂", kind: "nominal", ...moment.nominal });
+  if (moment.safe) lines.push({ label: "safe curve", kind: "bound", ...moment.safe });
+  if (moment.nominal) lines.push({ label: "nominal curve, by μ̂", kind: "nominal", ...moment.nominal });
   const from = extentAt(run, moment.t)[0] - 0.05 * wide;
   return { title: "Braking curves and limits at this time, km/h", x: { label: "position from the start, m", range: [from, from + 1.15 * wide] }, y: common(1), lines,
            marks: [{ x: moment.place, y: moment.speed, kind: "run", label: "" }] };
@@ -56,7 +56,7 @@ function readout(moment) {
   const saved = moment.saved_at_least, kept = saved >= 0 ? `saved at least ${number(saved, 0)} m` : `${number(-saved, 0)} m more than the fixed`;
   const claim = moment.kind === "prior" || saved === null ? "" : `, ${kept}`;
   return `${number(moment.speed, 1)} km/h, ${told(moment)}, at least ${number(moment.mu_lower, 4)}, ${moment.words}; ` +
-    `to ${target} km/h by μ̂ ${number(moment.distance, 0)} m, by the bound ${number(moment.longest, 0)} m${claim}`;
+    `to ${target} km/h by μ̂ ${number(moment.distance, 0)} m, by the safe curve ${number(moment.longest, 0)} m${claim}`;
 }
 
 const view = shared(() => { [slider.min, slider.max] = view.zoom ?? [0, longest]; }), sections = document.getElementById("runs");

@@ -88,13 +88,13 @@ def charts(run: Run, target_kmh: float, train: Train) -> Iterator[Chart]:
         *(f"{to_target}, m", 1),
         Line(worst, "fixed", Series(at, planned.fixed)),
         Line("true", "truth", true_way(run, target_kmh * KMH)),
-        Line("safe curve, by the lower bound", "bound", Series(at, planned.longest)),
+        Line("safe curve", "bound", Series(at, planned.longest)),
         Line("nominal curve, by μ̂", "nominal", Series(at, planned.identified)),
     )
     yield _chart(
         *(f"{to_target} saved, m", 1),
         Line(worst, "fixed", Series(at, np.zeros(at.size))),
-        Line("at least, by the lower bound", "bound", Series(at[seen], planned.saved_at_least[seen])),
+        Line("at least, by the safe curve", "bound", Series(at[seen], planned.saved_at_least[seen])),
         Line("by μ̂, where it is known", "nominal", Series(at[seen], planned.saved[seen])),
     )
 

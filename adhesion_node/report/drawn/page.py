@@ -124,7 +124,7 @@ def _recorded(run: Run) -> str:
 def _brakings(found: Mapping[str, Any]) -> str:
     """A row for each braking, whose button shows its first identified or first moment."""
     header = ("from", "km/h", "limited by", "μ̂ identified", "else μ ≥", "at least, at the end", "bound kept")
-    claims = ("rail changed", "fixed worst case", "saved at least, by every later bound")
+    claims = ("rail changed", "fixed worst case", "saved at least, by every later safe curve")
     body = ([_jump(row), *(escape(cell) for cell in _told(row))] for row in found["brakings"])
     return table_html([*header, *claims], body) if found["brakings"] else "<p>The train did not brake.</p>"
 
@@ -162,7 +162,7 @@ def _section(title: str, subjects: Sequence[Subject], write: Callable[[Subject],
 
 
 def _distances(subject: Subject, target_kmh: float) -> str:
-    header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "by bound m", f"fixed {FIXED_MU} m"]
+    header = ["km/h", "μ true", "μ̂", "at least", "true m", "by μ̂ m", "safe m", f"fixed {FIXED_MU} m"]
     body = list(rows(subject.run, target_kmh, subject.config.train, "–"))
     return table_html(shown(subject.run, header), body, "number") if body else f"<p>{escape(NO_ROWS)}</p>"
 

@@ -43,8 +43,8 @@ def bound_kept(run: Run, first: int, last: int) -> NDArray[np.bool_]:
 def row_of(run: Run, braking: Braking, planned: Distances, true_m: Series, target_mps: float) -> dict[str, Any]:
     """What a braking shows; None for what it cannot tell.
 
-    `saved_at_least_m` is what all bounds from the first identified estimate to the end of the braking leave of the way
-    that the fixed worst case needs from there; where the true way is known, no more than that leaves.
+    `saved_at_least_m` is what all safe curves from the first identified estimate to the end of the braking leave of the
+    way that the fixed worst case needs from there; where the true way is known, no more than that leaves.
     """
     own = slice(braking.first, braking.last + 1)
     times, speeds = run.speed.t_ns[own], np.abs(run.speed.values[own])

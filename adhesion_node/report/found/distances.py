@@ -35,7 +35,7 @@ class Distances(NamedTuple):
     identified: Array
     """By the nominal curves."""
     longest: Array
-    """By the safe curves: not exceeded, with the confidence of the bound."""
+    """By the safe curves: exceeded once in 1 / (1 − `curve_confidence`)."""
 
     @property
     def saved(self) -> Array:
@@ -44,7 +44,7 @@ class Distances(NamedTuple):
 
     @property
     def saved_at_least(self) -> Array:
-        """Saved at least, with the confidence of the bound."""
+        """Saved at least, by the safe curves."""
         return self.fixed - self.longest
 
 

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""The supervision limits over the distance, as ETCS draws them, by the lower bound and by the fixed worst case."""
+"""The supervision limits over the distance, as ETCS draws them, by the safe curve and by the fixed worst case."""
 
 from dataclasses import replace
 from typing import Any

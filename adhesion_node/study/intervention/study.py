@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""`study intervention`: where a train is braked by the identified adhesion, by its lower bound and by fixed values.
+"""`study intervention`: where a train is braked by its safe curve, by the identified adhesion and by fixed values.
 
 Replays the reference recordings offline and holds the braking curves of a few speeds against the limits of the ATP
 monitor: distances before the target at which the emergency brake intervenes (EBI), the service brake (SBI), the driver
@@ -76,14 +76,14 @@ def run(options: argparse.Namespace) -> tuple[list[dict[str, Any]], str]:
 
 
 def _draw(said: list[Prediction], place: Place) -> None:
-    """Draw the limits of the braking curve on the lower bound at 200 km/h."""
+    """Draw the limits of the safe curve at 200 km/h."""
     from .figure import draw
 
     last = _last(said, 200.0 * KMH)
     if last is None or last.safe is None:
         raise ValueError(f"figures = {place.path.parent}: there is no braking curve at 200 km/h to draw")
     fixed = braking.curve(CRH3, last.estimate.speed_mps, WORST)
-    title = f"Supervision limits by the lower bound of adhesion {last.estimate.mu_lower:.4f}"
+    title = "Supervision limits by the safe curve"
     draw(SupervisionConfig(), last.safe, fixed, title, place)
 
 
