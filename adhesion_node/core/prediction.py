@@ -8,6 +8,7 @@
 
 """What a consumer brakes by: an estimate with its two braking curves."""
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -17,11 +18,15 @@ from scipy.special import ndtri
 from .config import Config
 from .estimate import Estimate
 from .physics.adhesion import AdhesionLaw
-from .physics.braking import BrakingCurve, Slowdown, slowdown
+from .physics.braking import BrakingCurve, slowdown
 from .physics.train import Train
 
 LEAST_EFFICIENCY = 1e-3
 """A brake of which nothing may be counted on presses with so much of its force: a curve needs one."""
+
+
+REACH_S = 60.0
+"""Time of travel within which whoever brakes by a curve surely begins to: reactions and the build-up take less."""
 
 
 class Prediction(NamedTuple):
@@ -35,19 +40,16 @@ class Prediction(NamedTuple):
 
 
 def predict(config: Config, estimate: Estimate) -> Prediction:
-    """Braking curves from the estimate's speed on the least favourable resistance of the track ahead.
+    """Braking curves from the estimate's speed on the least favourable resistance of the way that they take.
 
     The safe curve holds the bound at its present value: on the published laws adhesion only rises while the train
     slows down. Its brake is that of the configured confidence. The nominal curve follows the identified law.
     """
-    ahead = abs(estimate.speed_mps), 0.0, config.track.least_resistance(estimate.position_m)
-    slowing = slowdown(config.train, *ahead)
+    bound = (_cautious(config), estimate.mu_lower) if estimate.ahead is None else (config.train, estimate.ahead)
     return Prediction(
         estimate,
-        _curve(slowdown(_cautious(config), *ahead), estimate.mu_lower)
-        if estimate.ahead is None
-        else _curve(slowing, estimate.ahead),
-        None if estimate.withheld else _curve(slowing, _expected(estimate)),
+        _curve(config, estimate, *bound),
+        None if estimate.withheld else _curve(config, estimate, config.train, _expected(estimate)),
     )
 
 
@@ -66,8 +68,17 @@ def _expected(estimate: Estimate) -> float | AdhesionLaw:
     return replace(shape, scale=shape.scale * max(estimate.mu, 1e-6) / now)
 
 
-def _curve(slowing: Slowdown, mu: float | AdhesionLaw) -> BrakingCurve | None:
-    try:
-        return slowing.curve(mu)
-    except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
-        return None
+def _curve(config: Config, estimate: Estimate, train: Train, mu: float | AdhesionLaw) -> BrakingCurve | None:
+    """The curve from here, or from wherever the train comes in `REACH_S` of travel.
+
+    A fall that begins beyond its end does not count, one on the way counts from here on.
+    """
+    speed_mps, here_m, curve, least = abs(estimate.speed_mps), estimate.position_m, None, math.inf
+    end_m = here_m + REACH_S * speed_mps
+    while (grade := config.track.least_resistance(here_m, end_m)) < least:
+        try:
+            curve = slowdown(train, speed_mps, 0.0, grade).curve(mu)
+        except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
+            return None
+        least, end_m = grade, here_m + REACH_S * speed_mps + float(curve.distance_m[-1])
+    return curve

@@ -22,7 +22,7 @@ import numpy as np
 from pyproj import Geod, Transformer
 from scipy.spatial import cKDTree
 
-from ..core.physics.track import Grade
+from ..core.physics.track import STEEPEST, Grade
 from ..core.physics.train import Array
 from .messages.refused import Reason, Rejected
 
@@ -32,11 +32,9 @@ PIECE_M = 100.0
 LIKELY_SIGMA = 3.0
 """Places that are further than the nearest one by less than so many standard deviations may be the true one."""
 
-SECTIONS_PER_TRAIN = 4
-"""Sections of the profile of grades on the length of a train."""
 
-STEEPEST = 0.15
-"""No railway on adhesion is steeper: the steepest climbs 0.135."""
+SECTIONS_PER_TRAIN = 2
+"""Sections of the profile of grades on the length of a train: shorter ones would be steep where heights are rough."""
 
 
 class Place(NamedTuple):
@@ -91,30 +89,23 @@ class TrackLine:
         return Place(float(along[best]), float(cross[best]), *_direction(way[best], latitude, longitude))
 
     def grades(self, train_length_m: float) -> tuple[Grade, ...]:
-        """The grades along the line, each the mean over the length of a train; none without heights.
+        """The grades along the line, each half as long as a train at most; none without heights.
 
         Raises ValueError naming the place of a grade that no railway has.
         """
         if self.height_m is None:
             return ()
         first, last = self.along_m[[0, -1]]
-        count = math.ceil((last - first) / (train_length_m / SECTIONS_PER_TRAIN))
-        ends = np.linspace(first, last, count + 1)
-        middle = (ends[:-1] + ends[1:]) / 2
-        tail, head = ((middle + side * train_length_m / 2).clip(first, last) for side in (-1, 1))
-        rise, way = (
-            np.diff([np.interp(where, self.along_m, self.height_m) for where in (tail, head)], axis=0),
-            head - tail,
-        )
-        slope = rise[0] / way
+        ends = np.linspace(first, last, math.ceil(SECTIONS_PER_TRAIN * (last - first) / train_length_m) + 1)
+        rises = np.diff(np.interp(ends, self.along_m, self.height_m))
+        slope = rises / np.diff(ends)
         worst = int(np.abs(slope).argmax())
         if abs(slope[worst]) > STEEPEST:
             raise ValueError(
-                f"{self.source}: rises {slope[worst]:.3f} m per m at {middle[worst]:.0f} m: "
+                f"{self.source}: rises {slope[worst]:.3f} m per m at {ends[worst : worst + 2].mean():.0f} m: "
                 f"no railway is steeper than {STEEPEST:g}: give heights in m, or none"
             )
-        steps = zip(ends[:-1], ends[1:], slope, strict=True)
-        return tuple(Grade(float(begin), float(end), float(each * (end - begin))) for begin, end, each in steps)
+        return tuple(Grade(*map(float, step)) for step in zip(ends[:-1], ends[1:], rises, strict=True))
 
 
 def line_of(source: str, latitude: Array, longitude: Array, height_m: Array | None, start_m: float) -> TrackLine:

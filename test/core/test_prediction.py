@@ -71,7 +71,7 @@ def test_more_adhesion_than_the_brake_uses_gives_no_shorter_curve() -> None:
     assert np.array_equal(prediction.safe.distance_m, prediction.nominal.distance_m)
 
 
-def test_the_least_resistance_ahead_counts() -> None:
+def test_the_least_resistance_on_the_way_counts() -> None:
     """At 1000 m: uphill behind and here, level further on, then 4 permille down with a tunnel that overlaps it."""
     sections = (
         Grade(-1000.0, 0.0, -20.0),
@@ -79,10 +79,37 @@ def test_the_least_resistance_ahead_counts() -> None:
         Grade(5000.0, 7000.0, -8.0),
         Tunnel(6000.0, 8000.0),
     )
-    for position_m, least in ((-500.0, -0.02), (0.0, -0.004), (1000.0, -0.004), (6999.0, -0.004 + 0.00026), (9e3, 0.0)):
+    for position_m, least in ((-500.0, -0.02), (1000.0, -0.004), (6999.0, -0.004 + 0.00026), (9e3, 0.0)):
         prediction = predict(config(*sections), estimate(position_m=position_m))
         assert prediction.safe is not None
         assert prediction.safe.deceleration_mps2 == pytest.approx((0.05 + least) * G), position_m
+
+
+@pytest.mark.parametrize(("begins_m", "least"), [(7250.0, -0.004), (7290.0, 0.0)])
+def test_a_fall_counts_that_begins_on_the_way_or_within_a_minute_of_travel(begins_m: float, least: float) -> None:
+    """On the level 60^2 / (2 0.05 9.8) = 3673 m, and 60 s at 60 m/s."""
+    prediction = predict(config(Grade(begins_m, begins_m + 2000.0, -8.0)), estimate())
+    assert prediction.safe is not None
+    assert prediction.safe.deceleration_mps2 == pytest.approx((0.05 + least) * G)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_wherever_in_a_minute_the_brake_is_applied_the_train_stops_within_the_curve(seed: int) -> None:
+    """On random hills; the oracle steps along the true grade under a train of 200 m, by 1 m."""
+    rng = np.random.default_rng(seed)
+    ends = np.concatenate([[-1e3], np.cumsum(rng.uniform(100.0, 3e3, 20))])
+    rises = rng.uniform(-0.03, 0.02, 20) * np.diff(ends)
+    heights = np.concatenate([[0.0], np.cumsum(rises)])
+    given = config(*(Grade(*map(float, one)) for one in zip(ends[:-1], ends[1:], rises, strict=True)))
+    prediction = predict(given, estimate(lower=0.05, position_m=500.0, speed_mps=40.0))
+    assert prediction.safe is not None
+    for begins_m in rng.uniform(500.0, 500.0 + 60.0 * 40.0, 5):
+        place, squared = float(begins_m), 40.0**2
+        while squared > 0.0:
+            front, rear = np.interp([place, place - 200.0], ends, heights)
+            squared -= 2.0 * G * (0.05 + (front - rear) / 200.0)
+            place += 1.0
+        assert place - begins_m <= prediction.safe.distance_m[-1] + 1.0
 
 
 def test_an_uphill_end_of_the_line_is_counted_on_only_when_it_lies_everywhere_ahead() -> None:
@@ -98,7 +125,7 @@ def test_a_downgrade_stronger_than_the_brake_has_no_curve() -> None:
     assert prediction.nominal is not None
     assert prediction.nominal.deceleration_mps2 == pytest.approx(0.02 * G)
     assert predict(steep, estimate(mu=0.06, lower=0.05))[1:3] == (None, None)
-    assert predict(steep, estimate(mu=0.06, lower=0.05, position_m=5000.0)).safe is not None
+    assert predict(steep, estimate(mu=0.06, lower=0.05, position_m=5200.0)).safe is not None
 
 
 def test_without_any_adhesion_the_resistance_alone_brakes() -> None:

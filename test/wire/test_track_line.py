@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 from pyproj import Geod
 
+from adhesion_node.core.physics.track import Track
 from adhesion_node.core.physics.train import Array
 from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.track_line import TrackLine, line_of
@@ -158,18 +159,16 @@ def test_a_narrow_loop_of_a_tram_is_no_second_place() -> None:
     assert placed(line, *beside(lat, lon, 67, 1.0, 0.0)) == pytest.approx(135.0, abs=0.1)
 
 
-def test_grades_are_means_over_the_length_of_the_train() -> None:
-    """A ramp of 10 per mille between 2 and 4 km: on it as it is, at its foot half of it under half the train."""
+def test_heights_tell_the_grade_under_the_train() -> None:
+    """A ramp of 10 per mille between 3 and 5 km; the oracle: by how much the front end is higher than the rear."""
     lat, lon = walked(46.5, 8.0, [70.0] * 600, 10.0)
     heights = np.clip((np.arange(601) * 10.0 - 2000.0) * 0.01, 0.0, 20.0)
-    line = line_of("line", lat, lon, heights, 1000.0)
-    grades = line.grades(400.0)
+    grades = line_of("line", lat, lon, heights, 1000.0).grades(400.0)
     assert (grades[0].start_m, grades[-1].end_m) == pytest.approx((1000.0, 7000.0), abs=1.0)
     assert sum(grade.rise_m for grade in grades) == pytest.approx(20.0, rel=0.01)
-    for grade in grades:
-        middle = (grade.start_m + grade.end_m) / 2
-        under = np.clip([middle - 200.0, middle + 200.0], 3000.0, 5000.0)
-        assert grade.resistance(400.0) == pytest.approx(0.01 * (under[1] - under[0]) / 400.0, abs=2e-5)
+    track, front = Track(grades, 400.0), np.arange(1500.0, 6900.0, 25.0)
+    rises = np.clip((front - 3000.0) * 0.01, 0.0, 20.0) - np.clip((front - 3400.0) * 0.01, 0.0, 20.0)
+    assert track.specific_resistance(front) == pytest.approx(rises / 400.0, abs=1.5e-3)
     assert line_of("line", lat, lon, None, 0.0).grades(400.0) == ()
 
 

@@ -8,12 +8,15 @@
 
 """Additional resistance along the track: grades, curves and tunnels, Xie et al. 2019, (7)-(10).
 
-All resistances are per weight (N/N), so that they do not depend on the train's mass.
+All resistances are per weight (N/N), so that they do not depend on the train's mass. A position is that of the front
+end. Grades and curves pull at every wagon that is on them, so they count in the mean over the length of the train.
 """
 
 import math
 from bisect import bisect_right
+from collections.abc import Iterator
 from dataclasses import astuple, dataclass, field, replace
+from itertools import pairwise
 from numbers import Real
 from typing import overload
 
@@ -31,12 +34,12 @@ class Grade:
     rise_m: float
 
     def resistance(self, train_length_m: float) -> float:
-        """Grade resistance h/l, N/N (8).
+        """Grade resistance h/l, N/N (8), with as much of it under the train as there can be.
 
-        >>> Grade(0.0, 2000.0, 10.0).resistance(200.0)
-        0.005
+        >>> Grade(0.0, 2000.0, 10.0).resistance(200.0), Grade(0.0, 100.0, 1.0).resistance(200.0)
+        (0.005, 0.005)
         """
-        return self.rise_m / (self.end_m - self.start_m)
+        return self.rise_m / max(self.end_m - self.start_m, train_length_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,9 @@ Section = Grade | Curve | Tunnel
 STEEPEST, TIGHTEST_M = 0.15, 10.0
 """Grade and radius of trams in Lisbon and Toronto, rounded outwards: beyond them a profile is a slip of the pen."""
 
+RAMP = 8
+"""Steps in which a grade or curve comes under a train, and leaves it."""
+
 MANY = 1000
 """Positions for which a look at their ends pays: most often they all lie between the same two borders."""
 
@@ -89,6 +95,8 @@ MANY = 1000
 @dataclass(frozen=True)
 class Track:
     """A track profile: sections may overlap; outside them the track is level, straight and open.
+
+    `train_length_m` is that of the train: a grade and a curve come under it, and leave it, in `RAMP` steps.
 
     Raises ValueError naming the section when it is none, does not end beyond its start, or is steeper or tighter than
     any train could pass.
@@ -98,7 +106,6 @@ class Track:
     train_length_m: float = 200.0
     _breaks: Array = field(init=False, repr=False, compare=False)
     _levels: Array = field(init=False, repr=False, compare=False)
-    _least: Array = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not (isinstance(self.train_length_m, Real) and 0.0 < self.train_length_m < math.inf):
@@ -118,15 +125,14 @@ class Track:
                     f"track section {section}: rises by {steep}, and trains climb {100.0 * STEEPEST:g} % at most: "
                     "rise_m is the height gained between both ends, in m"
                 )
-        ends = [end for s in self.sections for end in (s.start_m, s.end_m)]
-        breaks = np.unique(np.array(ends, dtype=np.float64))
+        pieces = [piece for section in self.sections for piece in _pieces(section, self.train_length_m)]
+        breaks = np.unique(np.array([end for start_m, end_m, _ in pieces for end in (start_m, end_m)], np.float64))
         levels = np.zeros(breaks.size + 1)
-        for s in self.sections:
-            first, last = breaks.searchsorted((s.start_m, s.end_m))
-            levels[first + 1 : last + 1] += s.resistance(self.train_length_m)
+        for start_m, end_m, resistance in pieces:
+            first, last = breaks.searchsorted((start_m, end_m))
+            levels[first + 1 : last + 1] += resistance
         object.__setattr__(self, "_breaks", breaks)
         object.__setattr__(self, "_levels", levels)
-        object.__setattr__(self, "_least", np.minimum.accumulate(levels[::-1])[::-1])
 
     @overload
     def specific_resistance(self, position_m: float) -> float: ...
@@ -135,7 +141,7 @@ class Track:
     def specific_resistance(self, position_m: Array) -> Array: ...
 
     def specific_resistance(self, position_m: float | Array) -> float | Array:
-        """Sum of grade, curve and tunnel resistance R2/(M g), N/N, at each position (7)."""
+        """Sum of grade, curve and tunnel resistance R2/(M g), N/N, with the front end at each position (7)."""
         if isinstance(position_m, float):
             return float(self._levels[bisect_right(self._breaks, position_m)])
         if not self.sections:
@@ -160,9 +166,33 @@ class Track:
         gaps = [max(s.start_m - most_m, 0.0) or min(s.end_m - least_m, 0.0) for s in self.sections]
         return min(gaps, key=abs, default=0.0)
 
-    def least_resistance(self, from_m: float) -> float:
-        """Smallest resistance, N/N, that the track has at or beyond a position: what a braking curve may count on."""
-        return float(self._least[self._breaks.searchsorted(from_m, side="right")])
+    def least_resistance(self, from_m: float, to_m: float) -> float:
+        """Smallest resistance, N/N, between two positions: what a braking curve over them may count on."""
+        first, last = self._breaks.searchsorted((from_m, to_m), side="right")
+        return float(self._levels[first : last + 1].min())
+
+
+def _pieces(section: Section, train_m: float) -> Iterator[tuple[float, float, float]]:
+    """Begin, end and resistance, N/N, of what the front end passes while a section is under the train.
+
+    >>> list(_pieces(Tunnel(0.0, 1000.0), 200.0))
+    [(0.0, 1000.0, 0.00013)]
+    >>> first, *_, last = sorted(_pieces(Grade(0.0, 1000.0, 16.0), 200.0), key=lambda piece: piece[0])
+    >>> first, last
+    ((0.0, 25.0, 0.001), (1175.0, 1200.0, 0.001))
+    """
+    most, length_m = section.resistance(train_m), section.end_m - section.start_m
+    if isinstance(section, Tunnel):
+        yield section.start_m, section.end_m, most
+    elif most:
+        ramp = np.linspace(0.0, min(length_m, train_m), RAMP + 1)
+        leaving_m = section.start_m + max(length_m, train_m)
+        for step, (begin_m, end_m) in enumerate(pairwise(ramp.tolist())):
+            part = (step + 0.5) / RAMP
+            yield section.start_m + begin_m, section.start_m + end_m, part * most
+            yield leaving_m + begin_m, leaving_m + end_m, (1.0 - part) * most
+        if leaving_m > section.start_m + ramp[-1]:
+            yield section.start_m + float(ramp[-1]), leaving_m, most
 
 
 def _turned(section: Section) -> Section:

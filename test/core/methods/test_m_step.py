@@ -36,7 +36,7 @@ def gradient(expected: Expectation, mu: float) -> float:
     return float(np.sum(expected.weight * (expected.used - mu), where=expected.limit > mu))
 
 
-@pytest.mark.parametrize("track", [LEVEL, Track((Grade(0.0, 1000.0, 1.0),))], ids=["level", "grade"])
+@pytest.mark.parametrize("track", [LEVEL, Track((Grade(-1000.0, 1000.0, 2.0),))], ids=["level", "grade"])
 @pytest.mark.parametrize("mu", [0.0, 0.03, 0.05, 0.08, 0.2])
 def test_gradient_29_to_32_is_the_slope_of_i2(mu: float, track: Track) -> None:
     """At the start's mu and elsewhere, below, between and above the brakes of the steps."""

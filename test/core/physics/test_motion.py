@@ -45,7 +45,7 @@ def test_step_2_3_while_the_brake_limits() -> None:
 def test_equation_5_adds_the_track_to_the_train() -> None:
     motion = Motion(CRH3, Track((Grade(0.0, 1000.0, 5.0), Tunnel(500.0, 1000.0))), Q_S, Q_V)
     # 0.01306 alone; + 0.005; + 0.005 + 0.00013e-3 x 500
-    assert motion.resistance(np.array([-1.0, 1.0, 600.0]), V300) == pytest.approx([0.01306, 0.01806, 0.018125])
+    assert motion.resistance(np.array([-1.0, 201.0, 600.0]), V300) == pytest.approx([0.01306, 0.01806, 0.018125])
     _, v = motion.advance(np.array(600.0), V300, 0.1, 0.0952, 0.0726)
     assert float(v) == pytest.approx(83.3333333333 - 0.98 * (0.0726 + 0.018125), abs=1e-9)
 

@@ -41,34 +41,53 @@ def test_equation_10_tunnel() -> None:
 
 def test_equation_7_adds_overlapping_sections() -> None:
     grade, curve, tunnel = Grade(0.0, 1000.0, 5.0), Curve(500.0, 1500.0, 4800.0, 12.0), Tunnel(800.0, 1200.0)
-    track = Track((tunnel, grade, curve))
+    track = Track((tunnel, grade, curve), train_length_m=80.0)  # on grade and curve in steps of 10 m
     # 5/1000 = 0.005; 0.6/4800 = 0.000125; 0.00013e-3 x 400 = 0.000052
-    positions = np.array([-1.0, 0.0, 499.9, 500.0, 800.0, 999.9, 1000.0, 1199.9, 1200.0, 1499.9, 1500.0, 1e6])
+    positions = np.array([-1.0, 80.0, 499.9, 580.0, 800.0, 999.9, 1080.0, 1199.9, 1200.0, 1499.9, 1580.0, 1e6])
     expected = [0, 0.005, 0.005, 0.005125, 0.005177, 0.005177, 0.000177, 0.000177, 0.000125, 0.000125, 0, 0]
     assert track.specific_resistance(positions) == pytest.approx(np.array(expected), abs=1e-15)
     assert track.specific_resistance(positions.reshape(3, 4)).shape == (3, 4)
 
 
+@pytest.mark.parametrize(
+    ("section", "per_wagon"),
+    [
+        (Grade(300.0, 2300.0, -16.0), -0.008),
+        (Grade(300.0, 400.0, 1.0), 0.01),
+        (Curve(300.0, 2300.0, 600.0, 191.0), 0.001),
+        (Curve(300.0, 400.0, 600.0, 9.54), 0.0010017),  # (9), of so short a one, is what the wagons on it feel
+    ],
+)
+def test_a_grade_and_a_curve_count_by_the_wagons_that_are_on_them(section: Section, per_wagon: float) -> None:
+    """The oracle adds up a train of 4000 wagons behind the front end; steps of an eighth are off by a sixteenth."""
+    track, behind = Track((section,), train_length_m=400.0), np.linspace(0.0, 400.0, 4001)
+    for front in np.linspace(200.0, 2900.0, 271):
+        on = np.mean((front - behind >= section.start_m) & (front - behind < section.end_m))
+        assert track.specific_resistance(float(front)) == pytest.approx(per_wagon * on, abs=abs(per_wagon) / 15)
+    steps = track.specific_resistance(np.arange(0.05, 4000.0, 0.1))
+    assert 0.1 * steps.sum() == pytest.approx(per_wagon * (section.end_m - section.start_m), rel=1e-3)
+
+
 def test_equal_sections_count_twice_and_shared_ends_once() -> None:
-    twice = Track((Grade(0.0, 100.0, 1.0), Grade(0.0, 100.0, 1.0)))
-    assert float(twice.specific_resistance(np.array(50.0))) == pytest.approx(0.02)
-    chain = Track((Grade(0.0, 100.0, 1.0), Grade(100.0, 200.0, 2.0)))
-    assert chain.specific_resistance(np.array([99.9, 100.0])) == pytest.approx([0.01, 0.02])
+    twice = Track((Grade(0.0, 300.0, 3.0), Grade(0.0, 300.0, 3.0)))
+    assert float(twice.specific_resistance(np.array(250.0))) == pytest.approx(0.02)
+    chain = Track((Grade(0.0, 300.0, 3.0), Grade(300.0, 600.0, 6.0)))
+    assert chain.specific_resistance(np.array([299.9, 500.0])) == pytest.approx([0.01, 0.02])
 
 
-def test_profile_equals_the_sum_over_sections_at_random_places() -> None:
+def test_the_least_resistance_is_that_of_all_places_between() -> None:
     rng = np.random.default_rng(1)
     sections: list[Section] = []
     for start, length, kind in zip(rng.uniform(0, 5e3, 30), rng.uniform(10, 2e3, 30), range(30), strict=True):
         end = float(start + length)
-        choice: tuple[Section, ...] = (Grade(start, end, 3.0), Curve(start, end, 900.0, 5.0), Tunnel(start, end))
+        choice: tuple[Section, ...] = (Grade(start, end, -1.0), Curve(start, end, 900.0, 5.0), Tunnel(start, end))
         sections.append(choice[kind % 3])
     track, places = Track(tuple(sections)), rng.uniform(-100, 8e3, 500)
-    plain = [sum(s.resistance(200.0) for s in sections if s.start_m <= x < s.end_m) for x in places]
-    assert track.specific_resistance(places) == pytest.approx(np.array(plain), abs=1e-14)
-    for x in (-50.0, 1234.0, 7900.0):
-        ahead = np.linspace(x, 9e3, 200_001)
-        assert track.least_resistance(x) == pytest.approx(float(track.specific_resistance(ahead).min()), abs=1e-14)
+    alone = np.sum([Track((section,)).specific_resistance(places) for section in sections], axis=0)
+    assert track.specific_resistance(places) == pytest.approx(alone, abs=1e-14)
+    for x, end in ((-50.0, 9e3), (1234.0, 1300.0), (3000.0, 4500.0), (7900.0, 9e3)):
+        between = np.linspace(x, end, 200_001)
+        assert track.least_resistance(x, end) == pytest.approx(track.specific_resistance(between).min(), abs=1e-14)
 
 
 @pytest.mark.parametrize("middle_m", [400.0, 800.0, 1200.0])
@@ -83,10 +102,11 @@ def test_many_places_at_once_are_each_in_their_section(middle_m: float) -> None:
 def test_level_line_and_least_resistance() -> None:
     assert LEVEL.specific_resistance(np.array([0.0, 1.0])).tolist() == [0.0, 0.0]
     hill = Track((Grade(0.0, 1000.0, -10.0), Grade(1000.0, 2000.0, 10.0)))
-    assert hill.least_resistance(-5.0) == pytest.approx(-0.01)
-    assert hill.least_resistance(999.0) == pytest.approx(-0.01)
-    assert hill.least_resistance(1000.0) == 0.0  # the level line behind the climb
-    assert LEVEL.least_resistance(0.0) == 0.0
+    assert hill.least_resistance(-5.0, 2e3) == pytest.approx(-0.01)
+    assert hill.least_resistance(-5.0, -1.0) == 0.0
+    assert -0.01 < hill.least_resistance(1050.0, 2e3) < 0.0  # the rear is still on the fall
+    assert hill.least_resistance(1200.0, 3e3) == 0.0  # the level line behind the climb
+    assert LEVEL.least_resistance(0.0, 1e3) == 0.0
 
 
 def test_parses_a_text() -> None:

@@ -112,8 +112,8 @@ def test_the_track_is_built_for_the_train() -> None:
         Tunnel(1000.0, 3000.0),
     )
     assert track.train_length_m == 400.0
-    # At 600 m: -10/2000 downhill and, shorter than the train, the curve's 0.0105 * 12/400.
-    (resistance,) = track.specific_resistance(np.array([600.0]))
+    # At 800 m: -10/2000 downhill and, shorter than the train and under it, the curve's 0.0105 * 12/400.
+    (resistance,) = track.specific_resistance(np.array([800.0]))
     assert resistance == pytest.approx(-0.005 + 0.0105 * 12 / 400)
 
 

@@ -95,9 +95,7 @@ class Solved(NamedTuple):
 
 @kernel
 def _resistance(given: Given, s: float, v: float) -> float:
-    section = 0
-    while section < given.breaks.size and s >= given.breaks[section]:
-        section += 1
+    section = np.searchsorted(given.breaks, s, side="right")
     c = given.resistance
     return float(c[0] + v * (c[1] + c[2] * v) + given.levels[section])
 
