@@ -245,10 +245,11 @@ def _pressures(config: Config, brake: BrakeSeen, measurement: Measurement) -> tu
 
 def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> Braking:
     """What the brake does from now on."""
-    share, held = memory.wheels.share(now_ns), memory.wheels.share(now_ns, FILLED_NS)
+    wheels = memory.wheels
+    share, held = wheels.share(now_ns), wheels.share(now_ns, FILLED_NS)
     applied = config.train.specific_brake(brake.applied_pa)
     sliding = held if held is not None and held >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
     fills = config.pressure_kind == "demanded" and brake.applied_pa < brake.demanded_pa
     filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
-    slid = told(share, brake.has_slid(now_ns), memory.wheels.fell(now_ns))
+    slid = told(share, brake.has_slid(now_ns), wheels.fell(now_ns), wheels.one_rolls(now_ns))
     return Braking(applied, sliding, brake.rising, slid, filling)

@@ -49,13 +49,16 @@ def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> motio
     free = _lasts_s(bank.kind) > 0.0
     slides = SLIDES[bank.kind] & ((rail < needed) | (braking.told > 0.0))
     sliding = np.where(slides, braking.share, 0.0)
+    loose = slides & (needed > 1.5 * rail)  # what rolls is hardly pressed
+    by_rail = sliding + np.where(loose, 1.5 * (1.0 - sliding), 0.0)
     slope = np.zeros(mean.shape)
-    slope[:, MU] = np.where(free, 1.0, sliding * (1.0 + mean[:, ROUGH]))
-    slope[:, ROUGH] = sliding * mean[:, MU]
-    held = np.where(free, 0.0, (1.0 - sliding) / (1.0 + rotating))
+    slope[:, MU] = np.where(free, 1.0, by_rail * (1.0 + mean[:, ROUGH]))
+    slope[:, ROUGH] = by_rail * mean[:, MU]
+    held = np.where(free | loose, 0.0, (1.0 - sliding) / (1.0 + rotating))
     slope[:, BRAKE] = held * braking.applied
     slope[:, SPEED] = -held * rotating * config.train.resistance_slope(mean[:, SPEED])
-    return motion.Use(np.where(free, mean[:, MU], sliding * rail + (1.0 - sliding) * needed), slope, slides, resisting)
+    value = by_rail * rail + np.where(loose, 0.0, (1.0 - sliding) * needed)
+    return motion.Use(np.where(free, mean[:, MU], value), slope, slides, resisting)
 
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:

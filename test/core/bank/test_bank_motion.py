@@ -36,7 +36,8 @@ LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
 BRAKINGS = [
     pytest.param(Braking(FULL), id="full"),
     pytest.param(Braking(0.4 * FULL), id="less than the rail gives"),
-    pytest.param(Braking(FULL, share=0.4), id="four of ten axles slide"),
+    pytest.param(Braking(FULL, share=0.4), id="four of ten axles slide, and the rest are hardly pressed"),
+    pytest.param(Braking(0.7 * FULL, share=0.4), id="four of ten axles slide"),
     pytest.param(Braking(0.4 * FULL, told=4.0), id="wheels tell of sliding"),
     pytest.param(Braking(0.0), id="released"),
 ]
@@ -57,8 +58,12 @@ def rate(x: Array, label: tuple[int, int, int], braking: Braking, rotating: floa
     v, mu, rough, brake, grade = x[SPEED], x[MU], x[ROUGH], x[BRAKE], x[GRADE]
     r = float(specific_resistance(np.array(v))) + RISE
     held = (brake * braking.applied - rotating * r) / (1.0 + rotating)
-    share = braking.share if slides else 0.0
-    used = mu if kind in FREE_S else share * mu * (1.0 + rough) + (1.0 - share) * held
+    share = braking.share
+    used = held
+    if kind in FREE_S:
+        used = mu
+    elif slides:  # those that roll bear half as much more at most, on cleaned rail
+        used = share * mu * (1.0 + rough) + (1.0 - share) * min(held, 1.5 * mu * (1.0 + rough))
     slowing = 9.8 * (used + r + grade)
     result = np.zeros(SIZE)
     result[POSITION], result[SPEED] = v, -slowing

@@ -88,7 +88,8 @@ def test_an_accelerometer_with_pitch_and_bias(share: float, rising: bool, fillin
     def felt(x: Array, index: int, resisting: float) -> tuple[float, float]:
         held = x[BRAKE] * FULL
         rail = x[MU] * (1.0 + x[ROUGH])
-        used = (x[MU], held, share * rail + (1 - share) * held, share * rail + (1 - share) * held)[index]
+        some = share * rail + (1 - share) * min(held, 1.5 * rail)
+        used = (x[MU], held, some, some)[index]
         return -(used + resisting) * (1.0 + x[PITCH]) + x[BIAS], used
 
     rows = []

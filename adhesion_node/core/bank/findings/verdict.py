@@ -54,7 +54,8 @@ SLIDES_FROM, CLAIMED = 0.5, 0.8
 
 DOUBTS, UNDUMPED = 2.0, 3.0
 """Errors of the brake by which less is used than it should give, from which axles slide that nobody sees; where a gauge
-would show that slide protection lets go of cylinders, and does not, sooner the brake is weak."""
+would show that slide protection lets go of cylinders, and does not, or a single axle is heard and rolls, sooner the
+brake is weak."""
 
 HELD_BACK = 3.0
 """Errors of the brake by which less is used than it should give, from which all axles may be held at some creep."""
@@ -123,7 +124,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
         return Regime.BRAKE_LIMITED if part > 1.0 - HELD_BACK * error else Regime.COASTING
     alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides
     dumped = memory.braking.told > 0.0 and (part < 1.0 - error or not alone)
-    shows = memory.brake.gauged and config.pressure_kind != "demanded"
+    gauge = memory.brake.gauged and config.pressure_kind != "demanded"
+    shows = gauge or memory.wheels.one_rolls(memory.t_ns)
     if slides > CLAIMED and (dumped or part < 1.0 - (UNDUMPED if shows else DOUBTS) * error):
         return Regime.ADHESION_LIMITED
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake

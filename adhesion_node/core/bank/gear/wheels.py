@@ -60,8 +60,9 @@ LEARNING_MPS = 5.0
 BRAKE_BELOW = 0.05
 """Share of sliding axles below which the brake limits."""
 
-SOME_SLIDE, TOLD = 0.25, 4.0
-"""Share of sliding axles from which adhesion limits, and the log odds per second by which wheels tell which does."""
+SOME_SLIDE, TOLD, HINTED = 0.25, 4.0, 1.0
+"""Share of sliding axles from which adhesion limits, and the log odds per second by which wheels tell which does, and
+a single one that rolls: protection may hold just this one at a small creep, or keep its brake released."""
 
 RISEN = 1.02
 """Times its lowest speed from which the fastest rim has risen, more than by noise."""
@@ -209,23 +210,34 @@ class WheelsSeen(NamedTuple):
 
     def share(self, now_ns: int, late_ns: int = SLID_NS) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
-        if not self.slid_ns:
+        slid, rolled = self._seen(now_ns, late_ns)
+        known = sum(one or other for one, other in zip(slid, rolled, strict=True))
+        if not known or 2 * known < len(slid) or (known == 1 and not any(slid)):
             return None
+        return sum(slid) / known
+
+    def one_rolls(self, now_ns: int) -> bool:
+        """Whether a single axle is known of, and has not slid of late."""
+        slid, rolled = self._seen(now_ns, SLID_NS)
+        return sum(rolled) == 1 and not any(slid)
+
+    def _seen(self, now_ns: int, late_ns: int) -> tuple[list[bool], list[bool]]:
+        """Which axles have slid of late, and which roll."""
         counts_ns = at_least(late_ns, SLID_SAMPLES, self.every_ns)
         slid = [each is not None and now_ns - each < counts_ns for each in self.slid_ns]
-        rolled = [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
-        known = sum(one or other for one, other in zip(slid, rolled, strict=True))
-        return sum(slid) / known if known and 2 * known >= len(slid) else None
+        return slid, [each is not None and now_ns - each < FRESH_NS for each in self.rolled_ns]
 
 
-def told(share: float | None, dumping: bool, fell: bool = False) -> float:
+def told(share: float | None, dumping: bool, fell: bool = False, one_rolls: bool = False) -> float:
     """Log odds per second by which axles are known to slide: wheels say it, else the dumps of the slide protection.
 
     >>> told(0.8, False), told(0.0, False), told(None, True), told(None, False), told(0.8, False, fell=True)
     (4.0, -4.0, 4.0, 0.0, 8.0)
+    >>> told(None, True, one_rolls=True), told(None, False, one_rolls=True)
+    (4.0, -1.0)
     """
     if fell:
         return FALLS
     if share is None:
-        return TOLD if dumping else 0.0
+        return TOLD if dumping else -HINTED if one_rolls else 0.0
     return TOLD if share >= SOME_SLIDE else -TOLD if share < BRAKE_BELOW else 0.0

@@ -33,6 +33,9 @@ LEAST_MU = 0.03
 """Adhesion drifts in proportion to itself, from this on: else one that was believed to be 0 would stay so."""
 LEAST_MPS = 0.1
 """What fades along the way fades as if the train were so fast at least: it may be, where it is believed to stand."""
+BEARS = 1.5
+"""Times as much as the sliding axles those that roll may use, on rail that is cleaned before them. One that is pressed
+with more and rolls is isolated, or its protection has let go of it."""
 POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, RADIUS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10, 11
 
 
@@ -88,9 +91,7 @@ def _basic(model: Model, v: float) -> float:
 
 @kernel
 def _resistance(model: Model, s: float, v: float) -> float:
-    section = 0
-    while section < model.breaks.size and s >= model.breaks[section]:
-        section += 1
+    section = np.searchsorted(model.breaks, s, side="right")
     return float(_basic(model, v) + model.levels[section])
 
 
@@ -112,6 +113,9 @@ def _used(
     rail = x[MU] * (1.0 + x[ROUGH])
     slides = model.kinds[kind, 0] > 0.0 and (rail < needed or step.told > 0.0)
     f = step.share if slides else 0.0
+    if slides and needed > BEARS * rail:
+        whole = f + (1.0 - f) * BEARS
+        return whole * rail, slides, whole * (1.0 + x[ROUGH]), whole * x[MU], 0.0, 0.0
     held = (1.0 - f) / (1.0 + rotating)
     by_speed = -held * rotating * (model.resistance[1] + 2.0 * model.resistance[2] * x[SPEED])
     return f * rail + (1.0 - f) * needed, slides, f * (1.0 + x[ROUGH]), f * x[MU], held * step.applied, by_speed
