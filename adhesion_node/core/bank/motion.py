@@ -36,10 +36,8 @@ from .layout import BRAKE, POSITION, SPEED, Bank, Mask
 if TYPE_CHECKING:
     from ..config import Config
 
-BUILDING_UP, FILLING = 0.3, 0.2
-"""Error of the brake's force, relative. While it is applied harder: of the speed over 1 s, and as an accelerometer
-feels it. While cylinders fill, over what they will press with, as how they fill nobody tells: of the speed over 1 s; an
-accelerometer feels it by the first, as it lasts."""
+STRONGER, LEAST_BRAKE_ERROR = 2.0, 0.1
+"""Errors of the brake, of such a size at least, by which the train is braked harder than by what is known to press."""
 
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""
@@ -166,8 +164,7 @@ def model_of(config: Config) -> moving.Model:
         rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2, RADIUS_DRIFT**2]),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),
-        building_up=BUILDING_UP,
-        filling=FILLING,
+        strongest=1.0 + STRONGER * max(config.brake_error, LEAST_BRAKE_ERROR),
     )
 
 

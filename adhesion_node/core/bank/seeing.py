@@ -18,9 +18,10 @@ from scipy.special import ndtr
 
 from ..physics.train import GRAVITY, Array
 from .kernels import weighing
+from .kernels.moving import BUILDING_UP
 from .labels.kinds import SLIDES
 from .layout import BIAS, BRAKE, MU, PITCH, ROUGH, SCALE, SPEED, Bank
-from .motion import BUILDING_UP, Braking, resistance, rolling_use, use
+from .motion import Braking, resistance, rolling_use, use
 
 if TYPE_CHECKING:
     from ..config import Config

@@ -16,6 +16,7 @@ import numpy as np
 
 from adhesion_node.core.bank import motion
 from adhesion_node.core.bank.kernels import moving
+from adhesion_node.core.bank.kernels.moving import BUILDING_UP, FILLING
 from adhesion_node.core.bank.labels import kinds, noises
 from adhesion_node.core.bank.labels.kinds import KINDS, SLIDES
 from adhesion_node.core.bank.labels.laws import laws_of
@@ -69,9 +70,11 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     slower = speed - dt_s * GRAVITY * (used.value + resisting + mean[:, GRADE])
     lasting, noise = _lasting(config, bank, slower, dt_s, declared_m)
     if braking.rising:
-        noise[:, SPEED] += np.square(motion.BUILDING_UP * GRAVITY * used.value) * dt_s
+        noise[:, SPEED] += np.square(BUILDING_UP * GRAVITY * used.value) * dt_s
     held = used.slope[:, BRAKE] > 0.0
-    noise[:, SPEED] += np.square(motion.FILLING * GRAVITY * held * mean[:, BRAKE] * braking.filling) * dt_s
+    strong = (braking.applied > 0.0) & (mean[:, BRAKE] > 1.0 + 2.0 * max(config.brake_error, 0.1))
+    noise[:, BRAKE] += 0.1**2 * strong * dt_s
+    noise[:, SPEED] += np.square(FILLING * GRAVITY * held * mean[:, BRAKE] * braking.filling) * dt_s
     means = mean * lasting
     means[:, SPEED] = slower
     means[:, POSITION] = mean[:, POSITION] + 0.5 * dt_s * (speed + slower)

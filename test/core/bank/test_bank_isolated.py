@@ -24,7 +24,7 @@ USED, CUT_OUT, AXLES = 0.027, 2, 12
 
 @pytest.mark.parametrize("seed", range(4))
 def test_axles_that_roll_on_leaves_are_not_thought_to_hold_the_train(seed: int) -> None:
-    """Were they braked with all that is demanded they would use 0.017 of the 0.027, and an unknown grade hid the rest."""
+    """Braked with all that is demanded they would use 0.017 of the 0.027, and an unknown grade would hide it."""
     rng, state, speed, place = np.random.default_rng(seed), init(CONFIG, 1), 25.0, 0.0
     told: list[tuple[float, float]] = []
     for tick in range(700):

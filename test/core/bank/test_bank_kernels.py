@@ -28,7 +28,7 @@ from adhesion_node.core.bank.findings.ahead import FAILS, counted_on, quantiles
 from adhesion_node.core.bank.kernels import parabola, weighing
 from adhesion_node.core.bank.labels.kinds import GROWTH, HELD, KINDS, PASSING, SLIDES
 from adhesion_node.core.bank.labels.noises import NOISES
-from adhesion_node.core.bank.layout import Bank
+from adhesion_node.core.bank.layout import BRAKE, Bank
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
@@ -70,6 +70,14 @@ def test_a_step(config: Config, braking: Braking) -> None:
     ours, theirs = (form.use(config, BANK, braking, resisting) for form in (motion, by_numpy))
     for one, other in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
+
+
+@pytest.mark.parametrize("applied", [0.0, FULL])
+def test_a_brake_that_is_stronger_than_it_can_be(applied: float) -> None:
+    mean = BANK.mean.copy()
+    mean[::2, BRAKE] = 1.4
+    strong, braking = BANK._replace(mean=mean), Braking(applied)
+    check(motion.moved(Config(), strong, 0.1, braking, 1.0), by_numpy.moved(Config(), strong, 0.1, braking, 1.0))
 
 
 def test_a_speed_below_0_and_a_standstill() -> None:

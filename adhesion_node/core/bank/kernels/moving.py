@@ -24,7 +24,7 @@ Mask = NDArray[np.bool_]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 """A bank as a plain tuple, as the next two are: one with names takes numba 20 times as long to look at."""
 ModelNumbers = tuple[
-    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, float, float, float, float
+    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, float, float, float
 ]
 StepNumbers = tuple[float, float, float, bool, float, float, float]
 
@@ -36,6 +36,13 @@ LEAST_MPS = 0.1
 BEARS = 1.5
 """Times as much as the sliding axles those that roll may use, on rail that is cleaned before them. One that is pressed
 with more and rolls is isolated, or its protection has let go of it."""
+BUILDING_UP, FILLING = 0.3, 0.2
+"""Error of the brake's force, relative. While it is applied harder: of the speed over 1 s, and as an accelerometer
+feels it. While cylinders fill, over what they will press with, as how they fill nobody tells: of the speed over 1 s; an
+accelerometer feels it by the first, as it lasts."""
+OPENS = 0.1
+"""Standard deviation per root of a second of the brake's force where it is more than the known brake can give: another
+one is at work, which no gauge shows, and nothing is known of that."""
 POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, RADIUS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10, 11
 
 
@@ -67,8 +74,8 @@ class Model(NamedTuple):
     """Variances per second of position, brake, bias and radius."""
     grade_error: float
     resistance_error: float
-    building_up: float
-    filling: float
+    strongest: float
+    """Part of the expected brake force beyond which another brake is at work."""
 
 
 class Step(NamedTuple):
@@ -122,6 +129,12 @@ def _used(
 
 
 @kernel
+def _opened(model: Model, step: Step, brake: float) -> float:
+    """Variance per second of the brake's force that is another one's."""
+    return OPENS**2 if step.applied > 0.0 and brake > model.strongest else 0.0
+
+
+@kernel
 def used(
     model_numbers: ModelNumbers, bank: Columns, resisting: Array, step_numbers: StepNumbers
 ) -> tuple[Array, Array, Mask]:
@@ -147,8 +160,7 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
     means, covariances = np.empty_like(mean), np.empty_like(covariance)
     lasting, added = np.ones(SIZE), np.zeros(SIZE)
     fall, by_fall, by_way = np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
-    added[POSITION], added[BRAKE] = dt * model.rates[0], dt * model.rates[1]
-    added[BIAS], added[RADIUS] = dt * model.rates[2], dt * model.rates[3]
+    added[POSITION], added[BIAS], added[RADIUS] = dt * model.rates[0], dt * model.rates[2], dt * model.rates[3]
     for h in range(kind.size):
         x, p, k = mean[h], covariance[h], kind[h]
         v, n = x[SPEED], model.noises[noise[h]]
@@ -165,10 +177,11 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
             added[MU] = (model.kinds[k, 1] * max(x[MU], LEAST_MU)) ** 2 * dt
         lasting[ROUGH] = math.exp(-way_m * model.fading[k, 0] - dt * model.fading[k, 1])
         lasting[GRADE], lasting[OFFSET] = math.exp(-way_m / model.grade_m), math.exp(-dt / n[4])
-        rising = model.building_up * GRAVITY * u if step.rising else 0.0
-        filling = model.filling * GRAVITY * x[BRAKE] * step.filling if by_brake > 0.0 else 0.0
+        rising = BUILDING_UP * GRAVITY * u if step.rising else 0.0
+        filling = FILLING * GRAVITY * x[BRAKE] * step.filling if by_brake > 0.0 else 0.0
         added[SPEED] = (model.kinds[k, 3] ** 2 + rising**2 + filling**2) * dt
         added[ROUGH] = model.kinds[k, 2] ** 2 * (1.0 - lasting[ROUGH] ** 2)
+        added[BRAKE] = dt * (model.rates[1] + _opened(model, step, x[BRAKE]))
         left = model.grade_error**2 + (model.resistance_error * basic) ** 2
         added[GRADE] = left * (1.0 - lasting[GRADE] ** 2)
         added[OFFSET] = max(n[2] * step.declared_m, n[3]) ** 2 * (1.0 - lasting[OFFSET] ** 2)
