@@ -42,7 +42,8 @@ POSITION = _sensor(
     "position",
     "geometry_msgs/msg/PoseWithCovarianceStamped",
     positions.POSITION,
-    "**in**: measured position along the track, pose.position.x m, covariance[0] m²; 0 is unknown: `position_std_m`",
+    "**in**: measured position of the front end along the track, pose.position.x m, covariance[0] m²; 0 is unknown: "
+    "`position_std_m`",
     Frame.LINE,
 )
 FIX = _sensor(
