@@ -73,7 +73,7 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
         noise[:, SPEED] += np.square(BUILDING_UP * GRAVITY * used.value) * dt_s
     held = used.slope[:, BRAKE] > 0.0
     strong = (braking.applied > 0.0) & (mean[:, BRAKE] > 1.0 + 2.0 * max(config.brake_error, 0.1))
-    noise[:, BRAKE] += 0.1**2 * strong * dt_s
+    noise[:, BRAKE] += 0.1**2 * (strong & (bank.covariance[:, BRAKE, BRAKE] < 0.5**2)) * dt_s
     noise[:, SPEED] += np.square(FILLING * GRAVITY * held * mean[:, BRAKE] * braking.filling) * dt_s
     means = mean * lasting
     means[:, SPEED] = slower

@@ -74,9 +74,9 @@ def test_a_step(config: Config, braking: Braking) -> None:
 
 @pytest.mark.parametrize("applied", [0.0, FULL])
 def test_a_brake_that_is_stronger_than_it_can_be(applied: float) -> None:
-    mean = BANK.mean.copy()
-    mean[::2, BRAKE] = 1.4
-    strong, braking = BANK._replace(mean=mean), Braking(applied)
+    mean, covariance = BANK.mean.copy(), BANK.covariance.copy()
+    mean[::2, BRAKE], covariance[::3, BRAKE, BRAKE] = 1.4, 0.3
+    strong, braking = BANK._replace(mean=mean, covariance=covariance), Braking(applied)
     check(motion.moved(Config(), strong, 0.1, braking, 1.0), by_numpy.moved(Config(), strong, 0.1, braking, 1.0))
 
 

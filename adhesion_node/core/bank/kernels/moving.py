@@ -40,9 +40,9 @@ BUILDING_UP, FILLING = 0.3, 0.2
 """Error of the brake's force, relative. While it is applied harder: of the speed over 1 s, and as an accelerometer
 feels it. While cylinders fill, over what they will press with, as how they fill nobody tells: of the speed over 1 s; an
 accelerometer feels it by the first, as it lasts."""
-OPENS = 0.1
+OPENS, OPEN = 0.1, 0.5
 """Standard deviation per root of a second of the brake's force where it is more than the known brake can give: another
-one is at work, which no gauge shows, and nothing is known of that."""
+one is at work, which no gauge shows, and nothing is known of that. It grows to this at most, as at a standstill."""
 POSITION, SPEED, MU, ROUGH, BRAKE, GRADE, OFFSET, BIAS, RADIUS, SIZE = 0, 1, 2, 3, 4, 5, 6, 7, 10, 11
 
 
@@ -129,9 +129,9 @@ def _used(
 
 
 @kernel
-def _opened(model: Model, step: Step, brake: float) -> float:
-    """Variance per second of the brake's force that is another one's."""
-    return OPENS**2 if step.applied > 0.0 and brake > model.strongest else 0.0
+def _opened(model: Model, step: Step, brake: float, variance: float) -> float:
+    """Variance per second of the brake's force that is another one's, by how well it is known."""
+    return OPENS**2 if step.applied > 0.0 and brake > model.strongest and variance < OPEN**2 else 0.0
 
 
 @kernel
@@ -181,7 +181,7 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         filling = FILLING * GRAVITY * x[BRAKE] * step.filling if by_brake > 0.0 else 0.0
         added[SPEED] = (model.kinds[k, 3] ** 2 + rising**2 + filling**2) * dt
         added[ROUGH] = model.kinds[k, 2] ** 2 * (1.0 - lasting[ROUGH] ** 2)
-        added[BRAKE] = dt * (model.rates[1] + _opened(model, step, x[BRAKE]))
+        added[BRAKE] = dt * (model.rates[1] + _opened(model, step, x[BRAKE], p[BRAKE, BRAKE]))
         left = model.grade_error**2 + (model.resistance_error * basic) ** 2
         added[GRADE] = left * (1.0 - lasting[GRADE] ** 2)
         added[OFFSET] = max(n[2] * step.declared_m, n[3]) ** 2 * (1.0 - lasting[OFFSET] ** 2)
