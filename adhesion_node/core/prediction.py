@@ -29,6 +29,10 @@ REACH_S = 60.0
 """Time of travel within which whoever brakes by a curve surely begins to: reactions and the build-up take less."""
 
 
+SIGMA = 3.0
+"""Standard deviations of the position within which the train is."""
+
+
 class Prediction(NamedTuple):
     """An estimate and the emergency braking from there to a standstill."""
 
@@ -69,16 +73,17 @@ def _expected(estimate: Estimate) -> float | AdhesionLaw:
 
 
 def _curve(config: Config, estimate: Estimate, train: Train, mu: float | AdhesionLaw) -> BrakingCurve | None:
-    """The curve from here, or from wherever the train comes in `REACH_S` of travel.
+    """The curve from wherever the train may be, or comes in `REACH_S` of travel.
 
     A fall that begins beyond its end does not count, one on the way counts from here on.
     """
-    speed_mps, here_m, curve, least = abs(estimate.speed_mps), estimate.position_m, None, math.inf
-    end_m = here_m + REACH_S * speed_mps
-    while (grade := config.track.least_resistance(here_m, end_m)) < least:
+    speed_mps, unsure_m, curve, least = abs(estimate.speed_mps), SIGMA * estimate.position_std_m, None, math.inf
+    rear_m, front_m = estimate.position_m - unsure_m, estimate.position_m + unsure_m + REACH_S * speed_mps
+    end_m = front_m
+    while (grade := config.track.least_resistance(rear_m, end_m)) < least:
         try:
             curve = slowdown(train, speed_mps, 0.0, grade).curve(mu)
         except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
             return None
-        least, end_m = grade, here_m + REACH_S * speed_mps + float(curve.distance_m[-1])
+        least, end_m = grade, front_m + float(curve.distance_m[-1])
     return curve

@@ -32,9 +32,9 @@ PIECE_M = 100.0
 LIKELY_SIGMA = 3.0
 """Places that are further than the nearest one by less than so many standard deviations may be the true one."""
 
-
-SECTIONS_PER_TRAIN = 2
-"""Sections of the profile of grades on the length of a train: shorter ones would be steep where heights are rough."""
+SECTIONS_PER_TRAIN, AVERAGED = 2, 9
+"""Sections of the profile of grades on the length of a train, and heights over such a section of which each end has the
+mean, as heights are rough."""
 
 
 class Place(NamedTuple):
@@ -97,7 +97,9 @@ class TrackLine:
             return ()
         first, last = self.along_m[[0, -1]]
         ends = np.linspace(first, last, math.ceil(SECTIONS_PER_TRAIN * (last - first) / train_length_m) + 1)
-        rises = np.diff(np.interp(ends, self.along_m, self.height_m))
+        aside = np.minimum(train_length_m / 4, np.minimum(ends - first, last - ends))
+        near = ends[:, np.newaxis] + aside[:, np.newaxis] * np.linspace(-1.0, 1.0, AVERAGED)
+        rises = np.diff(np.interp(near, self.along_m, self.height_m).mean(axis=1))
         slope = rises / np.diff(ends)
         worst = int(np.abs(slope).argmax())
         if abs(slope[worst]) > STEEPEST:

@@ -112,6 +112,16 @@ def test_wherever_in_a_minute_the_brake_is_applied_the_train_stops_within_the_cu
         assert place - begins_m <= prediction.safe.distance_m[-1] + 1.0
 
 
+@pytest.mark.parametrize(("std_m", "least"), [(0.1, 0.0), (4e3, 0.0), (5e3, -0.01)])
+@pytest.mark.parametrize("begins_m", [20e3, -20e3])
+def test_every_fall_counts_that_may_be_where_the_train_is(begins_m: float, std_m: float, least: float) -> None:
+    """Three standard deviations, ahead of them a minute of travel and the way: 3600 m and 3673 m."""
+    fall = config(Grade(begins_m, begins_m + 6e3, -60.0))
+    prediction = predict(fall, estimate()._replace(position_std_m=std_m))
+    assert prediction.safe is not None
+    assert prediction.safe.deceleration_mps2 == pytest.approx((0.05 + least) * G)
+
+
 def test_an_uphill_end_of_the_line_is_counted_on_only_when_it_lies_everywhere_ahead() -> None:
     prediction = predict(config(Grade(0.0, 2000.0, 20.0)), estimate(position_m=500.0))
     assert prediction.nominal is not None

@@ -130,7 +130,7 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         less_std=LESS_STD,
         least_std=LESS_LEAST_STD,
         applied=float(braking.applied),
-        told=float(braking.told),
+        told=float(braking.told) if braking.is_sure else 0.0,
         laws=law_priors(config),
         levels=LEVELS,
         sliding=np.column_stack((roughness_of(config), SLIDING_PRIORS)),

@@ -26,6 +26,7 @@ import numpy as np
 
 from ..physics.train import GRAVITY, Array
 from ..setting import once
+from .gear.wheels import HINTED
 from .kernels import moving
 from .kernels.weighing import variances
 from .labels import kinds, noises
@@ -59,6 +60,11 @@ class Braking(NamedTuple):
     """Log odds per second by which axles are known to slide, or below 0 to roll."""
     filling: float = 0.0
     """B/(M g) that they will press with once they have filled; 0: they have, or it is measured."""
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether that is known of the train, not hinted at by a single axle."""
+        return abs(self.told) > HINTED
 
 
 class Use(NamedTuple):

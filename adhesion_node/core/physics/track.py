@@ -14,9 +14,8 @@ end. Grades and curves pull at every wagon that is on them, so they count in the
 
 import math
 from bisect import bisect_right
-from collections.abc import Iterator
+from collections.abc import Sequence
 from dataclasses import astuple, dataclass, field, replace
-from itertools import pairwise
 from numbers import Real
 from typing import overload
 
@@ -86,7 +85,10 @@ STEEPEST, TIGHTEST_M = 0.15, 10.0
 """Grade and radius of trams in Lisbon and Toronto, rounded outwards: beyond them a profile is a slip of the pen."""
 
 RAMP = 8
-"""Steps in which a grade or curve comes under a train, and leaves it."""
+"""Steps on a train's length in which what lies under it changes."""
+
+EVEN = 1e-12
+"""Difference of grades that is none, but of rounding."""
 
 MANY = 1000
 """Positions for which a look at their ends pays: most often they all lie between the same two borders."""
@@ -125,12 +127,11 @@ class Track:
                     f"track section {section}: rises by {steep}, and trains climb {100.0 * STEEPEST:g} % at most: "
                     "rise_m is the height gained between both ends, in m"
                 )
-        pieces = [piece for section in self.sections for piece in _pieces(section, self.train_length_m)]
-        breaks = np.unique(np.array([end for start_m, end_m, _ in pieces for end in (start_m, end_m)], np.float64))
-        levels = np.zeros(breaks.size + 1)
-        for start_m, end_m, resistance in pieces:
-            first, last = breaks.searchsorted((start_m, end_m))
-            levels[first + 1 : last + 1] += resistance
+        breaks, levels = _under_train(
+            [one for one in self.sections if not isinstance(one, Tunnel)], self.train_length_m
+        )
+        for tunnel in (one for one in self.sections if isinstance(one, Tunnel)):
+            breaks, levels = _with_tunnel(breaks, levels, tunnel)
         object.__setattr__(self, "_breaks", breaks)
         object.__setattr__(self, "_levels", levels)
 
@@ -172,27 +173,42 @@ class Track:
         return float(self._levels[first : last + 1].min())
 
 
-def _pieces(section: Section, train_m: float) -> Iterator[tuple[float, float, float]]:
-    """Begin, end and resistance, N/N, of what the front end passes while a section is under the train.
+def _under_train(sections: Sequence[Grade | Curve], train_m: float) -> tuple[Array, Array]:
+    """Where the mean of grades and curves under a train changes, by its front end, and its values before and behind.
 
-    >>> list(_pieces(Tunnel(0.0, 1000.0), 200.0))
-    [(0.0, 1000.0, 0.00013)]
-    >>> first, *_, last = sorted(_pieces(Grade(0.0, 1000.0, 16.0), 200.0), key=lambda piece: piece[0])
-    >>> first, last
-    ((0.0, 25.0, 0.001), (1175.0, 1200.0, 0.001))
+    What a curve resists with counts as a height that the train gains on it. Between the ends of sections, and a train's
+    length behind them, the mean changes linearly: in `RAMP` steps per train, each as high as the mean in it.
+
+    >>> breaks, levels = _under_train([Grade(0.0, 1000.0, 8.0)], 200.0)
+    >>> breaks[[0, 1, 8, 9, -1]], levels[[0, 1, 9, -2, -1]]
+    (array([   0.,   25.,  200., 1000., 1200.]), array([0.    , 0.0005, 0.008 , 0.0005, 0.    ]))
     """
-    most, length_m = section.resistance(train_m), section.end_m - section.start_m
-    if isinstance(section, Tunnel):
-        yield section.start_m, section.end_m, most
-    elif most:
-        ramp = np.linspace(0.0, min(length_m, train_m), RAMP + 1)
-        leaving_m = section.start_m + max(length_m, train_m)
-        for step, (begin_m, end_m) in enumerate(pairwise(ramp.tolist())):
-            part = (step + 0.5) / RAMP
-            yield section.start_m + begin_m, section.start_m + end_m, part * most
-            yield leaving_m + begin_m, leaving_m + end_m, (1.0 - part) * most
-        if leaving_m > section.start_m + ramp[-1]:
-            yield section.start_m + float(ramp[-1]), leaving_m, most
+    if not sections:
+        return np.empty(0), np.zeros(1)
+    ends = np.unique(np.array([(one.start_m, one.end_m) for one in sections], np.float64))
+    density = np.zeros(ends.size - 1)
+    for one in sections:
+        first, last = ends.searchsorted((one.start_m, one.end_m))
+        length_m = one.end_m - one.start_m
+        density[first:last] += one.resistance(train_m) * max(length_m, train_m) / length_m
+    height = np.append(0.0, np.cumsum(density * np.diff(ends)))
+    knots = np.unique(np.append(ends, ends + train_m))
+    mean = (np.interp(knots, ends, height) - np.interp(knots - train_m, ends, height)) / train_m
+    steps = np.where(np.abs(np.diff(mean)) < EVEN, 1.0, np.ceil(RAMP * np.diff(knots) / train_m))
+    number = np.append(0.0, np.cumsum(steps))
+    places = np.arange(number[-1] + 1.0)
+    at = np.interp(places, number, mean)
+    return np.interp(places, number, knots), np.concatenate(([0.0], (at[:-1] + at[1:]) / 2, [0.0]))
+
+
+def _with_tunnel(breaks: Array, levels: Array, tunnel: Tunnel) -> tuple[Array, Array]:
+    """The same with a tunnel."""
+    ends = np.unique(np.append(breaks, (tunnel.start_m, tunnel.end_m)))
+    middle = np.concatenate(([-np.inf], (ends[:-1] + ends[1:]) / 2, [np.inf]))
+    found = levels[breaks.searchsorted(middle, side="right")]
+    first, last = ends.searchsorted((tunnel.start_m, tunnel.end_m))
+    found[first + 1 : last + 1] += tunnel.resistance(0.0)
+    return ends, found
 
 
 def _turned(section: Section) -> Section:

@@ -88,7 +88,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     middle = np.maximum(foreseen, ahead.LEAST_AHEAD)
     variance = np.log1p(np.square(std / middle))  # of the logarithm: so much may be taken away, but not all
     # where nothing tells which, sliding since the brake was applied is as likely as rolling beforehand
-    since = sliding & np.isneginf(bank.born_s) & (not partial) & (braking.told == 0.0)
+    since = sliding & np.isneginf(bank.born_s) & (not partial) & (abs(braking.told) <= 1.0)
     odds = np.where(since, ahead.UNTOLD, 1.0) * bank.weight
     weight = odds / odds.sum()
     wanted = missed, ahead.LIKELIER

@@ -31,9 +31,9 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
     sliding, held = bank.part(strong & SLIDES[bank.kind]), bank.part(strong & (bank.kind == HELD))
     if sliding.log_weight.size:
         children += _changed(config, sliding, now_s, elapsed_s)
-        if braking.told <= 0.0:
+        if braking.told <= 1.0:
             children += _rolling(sliding, braking, now_s, elapsed_s)
-    if held.log_weight.size and braking.told >= 0.0:
+    if held.log_weight.size and braking.told >= -1.0:
         children += _begun_to_slide(config, held, braking, now_s, elapsed_s)
     return normalised(joined(children))
 

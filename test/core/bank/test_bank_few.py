@@ -14,7 +14,7 @@ import math
 
 import numpy as np
 import pytest
-from banks import FULL_PA, S
+from banks import FULL, FULL_PA, S
 from scipy.signal import lfilter
 
 from adhesion_node.core.bank.following import followed, met
@@ -90,3 +90,22 @@ def test_an_axle_that_rolls_does_not_make_a_release_of_the_dumps_of_another(seed
     regimes, lower = zip(*told, strict=True)
     assert Regime.BRAKE_LIMITED not in regimes
     assert np.mean(np.array(lower) <= used) > 0.95
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_axle_that_rolls_does_not_hide_that_the_rail_becomes_bad(seed: int) -> None:
+    """A dry brake for 12 s, then leaves, while the axle that is heard goes on at a creep of 1 %."""
+    rng, state, speed, place = np.random.default_rng(seed), init(CONFIG, 1), 55.0, 0.0
+    kept: list[bool] = []
+    for tick in range(500):
+        braked_s, t_ns = 0.1 * tick - 15.0, S + tick * S // 10
+        part = min(max(braked_s / 3.0, 0.0), 1.0)
+        used = part * FULL if braked_s < 12.0 else 0.03
+        rim = speed * (0.99 if braked_s > 1.0 else 1.0) * (1.0 + 5e-4 * rng.standard_normal())
+        wheels = (WheelSample(t_ns, (rim / CONFIG.train.wheel_radius_m,)),)
+        seen = place + 0.3 * float(rng.standard_normal())
+        state, estimate = step(CONFIG, state, Measurement(t_ns, seen, 1.0, FULL_PA * part, wheels=wheels))
+        kept += [estimate.mu_lower <= used] if estimate is not None and braked_s > 14.0 else []
+        resisting = float(CONFIG.train.specific_resistance(speed))
+        place, speed = place + 0.1 * speed, speed - 0.98 * (used + resisting) * (braked_s > 0.0)
+    assert np.mean(kept) > 0.95

@@ -105,7 +105,7 @@ def counted_on(
     used = use(config, bank, braking, resistance(config, bank)) if used is None else used
     weight, partial = bank.weight, is_partial(config, braking)
     speeds = _speeds_ahead(bank)
-    if not (partial or braking.told):
+    if not (partial or braking.is_sure):
         weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
         weight /= weight.sum()
     borne, least = (ROLLED[0] / ROLLED[1], min(known.lower, surely(config, bank))) if partial else (1.0, 0.0)

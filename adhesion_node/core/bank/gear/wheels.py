@@ -217,9 +217,9 @@ class WheelsSeen(NamedTuple):
         return sum(slid) / known
 
     def one_rolls(self, now_ns: int) -> bool:
-        """Whether a single axle is known of, and has not slid of late."""
+        """Whether no more than one axle is known of, of one or two that are heard, and that has not slid of late."""
         slid, rolled = self._seen(now_ns, SLID_NS)
-        return sum(rolled) == 1 and not any(slid)
+        return len(slid) <= 2 and sum(rolled) == 1 and not any(slid)
 
     def _seen(self, now_ns: int, late_ns: int) -> tuple[list[bool], list[bool]]:
         """Which axles have slid of late, and which roll."""
