@@ -176,8 +176,8 @@ def test_heights_tell_the_grade_under_the_train() -> None:
 def test_rough_heights_are_no_steep_railway(seed: int) -> None:
     """Errors of 4 m every 10 m, as of a terrain model."""
     lat, lon = walked(46.5, 8.0, [70.0] * 600, 10.0)
-    heights = 0.02 * np.arange(601) * 10.0
-    rough = heights + 4.0 * np.random.default_rng(seed).standard_normal(heights.size)
+    heights = 0.2 * np.arange(601.0)
+    rough: Array = heights + 4.0 * np.random.default_rng(seed).standard_normal(heights.size)
     told = [Track(line_of("line", lat, lon, each, 0.0).grades(200.0), 200.0) for each in (heights, rough)]
     places = np.arange(300.0, 5900.0, 10.0)
     exact, found = (track.specific_resistance(places) for track in told)
