@@ -10,9 +10,9 @@
 
     u = mu (1 + rho)                                where the adhesion limits
     u = (beta B - rotating r)/(1 + rotating)        where the brake does
-    u = f mu (1 + rho) + (1 - f) beta B ...         where the share f of the axles slides; the rest, of beta B no more
-                                                    than half as much again as they
+    u = f mu (1 + rho) + (1 - f) beta B ...         where the share f of the axles slides
 
+Of beta B the axles that roll then use no more than half as much again as those that slide.
 Roughness rho and grade gamma fade with the way, a swing rho and the slow error of the positions with time.
 """
 
