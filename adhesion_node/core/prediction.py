@@ -25,12 +25,9 @@ LEAST_EFFICIENCY = 1e-3
 """A brake of which nothing may be counted on presses with so much of its force: a curve needs one."""
 
 
-REACH_S = 60.0
-"""Time of travel within which whoever brakes by a curve surely begins to: reactions and the build-up take less."""
-
-
-SIGMA = 3.0
-"""Standard deviations of the position within which the train is."""
+REACH_S, SIGMA = 60.0, 3.0
+"""Time of travel within which whoever brakes by a curve surely begins to, as reactions and the build-up take less; and
+standard deviations of the position within which the train is."""
 
 
 class Prediction(NamedTuple):
