@@ -44,7 +44,7 @@ def parts() -> dict[str, str]:
 
 def _kinds() -> Iterator[Sequence[str]]:
     for each in kinds.KINDS:
-        limits = "adhesion" if each.slides else "brake" if each.name == "brake" else "no brake"
+        limits = "adhesion" if each.slides else {"brake": "brake", "other": "another brake"}.get(each.name, "no brake")
         shares = (f"{share:.1%}".replace("%", " %") for share in (each.drift, each.growth, each.roughness))
         swings = "`used_ripple`" if each.swings else "–"
         yield f"`{each.name}`", limits, *shares, swings, f"{each.restlessness_mps:g}", f"{each.prior:g}"

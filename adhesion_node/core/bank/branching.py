@@ -25,7 +25,7 @@ from .gear.wheels import FALLS
 from .kernels import springing, uniting
 from .kernels.springing import Rule
 from .kernels.uniting import Pruning
-from .labels.kinds import HELD, KINDS, PASSING, SLIDING, roughness_of
+from .labels.kinds import HELD, KINDS, OTHER, PASSING, SLIDING, roughness_of
 from .labels.laws import LEVELS, law_priors
 from .layout import MU, ROUGH, Bank
 from .motion import Braking, rolling_use
@@ -57,6 +57,10 @@ the safe curve exceeds the way by 37 instead of 32 % on leaves where one cylinde
 PASSING_S, PASSED_S = 300.0, 3.0
 """A border of the rail comes once in that time, and the train takes so long to pass it."""
 
+OTHER_S, ENDED_S, MORE, UNNEEDED = 60.0, 20.0, (0.03, 0.03), 0.01
+"""Another brake, which no gauge shows, begins to work once in that time, and ends in that. So much more is used then
+than the known one needs, known so well; else it is at most so likely to be there."""
+
 CHANGE_S, BEND_S = 600.0, 60.0
 """Axles roll again, whatever the adhesion was, once in that time, and how it depends on speed changes."""
 
@@ -78,16 +82,19 @@ SLIDING_PRIORS = np.array([kind.prior if kind.slides else 0.0 for kind in KINDS]
 PRUNING = Pruning(math.log(LEAST), MOST, ALIKE, ALIKE_STD)
 
 
-def opened(config: Config, bank: Bank, rail: Rail) -> Bank:
+def opened(config: Config, bank: Bank, rail: Rail, alone: bool) -> Bank:
     """A braking begins on a rail that is known so: every law, every kind. `rail.lower` is a bound of `BOUND_STD`.
 
     What is known badly is divided into parts that are narrow enough for each to know when its axles begin to slide.
+    Where a gauge of cylinders is `alone` another brake may work beside.
     """
     mu = max(rail.mu, LEAST_MU)
     std = math.log(mu / min(max(rail.lower, LEAST_PART * mu), mu / (1.0 + LEAST_STD))) / BOUND_STD
     steps = [(step * std, SPLIT_STD * std) for step in SPLIT] if std > WIDE else [(0.0, std)]
     roughness, bank = roughness_of(config), by_noise(bank)
     parts, laws = [(HELD, 0, mu, std * mu, 0.0, math.log(KINDS[HELD].prior))], law_priors(config)
+    if alone:
+        parts.append((OTHER, 0, *MORE, 0.0, math.log(KINDS[OTHER].prior)))
     for law in range(len(laws)):
         for kind in SLIDING:
             grows = KINDS[kind].growth != 0.0  # as much as any law does, so that none of them matters
@@ -111,7 +118,7 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
     nearer it was; or the train passes a border: what it uses drifts meanwhile, as a long train takes seconds to, and
     lasts again behind it. Of those that roll: adhesion has become less
     than the brake needs, a little less while the brake rises, else any less. Where the wheels tell which it is, the
-    other does not spring.
+    other does not spring. Another brake, which no gauge shows, begins to work, or ends.
     """
     fell, rising_s = braking.told >= FALLS, max(RISING_S, RISES * config.brake_build_up_s)
     rule = Rule(
@@ -126,6 +133,11 @@ def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed
         passing=PASSING,
         passing_s=PASSING_S,
         passed_s=PASSED_S,
+        other=OTHER,
+        other_s=OTHER_S if braking.alone else math.inf,
+        ended_s=ENDED_S,
+        more=np.array(MORE),
+        unneeded=UNNEEDED,
         less=np.array(LESS[:1] if braking.rising and not fell else LESS),
         less_std=LESS_STD,
         least_std=LESS_LEAST_STD,

@@ -139,7 +139,7 @@ def followed(
             t_ns=until_ns,
             since_s=memory.since_s + (until_ns - memory.t_ns) / S,
             brake=brake,
-            braking=_braking(config, memory, brake, until_ns),
+            braking=_braking(config, memory, brake, until_ns, demand_pa is None),
             slowed_mps=memory.slowed_mps + (memory.bank.mean_of(SPEED) - bank.mean_of(SPEED) if memory.braked else 0.0),
         )
         if imu:
@@ -243,7 +243,7 @@ def _pressures(config: Config, brake: BrakeSeen, measurement: Measurement) -> tu
     return measurement.pressures or (() if newest is None else (PressureSample(measurement.t_ns, newest),))
 
 
-def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> Braking:
+def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int, undemanded: bool) -> Braking:
     """What the brake does from now on."""
     wheels = memory.wheels
     share, held = wheels.share(now_ns), wheels.share(now_ns, FILLED_NS)
@@ -252,4 +252,5 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int) -> B
     fills = config.pressure_kind == "demanded" and brake.applied_pa < brake.demanded_pa
     filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
     slid = told(share, brake.has_slid(now_ns), wheels.fell(now_ns), wheels.one_rolls(now_ns))
-    return Braking(applied, sliding, brake.rising, slid, filling)
+    alone = undemanded and config.pressure_kind != "demanded"
+    return Braking(applied, sliding, brake.rising, slid, filling, alone)

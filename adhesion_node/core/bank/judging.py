@@ -60,7 +60,8 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if braked and not before:
         known = rail()
         told_s = now_s + SETTLING_S + config.brake_build_up_s
-        return memory._replace(bank=opened(config, bank, known), since_s=0.0, seen=1, told_s=told_s, known=known)
+        bank = opened(config, bank, known, memory.braking.alone)
+        return memory._replace(bank=bank, since_s=0.0, seen=1, told_s=told_s, known=known)
     if before and not braked:
         return memory._replace(bank=closed(bank), seen=0)
     if not before:

@@ -40,6 +40,9 @@ if TYPE_CHECKING:
 STRONGER, LEAST_BRAKE_ERROR = 2.0, 0.1
 """Errors of the brake, of such a size at least, by which the train is braked harder than by what is known to press."""
 
+ANOTHER = 1.5
+"""Times the full brake, by what is told of it, that is used at most where another one works beside."""
+
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""
 
@@ -60,6 +63,8 @@ class Braking(NamedTuple):
     """Log odds per second by which axles are known to slide, or below 0 to roll."""
     filling: float = 0.0
     """B/(M g) that they will press with once they have filled; 0: they have, or it is measured."""
+    alone: bool = False
+    """Whether nothing but a gauge of cylinders tells of the brake: another one may be at work beside."""
 
     @property
     def is_sure(self) -> bool:
@@ -167,6 +172,7 @@ def model_of(config: Config) -> moving.Model:
         grade_m=kinds.grade_m_of(config),
         free=kinds.FREE_S,
         free_std=kinds.FREE_STD,
+        most=np.where(np.arange(kinds.FREE_S.size) == kinds.OTHER, ANOTHER * train.full_brake, np.inf),
         rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2, RADIUS_DRIFT**2]),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),

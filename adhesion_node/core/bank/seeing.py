@@ -19,7 +19,7 @@ from scipy.special import ndtr
 from ..physics.train import GRAVITY, Array
 from .kernels import weighing
 from .kernels.moving import BUILDING_UP
-from .labels.kinds import SLIDES
+from .labels.kinds import OTHER, SLIDES
 from .layout import BIAS, BRAKE, MU, PITCH, ROUGH, SCALE, SPEED, Bank
 from .motion import Braking, resistance, rolling_use, use
 
@@ -98,7 +98,11 @@ def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) 
     slope[:, MU], slope[:, ROUGH] = -more * (1.0 + mean[:, ROUGH]), -more * mean[:, MU]
     short = part * rolling_use(config, bank, braking) + slope[:, MU] * mean[:, MU]
     slides = np.where(SLIDES[bank.kind], times - 1.0, 0.0)
-    return _above(bank, short, slope, 0.0, 1.0, slides)
+    either = np.where(
+        bank.kind == OTHER, max(elapsed_s * braking.told, 0.0), 0.0
+    )  # another brake makes them slide, too
+    seen = _above(bank, short, slope, 0.0, 1.0, slides)
+    return seen._replace(log_weight=seen.log_weight + either)
 
 
 def fall_seen(config: Config, bank: Bank, braking: Braking, fall_mps2: float) -> Bank:

@@ -129,6 +129,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
                 _HANDLE,
                 _WHEELS,
             ),
+            ("electric_alone", "the same with an accelerometer, neither demand nor wheels", _gnss(), _BLENDED, _IMU),
             ("wheel_dropouts", "one bogie's wheels after the other missing", _gnss(), _MEAN, _PATCHY_WHEELS),
             ("tunnel_wheels", "minutes without a fix, and the wheels", _gnss(timing=_TUNNELS), _DEMANDED, _WHEELS),
             ("no_pressure", "satellites alone", _gnss()),

@@ -53,13 +53,15 @@ def use(config: Config, bank: Bank, braking: Braking, resisting: Array) -> motio
     loose = slides & (needed > 1.5 * rail)  # what rolls is hardly pressed
     by_rail = sliding + np.where(loose, 1.5 * (1.0 - sliding), 0.0)
     slope = np.zeros(mean.shape)
-    slope[:, MU] = np.where(free, 1.0, by_rail * (1.0 + mean[:, ROUGH]))
+    other = np.array([KINDS[each].name == "other" for each in bank.kind])
+    most = np.where(other, 1.5 * config.train.full_brake, np.inf)  # of whatever else brakes the train
+    slope[:, MU] = np.where(free, mean[:, MU] < most, by_rail * (1.0 + mean[:, ROUGH]))
     slope[:, ROUGH] = by_rail * mean[:, MU]
     held = np.where(free | loose, 0.0, (1.0 - sliding) / (1.0 + rotating))
     slope[:, BRAKE] = held * braking.applied
     slope[:, SPEED] = -held * rotating * config.train.resistance_slope(mean[:, SPEED])
     value = by_rail * rail + np.where(loose, 0.0, (1.0 - sliding) * needed)
-    return motion.Use(np.where(free, mean[:, MU], value), slope, slides, resisting)
+    return motion.Use(np.where(free, np.minimum(mean[:, MU], most), value), slope, slides, resisting)
 
 
 def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m: float) -> Bank:
@@ -72,7 +74,7 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
     if braking.rising:
         noise[:, SPEED] += np.square(BUILDING_UP * GRAVITY * used.value) * dt_s
     held = used.slope[:, BRAKE] > 0.0
-    strong = (braking.applied > 0.0) & (mean[:, BRAKE] > 1.0 + 2.0 * max(config.brake_error, 0.1))
+    strong = (braking.applied > 0.0) & (not braking.alone) & (mean[:, BRAKE] > 1.0 + 2.0 * max(config.brake_error, 0.1))
     noise[:, BRAKE] += 0.1**2 * (strong & (bank.covariance[:, BRAKE, BRAKE] < 0.5**2)) * dt_s
     noise[:, SPEED] += np.square(FILLING * GRAVITY * held * mean[:, BRAKE] * braking.filling) * dt_s
     means = mean * lasting
@@ -93,7 +95,7 @@ def moved(config: Config, bank: Bank, dt_s: float, braking: Braking, declared_m:
 
 def _lasts_s(kind: Indices) -> Array:
     """How long a deceleration lasts that no brake holds; 0 where one does."""
-    return np.array([{"free": 5.0, "steady": 7200.0}.get(KINDS[each].name, 0.0) for each in kind])
+    return np.array([{"free": 5.0, "steady": 7200.0, "other": 800.0}.get(KINDS[each].name, 0.0) for each in kind])
 
 
 def swings(kind: Indices) -> Mask:

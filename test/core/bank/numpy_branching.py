@@ -17,25 +17,26 @@ from numpy_bank import moments, normalised, roughness_of, use
 from scipy.special import ndtr
 
 from adhesion_node.core.bank import branching
-from adhesion_node.core.bank.labels.kinds import HELD, KINDS, PASSING, SLIDES, SLIDING
+from adhesion_node.core.bank.labels.kinds import HELD, KINDS, OTHER, PASSING, SLIDES, SLIDING
 from adhesion_node.core.bank.labels.laws import SLIPPERY, WET, laws_of
 from adhesion_node.core.bank.layout import BRAKE, MU, ROUGH, SPEED, Bank, joined
 from adhesion_node.core.bank.motion import Braking, resistance
 from adhesion_node.core.config import Config
+from adhesion_node.core.physics.train import Array
 
 
 def branched(config: Config, bank: Bank, braking: Braking, now_s: float, elapsed_s: float) -> Bank:
     """With what may have become different within the last `elapsed_s`."""
-    strong = bank.weight > branching.STRONG
+    strong, bank = bank.weight > branching.STRONG, _doubted(config, bank, braking)
     children = [bank]
-    sliding, held = bank.part(strong & SLIDES[bank.kind]), bank.part(strong & (bank.kind == HELD))
+    sliding, held = bank.part(strong & SLIDES[bank.kind]), bank.part(strong & np.isin(bank.kind, (HELD, OTHER)))
     if sliding.log_weight.size:
         children += _changed(config, sliding, now_s, elapsed_s)
         if braking.told <= 1.0:
             children += _rolling(sliding, braking, now_s, elapsed_s)
     if held.log_weight.size and braking.told >= -1.0:
         children += _begun_to_slide(config, held, braking, now_s, elapsed_s)
-    return normalised(joined(children))
+    return normalised(joined(children + _otherwise(config, bank.part(strong), braking, now_s, elapsed_s)))
 
 
 def _changed(config: Config, sliding: Bank, now_s: float, elapsed_s: float) -> list[Bank]:
@@ -77,10 +78,11 @@ def _rolling(sliding: Bank, braking: Braking, now_s: float, elapsed_s: float) ->
 
 
 def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
-    """Adhesion has become less than the brake needs: a little less while it rises, else any less."""
-    needed = use(config, held, braking, resistance(config, held)).value
+    """Adhesion has become less than the brake needs, or another one has ended: a little less, or any."""
+    needed = _rolling_use(config, held, braking)
     parts = branching.LESS[:1] if braking.rising else branching.LESS
-    rate = elapsed_s / (branching.RISING_S if braking.rising else branching.STEADY_S) / len(parts)
+    begin_s = branching.RISING_S if braking.rising else branching.STEADY_S
+    rate = elapsed_s / np.where(held.kind == HELD, begin_s, branching.ENDED_S) / len(parts)
     share = sum(KINDS[kind].prior for kind in SLIDING)
     found = []
     for less in parts:
@@ -92,6 +94,43 @@ def _begun_to_slide(config: Config, held: Bank, braking: Braking, now_s: float, 
                 fresh = held.with_fresh(MU, gives, branching.LESS_STD * gives + branching.LESS_LEAST_STD)
                 fresh = fresh.with_fresh(ROUGH, 0.0, roughness_of(config, np.array([kind]))[0])
                 found.append(fresh.labelled(kind, law, now_s, likely).part(probability > 0.0))
+    return found
+
+
+def _rolling_use(config: Config, bank: Bank, braking: Braking) -> Array:
+    held = bank._replace(kind=np.full_like(bank.kind, HELD))
+    return use(config, held, braking, resistance(config, held)).value
+
+
+def _doubted(config: Config, bank: Bank, braking: Braking) -> Bank:
+    """Another brake gives more than the known one needs, or it is hardly there."""
+    off = bank.mean[:, MU] - _rolling_use(config, bank, braking)
+    more = ndtr(off / np.sqrt(bank.covariance[:, MU, MU]))
+    doubt = np.where(bank.kind == OTHER, np.log(np.maximum(more, branching.UNNEEDED)), 0.0)
+    return bank._replace(log_weight=bank.log_weight + doubt)
+
+
+def _otherwise(config: Config, strong: Bank, braking: Braking, now_s: float, elapsed_s: float) -> list[Bank]:
+    """Another brake begins to work, or has ended: then axles roll, or what was used is what the rail gives."""
+    found, ended = [], elapsed_s / branching.ENDED_S
+    more, std = branching.MORE
+    for index, kind in enumerate(strong.kind):
+        one = strong.part(np.array([index])).with_fresh(ROUGH, 0.0, 0.0)
+        if kind == HELD and braking.alone:
+            other = one.with_fresh(MU, _rolling_use(config, one, braking) + more, std)
+            found.append(other.labelled(OTHER, 0, now_s, math.log(elapsed_s / branching.OTHER_S)))
+        elif kind == OTHER and braking.told <= 1.0:
+            spread = 0.5 * np.abs(one.mean[:, MU]) + branching.LESS_LEAST_STD
+            found.append(one.with_fresh(MU, one.mean[:, MU], spread).labelled(HELD, 0, now_s, math.log(ended)))
+    others = strong.part((strong.kind == OTHER) & (braking.told >= -1.0))
+    if others.log_weight.size:
+        share = sum(KINDS[kind].prior for kind in SLIDING)
+        for law, (_, priors) in enumerate(laws_of(config)):
+            probability = np.interp(others.mean[:, MU], (SLIPPERY, WET), priors)
+            for kind in SLIDING:
+                likely = np.log(np.maximum(ended * probability * KINDS[kind].prior / share, 1e-300))
+                left = others.with_fresh(ROUGH, 0.0, roughness_of(config, np.array([kind]))[0])
+                found.append(left.labelled(kind, law, now_s, likely).part(probability > 0.0))
     return found
 
 

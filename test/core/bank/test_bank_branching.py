@@ -24,7 +24,7 @@ from adhesion_node.core.bank.branching import LEAST, MOST, branched, opened, pru
 from adhesion_node.core.bank.free import closed
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.judging import judged
-from adhesion_node.core.bank.labels.kinds import FREE, HELD, KINDS, SLIDES, SLIDING, STEADY
+from adhesion_node.core.bank.labels.kinds import FREE, HELD, KINDS, OTHER, SLIDES, SLIDING, STEADY
 from adhesion_node.core.bank.layout import MU, ROUGH, SIZE, Bank, joined
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.bank.motion import Braking
@@ -55,17 +55,18 @@ def test_moments_are_those_of_the_mixture() -> None:
     assert bank._replace(log_weight=bank.log_weight + 3.0).moments()[0] == pytest.approx(mean, rel=1e-12)
 
 
+@pytest.mark.parametrize("alone", [False, True])
 @pytest.mark.parametrize("rail", [Rail(0.08, 0.005, 0.072), Rail(0.05, 0.04, 0.02), Rail(0.03, 0.02, 0.015)])
-def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
+def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail, alone: bool) -> None:
     start = bank_of([0, 0, 0], noises=[0, 1, 2])
-    bank = opened(CONFIG, start, rail)
+    bank = opened(CONFIG, start, rail, alone)
     assert is_normalised(bank)
     sliding = bank.part(SLIDES[bank.kind])
     std = np.sqrt(sliding.covariance[:, MU, MU])
     below = [float(sliding.weight @ norm.cdf((mu - sliding.mean[:, MU]) / std)) for mu in (rail.lower, rail.mu, 0.0)]
     # parts that are Gaussian in proportion are not quite log-normal together
     assert np.array(below) / sliding.weight.sum() == pytest.approx([0.05, 0.5, 0.0], abs=0.03)
-    priors = {kind: float(bank.weight @ (bank.kind == kind)) for kind in (HELD, *SLIDING)}
+    priors = {kind: float(bank.weight @ (bank.kind == kind)) for kind in (HELD, *SLIDING, *[OTHER] * alone)}
     total = sum(KINDS[kind].prior for kind in priors)
     assert priors == pytest.approx({kind: KINDS[kind].prior / total for kind in priors})
     grows = np.array([kind.growth != 0.0 for kind in KINDS])[sliding.kind]
@@ -82,7 +83,7 @@ def test_a_braking_opens_with_the_rail_as_it_is_known(rail: Rail) -> None:
 
 
 def test_a_braking_closes_to_two_hypotheses_for_each_noise() -> None:
-    bank = opened(CONFIG, bank_of([0, 0], noises=[1, 3]), Rail(0.05, 0.04, 0.02))
+    bank = opened(CONFIG, bank_of([0, 0], noises=[1, 3]), Rail(0.05, 0.04, 0.02), alone=True)
     free = closed(bank)
     assert free.noise.tolist() == [1, 3, 1, 3]
     assert free.kind.tolist() == [FREE, FREE, STEADY, STEADY]

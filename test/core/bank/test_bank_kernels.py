@@ -44,6 +44,7 @@ CONFIGS = [Config(), Config(train=replace(CRH3, rotating_mass_fraction=0.08), tr
 BRAKINGS = [
     *(Braking(FULL), Braking(0.4 * FULL, 0.6, True, 0.0), Braking(0.5 * FULL, 1.0, False, 4.0), Braking(0.0)),
     Braking(0.2 * FULL, filling=FULL),
+    Braking(0.3 * FULL, alone=True),
 ]
 MODULES = [import_module(f"{kernels.__name__}.{each.name}") for each in iter_modules(kernels.__path__)]
 
@@ -72,11 +73,11 @@ def test_a_step(config: Config, braking: Braking) -> None:
         np.testing.assert_allclose(one, other, rtol=1e-13, atol=1e-15)
 
 
-@pytest.mark.parametrize("applied", [0.0, FULL])
-def test_a_brake_that_is_stronger_than_it_can_be(applied: float) -> None:
+@pytest.mark.parametrize("braking", [Braking(0.0), Braking(FULL), Braking(FULL, alone=True)])
+def test_a_brake_that_is_stronger_than_it_can_be(braking: Braking) -> None:
     mean, covariance = BANK.mean.copy(), BANK.covariance.copy()
     mean[::2, BRAKE], covariance[::3, BRAKE, BRAKE] = 1.4, 0.3
-    strong, braking = BANK._replace(mean=mean, covariance=covariance), Braking(applied)
+    strong = BANK._replace(mean=mean, covariance=covariance)
     check(motion.moved(Config(), strong, 0.1, braking, 1.0), by_numpy.moved(Config(), strong, 0.1, braking, 1.0))
 
 

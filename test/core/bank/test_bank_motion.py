@@ -31,7 +31,7 @@ from adhesion_node.core.physics.train import CRH3, Array
 RISE = 0.004
 TRACK = Track((Grade(-1e5, 1e6, RISE * 1.1e6),))
 KIND_OF = {kind.name: index for index, kind in enumerate(KINDS)}
-FREE_S = {KIND_OF["free"]: 5.0, KIND_OF["steady"]: 7200.0}
+FREE_S = {KIND_OF["free"]: 5.0, KIND_OF["steady"]: 7200.0, KIND_OF["other"]: 800.0}
 LABELS = list(product(range(len(KINDS)), range(3), range(len(NOISES))))
 BRAKINGS = [
     pytest.param(Braking(FULL), id="full"),

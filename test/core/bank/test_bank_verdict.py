@@ -22,7 +22,7 @@ from adhesion_node.core.bank.findings.ahead import constant
 from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.gear.wheels import WheelsSeen
-from adhesion_node.core.bank.labels.kinds import HELD, KINDS
+from adhesion_node.core.bank.labels.kinds import HELD, KINDS, STEADY
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail
@@ -60,6 +60,28 @@ def test_while_much_is_open_no_more_is_counted_on_than_was_known() -> None:
         slowing = (50.0 / fastest) ** 2 * (least + resisting)
         assert findings.ahead.mu[-1] == pytest.approx(slowing - resisting), "the fastest one stops where it is told"
         assert findings.rail.lower == pytest.approx(min(least, findings.rail.mu))
+
+
+@pytest.mark.parametrize(
+    ("used", "alone", "told"),
+    [(0.04, True, True), (0.04, False, False), (0.018, True, False), (1.6 * FULL, True, False)],
+    ids=["slowed", "by no demand", "hardly", "by more than any brake"],
+)
+def test_a_gauge_that_shows_no_brake_while_the_train_is_slowed(used: float, alone: bool, told: bool) -> None:
+    """Another brake works: what it uses is told, and that the rail gives it; nothing is learnt of the rail."""
+    bank = bank_of([STEADY], spread=0.0)
+    bank.mean[:, MU] = used
+    bank = bank._replace(covariance=1e-8 * bank.covariance)
+    findings = found(CONFIG, memory_of(bank, Braking(0.0, alone=alone), 0), NOTHING, NOTHING)
+    assert findings.regime is Regime.COASTING
+    assert findings.known == NOTHING
+    if told:
+        assert findings.rail.mu == pytest.approx(used)
+        assert 0.8 * used < findings.rail.lower < used
+        assert NOTHING.lower < min(findings.ahead.mu) < 0.8 * used
+    else:
+        assert findings.rail == NOTHING
+        assert max(findings.ahead.mu) <= NOTHING.lower
 
 
 def test_a_train_of_whose_brake_nothing_is_known_brakes_from_a_fiftieth_of_g_on() -> None:

@@ -103,7 +103,7 @@ def counted_on(
     `used` is what each hypothesis uses now, if that is at hand.
     """
     used = use(config, bank, braking, resistance(config, bank)) if used is None else used
-    weight, partial = bank.weight, is_partial(config, braking)
+    weight, partial = bank.weight, is_partial(config, braking, float(bank.weight @ used.value))
     speeds = _speeds_ahead(bank)
     if not (partial or braking.is_sure):
         weight = weight * np.where(used.slides & np.isneginf(bank.born_s), UNTOLD, 1.0)
@@ -152,9 +152,9 @@ def surely(config: Config, bank: Bank) -> float:
     return min(max(factor, 0.0), 1.0) * config.train.full_brake
 
 
-def is_partial(config: Config, braking: Braking) -> bool:
-    """Whether only a part of the brake is applied."""
-    return braking.applied < PARTIAL * config.train.full_brake
+def is_partial(config: Config, braking: Braking, used: float) -> bool:
+    """Whether only a part of the brake is applied, by what presses and by what is `used`, of another one, too."""
+    return max(braking.applied, used) < PARTIAL * config.train.full_brake
 
 
 def _speeds_ahead(bank: Bank) -> Array:

@@ -20,7 +20,7 @@ from ..following import SPEED_ERROR_MPS
 from ..gear.wheels import BRAKE_BELOW
 from ..labels.laws import SLIPPERY
 from ..memory import Memory
-from ..motion import resistance, use
+from ..motion import ANOTHER, resistance, use
 from .ahead import (
     KNOWN_SHARE,
     PARTIAL,
@@ -44,7 +44,7 @@ WIDTH_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
 SLOWING = 0.02
-"""Net deceleration over g from which a train of whose brake nothing is known brakes."""
+"""Net deceleration over g from which a train brakes of whose brake nothing is known, or no gauge shows."""
 
 LIKELY = 0.5
 """Probability of sliding from which what is used is what the rail gives."""
@@ -83,34 +83,40 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     if memory.misled:
         lower = min(nothing.lower, surely(config, bank))
         return Findings(Regime.COASTING, nothing, for_the_fastest(config, bank, lower)[0], nothing)
-    if not memory.braked and memory.brake.known:
-        return Findings(Regime.COASTING, before, unfelt(config, bank, before.lower), before)
     used = use(config, bank, memory.braking, resistance(config, bank))
     std, missed = used.std(config, bank), KNOWN_SHARE * (1.0 - config.confidence)
     low, middle, high = quantiles(bank.weight, used.value, std, (LOW_95, 0.5, HIGH_95))
+    if memory.brake.known and not (memory.braked or _is_slowed(config, memory, low, high)):
+        return Findings(Regime.COASTING, before, unfelt(config, bank, before.lower), before)
     surging = np.hypot(std, SURGING * config.ripple * used.value)
     bound = float(quantiles(bank.weight, used.value, surging, (missed,)).item())
     rail = Rail(max(middle, 0.0), (high - low) / WIDTH_95, min(max(bound, 0.0), max(middle, 0.0)))
-    if not memory.braked:
+    if not memory.brake.known:
         free = before
         if rail.mu > SLOWING:
             free = rail._replace(lower=max(rail.lower, min(before.lower, rail.mu)))
         return Findings(Regime.COASTING, free, unfelt(config, bank, before.lower), free)
     missed = KNOWN_SHARE * (1.0 - config.curve_confidence)
-    ahead = counted_on(config, borne_out(memory), missed, memory.braking, memory.known, used)
-    slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, memory.known.lower
+    was = memory.known if memory.braked else before
+    ahead = counted_on(config, borne_out(memory), missed, memory.braking, was, used)
+    slides, regime, least = float(bank.weight @ used.slides), Regime.COASTING, was.lower
     if rail.std > config.undecided_share * config.unknown_std:
         least = min(before.lower, least)
     else:
         regime = _regime(config, memory, slides, rail.mu)
         rolls = slides <= LIKELY and regime is not Regime.ADHESION_LIMITED
-        least = least if is_partial(config, memory.braking) and rolls else 0.0
+        least = least if is_partial(config, memory.braking, rail.mu) and rolls else 0.0
     floor, is_lost = for_the_fastest(config, bank, min(least, surely(config, bank)))
     lower = max(rail.lower, least)
     ahead = for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
-    return Findings(regime, rail, ahead, known)
+    return Findings(regime, rail, ahead, known if memory.braked else before)
+
+
+def _is_slowed(config: Config, memory: Memory, low: float, high: float) -> bool:
+    """Whether a brake surely slows the train down though the gauge shows none."""
+    return memory.braking.alone and low > SLOWING and high < ANOTHER * config.train.full_brake
 
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:

@@ -24,9 +24,9 @@ Mask = NDArray[np.bool_]
 Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 """A bank as a plain tuple, as the next two are: one with names takes numba 20 times as long to look at."""
 ModelNumbers = tuple[
-    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, float, float, float
+    float, Array, Array, Array, Array, Array, Array, Array, float, Array, float, Array, Array, float, float, float
 ]
-StepNumbers = tuple[float, float, float, bool, float, float, float]
+StepNumbers = tuple[float, float, float, bool, float, float, bool, float]
 
 GRAVITY = 9.8
 LEAST_MU = 0.03
@@ -70,6 +70,8 @@ class Model(NamedTuple):
     """How long the net deceleration of each kind lasts that no brake holds, s, shape (K,); 0: brake or rail hold it."""
     free_std: float
     """Its standard deviation over g."""
+    most: Array
+    """And what it is at most, shape (K,)."""
     rates: Array
     """Variances per second of position, brake, bias and radius."""
     grade_error: float
@@ -87,6 +89,7 @@ class Step(NamedTuple):
     rising: bool
     told: float
     filling: float
+    alone: bool
     declared_m: float
 
 
@@ -114,7 +117,8 @@ def _used(
 ) -> tuple[float, bool, float, float, float, float]:
     """u, whether the adhesion limits, and du/d(mu, rho, beta, v)."""
     if model.free[kind] > 0.0:
-        return x[MU], False, 1.0, 0.0, 0.0, 0.0
+        most = model.most[kind]
+        return min(x[MU], most), False, 1.0 if x[MU] < most else 0.0, 0.0, 0.0, 0.0
     rotating = model.rotating
     needed = (x[BRAKE] * step.applied - rotating * resisting) / (1.0 + rotating)
     rail = x[MU] * (1.0 + x[ROUGH])
@@ -130,8 +134,12 @@ def _used(
 
 @kernel
 def _opened(model: Model, step: Step, brake: float, variance: float) -> float:
-    """Variance per second of the brake's force that is another one's, by how well it is known."""
-    return OPENS**2 if step.applied > 0.0 and brake > model.strongest and variance < OPEN**2 else 0.0
+    """Variance per second of the brake's force that is another one's, by how well it is known.
+
+    Where a gauge is alone another brake is a hypothesis of its own.
+    """
+    stronger = brake > model.strongest and step.applied > 0.0 and not step.alone
+    return OPENS**2 if stronger and variance < OPEN**2 else 0.0
 
 
 @kernel

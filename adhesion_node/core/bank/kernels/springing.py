@@ -28,7 +28,7 @@ Columns = tuple[Array, Array, Array, Labels, Labels, Labels, Array, Array]
 
 MU, ROUGH, BRAKE, SIZE = 2, 3, 4, 11
 HELD = 1
-LAW, ROLLS, BORDER, LASTS, SLIDES = 1, 2, 3, 4, 5
+LAW, ROLLS, BORDER, BEGINS, ENDS, LASTS, LEFT, SLIDES = 1, 2, 3, 4, 5, 6, 7, 8
 """What is new of a hypothesis; from `SLIDES` on, by which part of `less`. A row of `rows` is its parent, law, kind, and
 this."""
 
@@ -56,6 +56,16 @@ class Rule(NamedTuple):
     """Time in which it begins to pass one."""
     passed_s: float
     """Time that this takes."""
+    other: int
+    """Kind of a train that another brake holds beside the known one."""
+    other_s: float
+    """Time in which that begins to work, ..."""
+    ended_s: float
+    """... and ends."""
+    more: Array
+    """How much more is used then than the known brake needs, and how well that is known."""
+    unneeded: float
+    """Probability of another brake, at least, of which it is seen that it gives no more."""
     less: Array
     """Parts of what the brake needs that a rail may give on which axles begin to slide."""
     less_std: float
@@ -133,18 +143,59 @@ def _rolling(bank: Bank, slides: Mask, rule: Rule, rows: Labels, weight: Array, 
 
 @kernel
 def _begun(bank: Bank, holds: Mask, needed: Array, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
-    """Adhesion has become less than the brake needs."""
-    rate = rule.elapsed_s / rule.begin_s / rule.sliding[:, 1].sum() / rule.less.size
+    """Adhesion has become less than the brake needs, or is so where there is no other brake any more."""
+    rate = rule.elapsed_s / rule.sliding[:, 1].sum() / rule.less.size
     for part in range(rule.less.size):
         for law in range(rule.laws.shape[0]):
             for kind in range(rule.sliding.shape[0]):
                 for h in range(holds.size):
-                    gives = rule.less[part] * needed[h]
-                    likely = rate * law_prior(rule.laws, rule.levels, law, gives) * rule.sliding[kind, 1]
+                    gives, within_s = (
+                        rule.less[part] * needed[h],
+                        rule.begin_s if bank.kind[h] == HELD else rule.ended_s,
+                    )
+                    likely = rate / within_s * law_prior(rule.laws, rule.levels, law, gives) * rule.sliding[kind, 1]
                     if holds[h] and likely > 0.0:
                         rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, SLIDES + part
-                        weight[size] = bank.log_weight[h] + math.log(likely)
+                        weight[size] = weight[h] + math.log(likely)
                         size += 1
+    return size
+
+
+@kernel
+def _unneeded(bank: Bank, needed: Array, rule: Rule, weight: Array) -> None:
+    """Another brake that gives no more than the known one needs is hardly there."""
+    for h in range(needed.size):
+        if bank.kind[h] == rule.other:
+            off = (needed[h] - bank.mean[h, MU]) / math.sqrt(max(bank.covariance[h, MU, MU], 1e-12))
+            weight[h] += math.log(max(0.5 * math.erfc(off / math.sqrt(2.0)), rule.unneeded))
+
+
+@kernel
+def _otherwise(bank: Bank, strong: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """Another brake begins to work beside the known one, or has ended: then axles roll."""
+    for h in range(strong.size):
+        begins, ends = bank.kind[h] == HELD, bank.kind[h] == rule.other and rule.told <= 0.0
+        likely = rule.elapsed_s / (rule.other_s if begins else rule.ended_s)
+        if strong[h] and (begins or ends) and likely > 0.0:
+            rows[size, 0], rows[size, 1], rows[size, 2] = h, 0, rule.other if begins else HELD
+            rows[size, 3] = BEGINS if begins else ENDS
+            weight[size] = weight[h] + math.log(likely)
+            size += 1
+    return size
+
+
+@kernel
+def _left(bank: Bank, others: Mask, rule: Rule, rows: Labels, weight: Array, size: int) -> int:
+    """There is no other brake any more, and what is used is what the rail gives."""
+    rate = rule.elapsed_s / rule.ended_s / rule.sliding[:, 1].sum()
+    for law in range(rule.laws.shape[0]):
+        for kind in range(rule.sliding.shape[0]):
+            for h in range(others.size):
+                likely = rate * law_prior(rule.laws, rule.levels, law, bank.mean[h, MU]) * rule.sliding[kind, 1]
+                if others[h] and likely > 0.0:
+                    rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, LEFT
+                    weight[size] = weight[h] + math.log(likely)
+                    size += 1
     return size
 
 
@@ -165,17 +216,22 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
     count = bank.kind.size
     strong = np.exp(bank.log_weight) > rule.strong
     slides = strong & (rule.sliding[:, 1][bank.kind] > 0.0)
-    holds = strong & (bank.kind == HELD) & (rule.told >= 0.0)
+    holds = strong & ((bank.kind == HELD) | (bank.kind == rule.other)) & (rule.told >= 0.0)
+    others = strong & (bank.kind == rule.other) & (rule.told >= 0.0)
     kinds, laws = rule.sliding.shape[0], rule.laws.shape[0]
-    most = count + (laws + 1 + kinds) * slides.sum() + laws * kinds * rule.less.size * holds.sum()
+    most = count + strong.sum() + (laws + 1 + kinds) * slides.sum()
+    most += laws * kinds * (rule.less.size * holds.sum() + others.sum())
     rows, weight = np.zeros((most, 4), np.intp), np.empty(most)
     for h in range(count):
         rows[h, 0], rows[h, 1], rows[h, 2], weight[h] = h, bank.law[h], bank.kind[h], bank.log_weight[h]
+    _unneeded(bank, needed, rule, weight)
     size = _bent(bank, slides, rule, rows, weight, count)
     size = _passing(bank, slides, rule, rows, weight, size)
     if rule.told <= 0.0 and slides.any():
         size = _rolling(bank, slides, rule, rows, weight, size)
     size = _begun(bank, holds, needed, rule, rows, weight, size)
+    size = _otherwise(bank, strong, rule, rows, weight, size)
+    size = _left(bank, others, rule, rows, weight, size)
     parent, law, kind = rows[:size, 0].copy(), rows[:size, 1].copy(), rows[:size, 2].copy()
     mean, covariance = bank.mean[parent], bank.covariance[parent]
     born, changed = bank.born_s[parent], bank.changed_s[parent]
@@ -184,8 +240,12 @@ def branched(bank: Bank, needed: Array, rule: Rule) -> Columns:
         born[row] = rule.now_s
         if new in (BORDER, LASTS):
             changed[row] = rule.now_s
-        if new == ROLLS:
+        if new in (ROLLS, BEGINS, ENDS):
             _fresh(x, p, ROUGH, 0.0, 0.0)
+        if new == BEGINS:
+            _fresh(x, p, MU, needed[parent[row]] + rule.more[0], rule.more[1])
+        if new == ENDS:
+            _fresh(x, p, MU, x[MU], 0.5 * abs(x[MU]) + rule.least_std)
         if new >= LASTS:
             _fresh(x, p, ROUGH, 0.0, rule.sliding[kind[row], 0])
         if new >= SLIDES:

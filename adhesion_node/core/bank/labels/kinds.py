@@ -53,8 +53,9 @@ KINDS = (
     Kind("passing", True, 0.3, 0.0, 0.05, 0.01),
     Kind("failing", True, 0.006, 0.0, 0.01, 0.08, -0.006, swings=True),
     Kind("steady", False, 0.0, 0.0, 0.02, 0.5, free_s=7200.0),
+    Kind("other", False, 0.0, 0.0, 0.02, 0.02, free_s=800.0),
 )
-FREE, HELD, PASSING, STEADY = 0, 1, 7, 9
+FREE, HELD, PASSING, STEADY, OTHER = 0, 1, 7, 9, 10
 SLIDING = tuple(index for index, kind in enumerate(KINDS) if kind.slides)
 
 SLIDES = np.array([kind.slides for kind in KINDS])
