@@ -59,7 +59,7 @@ PASSING_S, PASSED_S = 300.0, 3.0
 
 OTHER_S, ENDED_S, MORE, UNNEEDED = 60.0, 20.0, (0.03, 0.03), 0.01
 """Another brake, which no gauge shows, begins to work once in that time, and ends in that. So much more is used then
-than the known one needs, known so well; else it is at most so likely to be there."""
+than the known one needs, known so well; of one that is seen to give no more so much is left, twice a second."""
 
 CHANGE_S, BEND_S = 600.0, 60.0
 """Axles roll again, whatever the adhesion was, once in that time, and how it depends on speed changes."""

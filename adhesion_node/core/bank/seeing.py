@@ -98,11 +98,8 @@ def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) 
     slope[:, MU], slope[:, ROUGH] = -more * (1.0 + mean[:, ROUGH]), -more * mean[:, MU]
     short = part * rolling_use(config, bank, braking) + slope[:, MU] * mean[:, MU]
     slides = np.where(SLIDES[bank.kind], times - 1.0, 0.0)
-    either = np.where(
-        bank.kind == OTHER, max(elapsed_s * braking.told, 0.0), 0.0
-    )  # another brake makes them slide, too
-    seen = _above(bank, short, slope, 0.0, 1.0, slides)
-    return seen._replace(log_weight=seen.log_weight + either)
+    seen, more = _above(bank, short, slope, 0.0, 1.0, slides), max(elapsed_s * braking.told, 0.0)
+    return seen._replace(log_weight=seen.log_weight + more * (bank.kind == OTHER))  # it makes them slide, or none does
 
 
 def fall_seen(config: Config, bank: Bank, braking: Braking, fall_mps2: float) -> Bank:

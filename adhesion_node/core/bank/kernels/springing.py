@@ -65,7 +65,7 @@ class Rule(NamedTuple):
     more: Array
     """How much more is used then than the known brake needs, and how well that is known."""
     unneeded: float
-    """Probability of another brake, at least, of which it is seen that it gives no more."""
+    """Part of its probability, at least, that is left to one that is seen to give no more."""
     less: Array
     """Parts of what the brake needs that a rail may give on which axles begin to slide."""
     less_std: float
@@ -149,11 +149,9 @@ def _begun(bank: Bank, holds: Mask, needed: Array, rule: Rule, rows: Labels, wei
         for law in range(rule.laws.shape[0]):
             for kind in range(rule.sliding.shape[0]):
                 for h in range(holds.size):
-                    gives, within_s = (
-                        rule.less[part] * needed[h],
-                        rule.begin_s if bank.kind[h] == HELD else rule.ended_s,
-                    )
-                    likely = rate / within_s * law_prior(rule.laws, rule.levels, law, gives) * rule.sliding[kind, 1]
+                    gives = rule.less[part] * needed[h]
+                    likely = rate * law_prior(rule.laws, rule.levels, law, gives) * rule.sliding[kind, 1]
+                    likely /= rule.begin_s if bank.kind[h] == HELD else rule.ended_s
                     if holds[h] and likely > 0.0:
                         rows[size, 0], rows[size, 1], rows[size, 2], rows[size, 3] = h, law, kind, SLIDES + part
                         weight[size] = weight[h] + math.log(likely)
