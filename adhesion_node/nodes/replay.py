@@ -109,7 +109,9 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
 
 def _parser() -> argparse.ArgumentParser:
     usage = "%(prog)s BAG [options] [--ros-args ...]"
-    parser = argparse.ArgumentParser("replay", parents=[json_option()], usage=usage, **help_texts(__doc__, *EXAMPLES))
+    parser = argparse.ArgumentParser(
+        "replay", parents=[json_option()], usage=usage, allow_abbrev=False, **help_texts(__doc__, *EXAMPLES)
+    )
     add = parser.add_argument
     add("bag", metavar="BAG", help="a rosbag2 directory, an .mcap or a .db3 file, finished or not")
     remap_option(add)

@@ -61,6 +61,15 @@ def test_a_frame_gives_what_its_log_gives_to_the_bit(frame: pd.DataFrame, tmp_pa
     assert found.attrs["why"] == expected.get("why")
 
 
+@pytest.mark.parametrize("unit_pa", [1e5, 1e3])
+def test_a_pressure_in_another_unit_is_no_brake_that_is_known(unit_pa: float) -> None:
+    frame = measured()
+    found = estimate(frame.assign(brake_pressure=frame.brake_pressure / unit_pa))
+    assert str(found.attrs["why"]).startswith(
+        f"the brake pressure is {410e3 / unit_pa:.3g} Pa at most: is its unit right"
+    )
+
+
 def test_the_result_has_the_columns_of_a_file_and_the_time_of_the_frame() -> None:
     frame = measured()
     found = estimate(frame)

@@ -250,7 +250,8 @@ def test_an_unreadable_bag_is_one_line_and_code_2(
 
 
 def test_bad_usage_ends_with_code_2(bag: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    for arguments in (["--offline"], [str(bag), "--offline", "--nothing"], [str(bag), "--offline", "--seed", "one"]):
+    offline = str(bag), "--offline"
+    for arguments in (["--offline"], [*offline, "--nothing"], [*offline, "--seed", "one"], [str(bag), "--off"]):
         with pytest.raises(SystemExit) as ended:
             replay.main(arguments)
         assert ended.value.code == 2

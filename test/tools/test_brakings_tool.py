@@ -221,5 +221,6 @@ def test_bad_usage_is_said_before_anything_is_replayed(
 ) -> None:
     assert brakings.main([str(bags / "monday"), *options]) == 2
     assert said in capfd.readouterr().err
-    assert brakings.main(["nowhere", "--output", "b.csv"]) == 2
-    assert "bag = nowhere: is not there" in capfd.readouterr().err
+    for given, path in (("nowhere", "nowhere"), ("ice=a=b/c", "a=b/c"), ("ice=", "ice=")):
+        assert brakings.main([given, "--output", "b.csv"]) == 2
+        assert f"bag = {path}: is not there" in capfd.readouterr().err

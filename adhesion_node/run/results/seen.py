@@ -113,7 +113,7 @@ class Seen:
     @property
     def identified(self) -> bool:
         """Whether the adhesion limited, or may have for more than the first moments of a braking."""
-        told = 0 if self.most_pa is None else self._told  # without any pressure it may be a brake that is seen
+        told = self._told if (self.most_pa or 0.0) >= BRAKED_PA else 0  # else it may be a brake that is seen
         is_open = self._limited > 0 or told > MANY * self._at_brake
         return is_open and not (self._runs_back or self._runs_on or self._fastest_mps > FASTEST_MPS)
 

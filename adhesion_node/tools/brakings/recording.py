@@ -76,9 +76,11 @@ class Recording(NamedTuple):
 
 def recording_of(text: str, values: dict[str, Any], options: argparse.Namespace) -> Recording:
     """The task of what is given, [TRAIN=]BAG. Raises ValueError where there is no such recording."""
-    name, _, path = ("", "", text) if Path(text).exists() else text.rpartition("=")
-    if not Path(path).exists():
-        raise ValueError(f"bag = {path}: is not there")
+    name, is_named, path = text.partition("=")
+    if Path(text).exists() or not is_named:
+        name, path = "", text
+    if not path or not Path(path).exists():
+        raise ValueError(f"bag = {path or text}: is not there")
     named = [value for value in values.values() if isinstance(value, str) and value and Path(value).is_file()]
     as_of = tuple(_as_of(Path(each)) for each in (path, *named))
     train = name or Path(path).resolve().stem

@@ -130,7 +130,9 @@ def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any
         how = f"it is not written {known}: say how with --time-format, such as '%d.%m.%Y %H:%M:%S.%f'"
         refuse(bad, "not_a_time", "time", lambda _: how)
         return
-    outside = bad & np.isfinite(numbers(cells, form.decimal or "."))
+    read = numbers(cells, form.decimal or ".", form.thousands)
+    refuse(bad & (read < 0.0), "out_of_range", "time", lambda _: "it is below 0: add the same to all, so that none is")
+    outside = bad & np.isfinite(read)
     range_ = "a stamp lies between 1970 (or 0) and 2038: is the --time-unit another? Or --time-format %Y%m%d%H%M%S?"
     refuse(outside, "out_of_range", "time", lambda _: range_)
     refuse(bad, "not_a_number", "time", lambda _: f"{NO_NUMBER}; a date is told by --time-format")

@@ -80,7 +80,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     std = np.sqrt(np.maximum(variance, 1e-12)) * rising
     # the whole brake may make axles slide that roll under a part of it
     whole = config.train.specific_brake(config.train.full_pressure_pa)
-    partial = max(braking.applied, float(bank.weight @ used.value)) < ahead.PARTIAL * whole
+    partial = max(braking.applied, float(bank.weight @ used.value)) < ahead.PARTIAL * whole and braking.told <= 1.0
     borne = used.value * (ROLLED[0] / ROLLED[1] if partial else 1.0)
     least = min(known.lower, whole) if partial else 0.0
     foreseen, more = np.where(sliding, foreseen, foreseen + borne - used.value), ~sliding & (borne < least)

@@ -36,7 +36,7 @@ FAULTS = [
     (
         "-1,1,1,0,0",
         "out_of_range",
-        "FILE:3: time = '-1': a stamp lies between 1970 (or 0) and 2038: is the --time-unit",
+        "FILE:3: time = '-1': it is below 0: add the same to all, so that none is",
     ),
     ("1700000000000,1,1,0,0", "out_of_range", "FILE:3: time = '1700000000000': a stamp lies between 1970"),
     ("2,1e300,1,0,0", "out_of_range", "FILE:3: position = '1e300': 1e+300 is not from -1e+07 to 1e+07 m"),

@@ -21,10 +21,11 @@ __all__ = ["importing"]
 
 
 def in_groups(rows: pd.DataFrame, separator: str, decimal: str) -> pd.DataFrame:
-    """Numbers with separators of thousands; whole ones have no decimals."""
+    """Numbers with separators of thousands; whole ones have no decimals. Times pass 1000 s in their midst."""
     signs = str.maketrans(",.", separator + decimal)
     written = {name: rows[name].map("{:,.2f}".format) for name in ("position", "speed")}
-    written |= {"brake_pressure": rows.brake_pressure.map("{:,.0f}".format), "time": rows.time.map("{:.1f}".format)}
+    times = (rows.time + 970.0).map("{:,.1f}".format)
+    written |= {"brake_pressure": rows.brake_pressure.map("{:,.0f}".format), "time": times}
     return rows.assign(**{name: cells.str.translate(signs) for name, cells in written.items()})
 
 

@@ -19,6 +19,7 @@ from ...belief.rail import Rail
 from ...physics.train import Array
 from ...setting import once
 from ..blind import STANDS_MPS
+from ..gear.wheels import HINTED
 from ..kernels import mixture, weighing
 from ..labels import kinds
 from ..layout import BRAKE, SPEED, Bank
@@ -153,8 +154,8 @@ def surely(config: Config, bank: Bank) -> float:
 
 
 def is_partial(config: Config, braking: Braking, used: float) -> bool:
-    """Whether only a part of the brake is applied, by what presses and by what is `used`, of another one, too."""
-    return max(braking.applied, used) < PARTIAL * config.train.full_brake
+    """Whether axles may roll under a part of the brake, by what presses and by what is `used`, of another one, too."""
+    return max(braking.applied, used) < PARTIAL * config.train.full_brake and not braking.told > HINTED
 
 
 def _speeds_ahead(bank: Bank) -> Array:

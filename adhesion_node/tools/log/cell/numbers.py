@@ -80,15 +80,20 @@ def numbers(cells: "pd.Series[Any]", decimal: str, thousands: bool = False) -> A
     if pd.api.types.is_numeric_dtype(cells):
         read = cells.to_numpy(dtype=np.float64, na_value=np.nan)
     else:
-        text, separator = cells.astype(str).str.replace("\u2212", "-", regex=False), "." if decimal == "," else ","
-        text = text.str.replace(NO_DECIMAL, "", regex=True)
-        in_groups = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{separator}][0-9]{{3}})+[{decimal}][0-9]+")
-        in_groups |= grouped(text, decimal) & thousands
-        text = text.mask(in_groups, text.str.replace(separator, "", regex=False))
+        text = _ungrouped(cells.astype(str), decimal, thousands)
         if decimal == ",":
             text = text.str.replace(".", "no number", regex=False).str.replace(",", ".", regex=False)
         read = text.where(text.str.fullmatch(_NUMBER), "nan").to_numpy(dtype=object).astype(np.float64)
     return np.where(np.isfinite(read), read, np.nan)
+
+
+def _ungrouped(text: "pd.Series[str]", decimal: str, thousands: bool) -> "pd.Series[str]":
+    """Cells without separators of thousands; the decimal sign stays as it is."""
+    text = text.str.replace("\u2212", "-", regex=False).str.replace(NO_DECIMAL, "", regex=True)
+    separator = "." if decimal == "," else ","
+    in_groups = text.str.fullmatch(rf"[+-]?[0-9]{{1,3}}(?:[{separator}][0-9]{{3}})+[{decimal}][0-9]+")
+    in_groups |= grouped(text, decimal) & thousands
+    return text.mask(in_groups, text.str.replace(separator, "", regex=False))
 
 
 def in_flags(cells: "pd.Series[Any]") -> "pd.Series[Any]":
@@ -127,8 +132,10 @@ def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype
         since = pd.TimedeltaIndex(cells).as_unit("ns").asi8
         return np.where((since >= 0) & (since < END_OF_STAMPS_NS), since, NO_TIME)
     if form.time_format is None:
-        unit, sign = form.time_unit or "s", form.decimal or "."
-        return np.array([_count(text.replace(sign, "."), unit) for text in map(str, cells)], dtype=np.int64)
+        unit, sign, text = form.time_unit or "s", form.decimal or ".", cells.astype(str)
+        if not pd.api.types.is_numeric_dtype(cells):
+            text = _ungrouped(text, sign, form.thousands).str.replace(sign, ".", regex=False)
+        return np.array([_count(each, unit) for each in text], dtype=np.int64)
     return _stamps(_parsed(cells.astype(str), form.time_format))
 
 
