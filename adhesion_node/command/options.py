@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 
 from .signals import interrupted
 from .streams import open_closed_streams
-from .written import require_folder, write_text
+from .written import require_apart, require_folder, write_text
 
 Item = TypeVar("Item")
 
@@ -44,6 +44,12 @@ NO_ROOM = ": make room, or name a place on another disk"
 ESCAPED = "backslashreplace"
 """What becomes of letters that a terminal's encoding has not, and of bytes in a file's name that are none."""
 
+WRITTEN = ("output", "map", "out", "json")
+"""Options of all tools that name a file to write, or a folder."""
+
+NARROWEST = 11
+"""Letters to a line of a help, as argparse has it."""
+
 PROGRESS_S = 1.0
 """Time between two signs of life."""
 
@@ -54,7 +60,7 @@ def help_texts(purpose: str, *examples: str, more: str = "") -> dict[str, Any]:
     >>> help_texts("Does it.", "tool FILE")["epilog"]
     'examples:\n  tool FILE'
     """
-    width = shutil.get_terminal_size().columns - 2
+    width = max(shutil.get_terminal_size().columns - 2, NARROWEST)
     paragraphs = [textwrap.fill(" ".join(part.split()), width) for part in purpose.split("\n\n")]
     shown = "\n".join(["examples:", *(f"  {example}" for example in examples)]) if examples else ""
     return {
@@ -164,7 +170,7 @@ def _worked(
     complete(parser)
     options = parser.parse_args(args)
     try:
-        require_folder(getattr(options, "json", None) or "-", getattr(options, "output", None))
+        _require_files(options)
         return work(options)
     except ValueError as error:
         return complain(parser.prog, error, BAD_INPUT)
@@ -176,6 +182,15 @@ def _worked(
         if not _is_interrupt(error):
             raise
         return interrupted(parser.prog)
+
+
+def _require_files(options: argparse.Namespace) -> None:
+    """Raise, before the work, where a file cannot be written as it is named, or would be in another's place."""
+    named = {name: value for name, value in vars(options).items() if value not in (None, "-")}
+    require_folder(named.get("json", "-"), named.get("output"))
+    written = {name: str(named.pop(name)) for name in WRITTEN if name in named}
+    texts = [str(text) for value in named.values() for text in (value if isinstance(value, list) else [value])]
+    require_apart(written, [*texts, *(text.partition("=")[2] for text in texts)])
 
 
 def printable(path: str) -> str:

@@ -102,7 +102,11 @@ def running(options: argparse.Namespace) -> Running:
 
 def run_all(wanted: Sequence[Task], where: Running, *, as_given: bool = False) -> Iterator[Arrays]:
     """Yield the results of all tasks in order; compute those that the cache lacks, heavy ones first or `as_given`."""
-    where.cache.mkdir(parents=True, exist_ok=True)
+    try:
+        where.cache.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        remedy = "name a place for finished runs with --cache"
+        raise ValueError(f"cache = {where.cache}: {error.strerror}: {remedy}") from error
     by_file = {file_name(task): task for task in wanted}
     missing = [task for file, task in by_file.items() if not _is_kept(where.cache / file)]
     if missing:

@@ -16,6 +16,7 @@ number alone, so the same samples give the same bits whoever feeds them.
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from numbers import Integral
 
 from .config import Config
 from .estimate import Estimate
@@ -39,9 +40,9 @@ from .state import State
 
 
 def init(config: Config, seed: int) -> State:
-    """State before the first measurement. Raises ValueError for a negative seed."""
-    if seed < 0:
-        raise ValueError(f"seed = {seed}: give an integer of at least 0")
+    """State before the first measurement. Raises ValueError for a seed that is negative or no integer."""
+    if not (isinstance(seed, Integral) and seed >= 0):
+        raise ValueError(f"seed = {seed!r}: give an integer of at least 0")
     return State(seed, gate_of(config), METHODS.get(config.method))
 
 

@@ -17,8 +17,8 @@ from pathlib import Path
 
 import pytest
 
-from adhesion_node.command.options import DONE, FAILED, json_option, run_tool
-from adhesion_node.command.written import write_text
+from adhesion_node.command.options import BAD_INPUT, DONE, FAILED, help_texts, json_option, run_tool
+from adhesion_node.command.written import whole, write_text
 
 
 def interrupted_in_a_kernel(_: argparse.Namespace) -> int:
@@ -119,3 +119,89 @@ def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path: Path, caps
     assert not worked
     assert tables("--output", str(tmp_path / "no")) == DONE  # a folder that the work makes
     assert "No such file or directory: name one that is there" in capsys.readouterr().err
+
+
+def reading(args: list[str]) -> int:
+    """A tool that reads LOG and writes a file of its own and JSON."""
+    parser = argparse.ArgumentParser("tool", parents=[json_option()])
+    parser.add_argument("log", nargs="+")
+    parser.add_argument("--out")
+
+    def work(options: argparse.Namespace) -> int:
+        for path in filter(None, (options.out, options.json)):
+            write_text(path, "result")
+        return DONE
+
+    return run_tool(parser, work, args)
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Work in an empty folder."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize("option", ["--out", "--json"])
+@pytest.mark.parametrize("path", ["log.csv", "./log.csv", "link.csv"])
+@pytest.mark.parametrize("log", ["log.csv", "unit_7=log.csv"])
+def test_no_result_takes_the_place_of_what_is_read(
+    option: str, path: str, log: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The log was lost."""
+    (here / "log.csv").write_text("log")
+    (here / "link.csv").symlink_to("log.csv")
+    assert reading([log, option, path]) == BAD_INPUT
+    assert capsys.readouterr().err == f"tool: {option} {path}: is read, and would be lost: name another file\n"
+    assert (here / "log.csv").read_text() == "log"
+    assert reading([log, option, "result"]) == DONE
+    assert reading([log, option, "result"]) == DONE, "an earlier result is written over"
+
+
+def test_two_results_are_not_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "result"
+    assert reading(["log.csv", "--out", str(file), "--json", f"{tmp_path}/./result"]) == BAD_INPUT
+    assert "both are one file: give each its own" in capsys.readouterr().err
+    assert not file.exists()
+
+
+@pytest.mark.parametrize("end", [ValueError, KeyboardInterrupt])
+@pytest.mark.parametrize("earlier", [[], ["earlier"]])
+def test_what_is_interrupted_leaves_the_earlier_file(
+    end: type[BaseException], earlier: list[str], tmp_path: Path
+) -> None:
+    """A part of the rows stood there under the final name."""
+    file = tmp_path / "out.csv"
+    for text in earlier:
+        file.write_text(text)
+    with pytest.raises(end):
+        begin(file, end)
+    assert [path.read_text() for path in tmp_path.iterdir()] == earlier
+
+
+def begin(file: Path, end: type[BaseException]) -> None:
+    with whole(file) as part:
+        Path(part).write_text("a part")
+        raise end
+
+
+def test_what_a_link_names_is_written(tmp_path: Path) -> None:
+    file, link = tmp_path / "out.csv", tmp_path / "link.csv"
+    link.symlink_to(file)
+    with whole(link) as part:
+        Path(part).write_text("all")
+    assert (file.read_text(), link.is_symlink()) == ("all", True)
+
+
+def test_what_is_no_file_is_written_itself(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    for path in (pipe, "/dev/stdout"):
+        with whole(path) as written:
+            assert written == str(path)
+
+
+def test_a_help_is_shown_on_the_narrowest_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It ended with a traceback."""
+    monkeypatch.setenv("COLUMNS", "1")
+    assert help_texts("Does it, and more.", "tool FILE")["description"].split() == ["Does", "it,", "and", "more."]

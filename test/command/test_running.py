@@ -210,6 +210,12 @@ def test_workers_do_not_take_each_others_cores(tmp_path: Path, monkeypatch: pyte
     assert told["threads"].tolist() == [3, 1, 1]
 
 
+def test_a_cache_that_cannot_be_made_is_told_with_the_remedy(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ValueError, match=r"cache = .*: Not a directory: name a place for finished runs with --cache"):
+        squares([Square(1.0, "")], Running(tmp_path / "file" / "cache"))
+
+
 def test_bad_numbers_of_workers_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["tune-ekf", "--runs", "1", "--cache", str(tmp_path), "--workers", "0"]) == 2
     assert capsys.readouterr().err == "study: workers = 0: give at least 1\n"

@@ -158,6 +158,8 @@ def test_a_frame_that_cannot_be_right_is_refused_with_the_remedy(frame: Any, mes
     [
         (lambda: estimate(measured(), slip({"start_mu": 0.1})), "config = {'start_mu': 0.1}: give a Config"),
         (lambda: estimate(measured(), seed=-1), "seed = -1: give an integer of at least 0"),
+        (lambda: estimate(measured(), seed=slip("1")), "seed = '1': give an integer of at least 0"),
+        (lambda: estimate(measured(), seed=slip(1.5)), "seed = 1.5: give an integer of at least 0"),
         (lambda: estimate(measured(), std_m=0.0), r"std_m = 0\.0: give the positions' standard deviation"),
         (lambda: Config(train=slip("CRH3")), "train = 'CRH3': give a Train"),
         (lambda: Config(track=slip("grade 0 1 2")), "track = 'grade 0 1 2': give a Track"),

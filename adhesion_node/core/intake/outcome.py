@@ -58,7 +58,8 @@ class Outcome(Enum):
     )
     SLIDING = (
         "positions slow down as no train can: those of a sliding wheel, left out until the brake is released; "
-        "take them from an axle without a brake, or from satellites; or is a speed beside them not in m/s?"
+        "take them from an axle without a brake, or from satellites; or is a speed beside them not in m/s, or do they "
+        "fall along the run: set direction?"
     )
     TURNED = (
         "the accelerometer feels the brake push the train forward: left out until a braking says otherwise; "

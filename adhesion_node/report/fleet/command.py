@@ -36,6 +36,8 @@ def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
         raise ValueError(f"bags = {', '.join(recordings)}: give recordings, or tables of brakings, not both")
     refuse(options, OF_RECORDINGS, "tables are shown as written: leave it out")
     fleet = read_fleet([Path(path) for path in paths])
+    for remark in fleet.remarks:
+        print(f"report: {remark}", file=sys.stderr)
     html, spots = fleet_page(fleet, low), low_spots(fleet.rail, low)
     output = Path(options.output)
     output.mkdir(parents=True, exist_ok=True)

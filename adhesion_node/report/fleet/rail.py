@@ -17,6 +17,7 @@ import pandas as pd
 
 from ...core.physics.train import KMH
 from ...run.results.brakings import BRAKING, CELL_M
+from ...run.results.copies import without_copies
 from ...run.results.rail_map import map_of
 
 RAIL = ("place_m", "length_m", "date", "seen", "limited", "mu", "mu_lowest", "used", "mu_lower")
@@ -31,6 +32,8 @@ class Fleet(NamedTuple):
     rail: pd.DataFrame
     by_piece: bool
     """The rail is a map that was written beside the brakings; else each braking counts alike along its whole way."""
+    remarks: Sequence[str] = ()
+    """Which brakings are there twice, and count once."""
 
 
 class Spot(NamedTuple):
@@ -63,12 +66,13 @@ def read_fleet(paths: Sequence[Path]) -> Fleet:
         (maps if is_map else tables).append(frame)
     if not tables or len(maps) > 1:
         raise ValueError(f"tables = {len(tables)} of brakings, {len(maps)} maps: give one or more, and one map at most")
-    brakings = pd.concat(tables).sort_values("t_ns", ignore_index=True)
+    once, copies = without_copies(pd.concat(tables))
+    brakings = once.sort_values("t_ns", ignore_index=True)
     if brakings.empty:
         raise ValueError(f"tables = {', '.join(map(str, paths))}: hold no braking, there is nothing to show")
     brakings["time"] = pd.to_datetime(brakings["t_ns"], utc=True)
     rail = maps[0] if maps else spread(brakings)
-    return Fleet(brakings, rail.sort_values(["date", "place_m"], ignore_index=True), bool(maps))
+    return Fleet(brakings, rail.sort_values(["date", "place_m"], ignore_index=True), bool(maps), tuple(copies))
 
 
 def spread(brakings: pd.DataFrame, cell_m: float = CELL_M) -> pd.DataFrame:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from ...command.written import naming
+from ...command.written import naming, whole
 from ...core import Prediction
 from ...core.bank.findings.learnt import KIND, QUANTITIES, learnt
 from ...core.bank.labels.kinds import KINDS
@@ -79,7 +79,7 @@ def rows_to(path: str | None) -> Iterator[Write]:
 
 @contextmanager
 def _csv(path: str) -> Iterator[Write]:
-    with _closed(Path(path).open("w", encoding="utf-8", newline=""), path) as file:
+    with whole(path) as part, _closed(Path(part).open("w", encoding="utf-8", newline=""), path) as file:
         writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
         writer.writeheader()  # waits in the file's buffer
 
@@ -100,22 +100,23 @@ def _parquet(path: str) -> Iterator[Write]:
     kinds = {int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.dictionary(pyarrow.int32(), pyarrow.string())}
     schema = pyarrow.schema([(name, kinds[kind]) for name, kind in COLUMNS.items()])
     waiting: list[Row] = []
-    with naming(path):
-        opened = parquet.ParquetWriter(path, schema)
-    with _closed(opened, path) as writer:
+    with whole(path) as part:
+        with naming(path):
+            opened = parquet.ParquetWriter(part, schema)
+        with _closed(opened, path) as writer:
 
-        def flush() -> None:
-            with naming(path):
-                writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
-            waiting.clear()
+            def flush() -> None:
+                with naming(path):
+                    writer.write_table(pyarrow.Table.from_pylist(waiting, schema))
+                waiting.clear()
 
-        def write(row: Row) -> None:
-            waiting.append(row)
-            if len(waiting) >= CHUNK:
-                flush()
+            def write(row: Row) -> None:
+                waiting.append(row)
+                if len(waiting) >= CHUNK:
+                    flush()
 
-        yield write
-        flush()
+            yield write
+            flush()
 
 
 @contextmanager

@@ -13,10 +13,8 @@ is finished is kept, so that a killed call goes on.
 """
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
-from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -37,12 +35,13 @@ from ...command.options import (
 from ...command.running import add_running_options, run_all, running
 from ...run import offline
 from ...run.results.brakings import CELL_M
+from ...run.results.copies import without_copies
 from ...run.results.rail_map import map_of
 from ...wire.files.train import read_train
 from ...wire.settings.nodes import TRAIN_FILE
 from ...wire.settings.setup import setup_of
 from .recording import once, recording_of
-from .table import say_undated, summary, table_of, without_copies, write
+from .table import say_undated, summary, table_of, write
 
 EXAMPLES = (
     "brakings monday tuesday --output brakings.parquet --map rail.parquet",
@@ -94,7 +93,10 @@ def _work(options: argparse.Namespace) -> int:
             print(f"brakings: {task.path}: {where}: record positions, or set track_line for its fixes", file=sys.stderr)
     result: dict[str, Any] = {"train": setup.train, "recordings": len(rows), "failed": failed, "brakings": 0}
     if rows:
-        table = table_of(without_copies(pd.concat(rows)))
+        once_each, copies = without_copies(pd.concat(rows))
+        for remark in copies:
+            print(f"brakings: {remark}", file=sys.stderr)
+        table = table_of(once_each)
         write(table, options.output)
         result |= {"brakings": len(table), "output": options.output, **summary(table)}
     if rows and options.map:
@@ -107,14 +109,10 @@ def _work(options: argparse.Namespace) -> int:
 
 
 def _check_files(options: argparse.Namespace) -> None:
-    """Raise ValueError for a file that cannot be written as it is named, or that would take another's place."""
+    """Raise ValueError for a table that cannot be written as it is named."""
     for name, path in (("output", options.output), ("map", options.map)):
         if path and Path(path).suffix not in ENDINGS:
             raise ValueError(f"{name} = {path}: give a file that ends in {' or '.join(ENDINGS)}")
-    named = [(name, path) for name in ("output", "map", "json") if (path := getattr(options, name))]
-    for (one, path), (other, again) in combinations(named, 2):
-        if os.path.realpath(path) == os.path.realpath(again):
-            raise ValueError(f"--{one} {path} and --{other} {again}: both are one file: give each its own")
 
 
 if __name__ == "__main__":

@@ -14,8 +14,7 @@ from typing import Any
 
 import pandas as pd
 
-from ...command.written import naming
-from ...run.results.brakings import BRAKING
+from ...command.written import naming, whole
 
 
 def table_of(rows: pd.DataFrame) -> pd.DataFrame:
@@ -23,17 +22,6 @@ def table_of(rows: pd.DataFrame) -> pd.DataFrame:
     table = rows.sort_values("t_ns", ignore_index=True)
     table.insert(0, "time", pd.to_datetime(table["t_ns"], utc=True))
     return table[["train", "recording", *table.columns.drop(["train", "recording"])]]
-
-
-def without_copies(rows: pd.DataFrame) -> pd.DataFrame:
-    """Say which brakings are copies, and take the first of each: no two agree in their stamps and in every number."""
-    numbers = list(BRAKING.names or ())
-    copied = rows.duplicated(numbers)
-    first = rows.groupby(numbers, dropna=False)["recording"].transform("first")
-    for (path, of), count in rows.assign(of=first)[copied].groupby(["recording", "of"]).size().items():
-        shared = f"{count} of its brakings are those of {of}, and count once"
-        print(f"brakings: {path}: {shared}: give one of both", file=sys.stderr)
-    return rows[~copied]
 
 
 def say_undated(table: pd.DataFrame) -> None:
@@ -59,12 +47,11 @@ def summary(table: pd.DataFrame) -> dict[str, Any]:
 
 def write(frame: pd.DataFrame, path: str) -> None:
     """Write a table as CSV or Parquet, by the ending of its file."""
-    if Path(path).suffix == ".csv":
-        with naming(path):
-            frame.to_csv(path, index=False)
-        return
-    try:
-        with naming(path):
-            frame.to_parquet(path, index=False)
-    except ImportError as error:
-        raise ValueError(f"output = {path}: needs pyarrow, pip install '.[parquet]', or write a .csv") from error
+    with naming(path), whole(path) as part:
+        if Path(path).suffix == ".csv":
+            frame.to_csv(part, index=False)
+            return
+        try:
+            frame.to_parquet(part, index=False)
+        except ImportError as error:
+            raise ValueError(f"output = {path}: needs pyarrow, pip install '.[parquet]', or write a .csv") from error

@@ -93,8 +93,9 @@ def in_doubt(told: Mapping[str, str], form: Format) -> Iterator[str]:
         unit, given, how = known(text, ours), form.given(ours), f"--{FAMILIES.get(ours)}-unit"
         if unit and given not in (unit, None):
             yield f"{ours} is said to be in {text!r}, and by {how} in {given}: which is right?"
-        elif kind_of(text, ours) == "gauge" and not form.pressure_is_gauge:
-            yield f"{ours} is said to be in {text!r}, above the air, and by --pressure-kind absolute: which is right?"
+        elif (kind := kind_of(text, ours)) and form.is_gauge not in (kind == "gauge", None):
+            other = "absolute" if kind == "gauge" else "gauge"
+            yield f"{ours} is said to be in {text!r}, {kind}, and by --pressure-kind {other}: which is right?"
         elif unit is None and given is None:
             *more, last = UNITS[FAMILIES.get(ours, ours)]
             cure = f"say which with {how} {', '.join(more)} or {last}" if more else "convert it"

@@ -49,7 +49,10 @@ def is_parquet(path: Path) -> bool:
 def lines(path: Path, encoding: str | None) -> Iterator[str]:
     """Yield the lines of a log, unpacked. A broken byte ends nothing: it becomes a character that no number has."""
     with _opened(path) as file, TextIOWrapper(file, encoding=encoding, errors="replace") as text:
-        yield from text
+        try:
+            yield from text
+        except UnicodeError as error:  # where a mark of the byte order is missing, or a whole letter
+            raise ValueError(f"{path}: encoding = {encoding}: {error}: name another, or leave it out") from None
 
 
 def encoding_of(path: Path) -> str:

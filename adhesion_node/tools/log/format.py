@@ -146,7 +146,8 @@ class Format:
     position_std_m: float | None = None
     """Stands in where the log gives no variance; None: see steps.py."""
     pressure_unit: str | None = None
-    pressure_is_gauge: bool = True
+    is_gauge: bool | None = None
+    """Whether all pressures are above the air; None: those which the log does not name absolute."""
     ambient_pressure_pa: float = ATMOSPHERE_PA
     pipe_released: float | None = None
     """Of the brake pipe, in the unit of pressures, where the brake is released; None: 9th decile as the train runs."""
@@ -190,7 +191,7 @@ class Format:
 
     def offset(self, column: str) -> float:
         """What is added to the numbers of a column in SI: the pressure of the air to those above it."""
-        is_gauge = self.pressure_is_gauge and column not in self.absolute
+        is_gauge = column not in self.absolute if self.is_gauge is None else self.is_gauge
         return self.ambient_pressure_pa if column in PRESSURES and (is_gauge or self.is_share(column)) else 0.0
 
     def is_share(self, column: str) -> bool:

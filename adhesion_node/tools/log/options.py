@@ -31,6 +31,9 @@ from .format import (
 )
 from .idle import asked
 
+GAUGE = {"gauge": True, "absolute": False}
+"""By --pressure-kind: whether pressures are above the air."""
+
 OF_TRAIN = ("wheel_radius_m", "full_pressure_pa")
 """What of a log's format the train's file knows."""
 
@@ -59,7 +62,7 @@ def format_of(options: argparse.Namespace) -> Format:
     given = vars(options)
     asked_for = asked(given)
     names = {column: given[column] for column in ("time", *OPTIONAL) if given[column] is not None}
-    given |= {"named": names, "pressure_is_gauge": options.pressure_kind == "gauge", "asked": asked_for}
+    given |= {"named": names, "is_gauge": GAUGE.get(options.pressure_kind), "asked": asked_for}
     train = read_train(options.train).train if options.train else CRH3
     given |= {name: getattr(train, name) for name in OF_TRAIN if given[name] is None}
     given["delimiter"] = options.delimiter and options.delimiter.replace("\\t", "\t")
@@ -101,7 +104,7 @@ def _unit_options(add: Callable[..., Any]) -> None:
     std = "of all positions, without a variance (default: 0.5, of latitude and longitude unknown; by coarse steps)"
     add("--position-std", dest="position_std_m", type=float, metavar="M", help=std)
     add("--pressure-unit", type=_spelt("pressure"), choices=[*PRESSURE_UNITS, *SHARES], help=f"{_TOLD} pa")
-    add("--pressure-kind", choices=["gauge", "absolute"], default="gauge", help="of all pressures")
+    add("--pressure-kind", choices=list(GAUGE), help=f"of all pressures, {_TOLD} gauge")
     air = f"of the air, which a gauge pressure is above; give the estimator the same as {AMBIENT.name}"
     add("--ambient-pressure", dest=AMBIENT.name, type=float, default=AMBIENT.default, metavar="PA", help=air)
     released = "of the brake pipe while released, in the unit of pressures (default: its 9th decile as the train runs)"

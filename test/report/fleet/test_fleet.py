@@ -109,6 +109,20 @@ def test_the_page_has_a_row_for_each_braking_and_says_how_low_where(
     assert legend.count("</span> <span>") == legend.count("<span>") - 1 == 4, "Firefox breaks a line at a space alone"
 
 
+def test_a_braking_of_two_tables_counts_once(table: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """As where the table of a month is given beside that of the year."""
+    month = tmp_path / "month.parquet"
+    pd.DataFrame([*BRAKINGS[:2], braking("unit_9", 2, 3000.0, 0.07)]).to_parquet(month, index=False)
+    result = tmp_path / "result.json"
+    assert main([str(table), str(month), "--output", str(tmp_path / "report"), "--json", str(result)]) == 0
+    told = json.loads(result.read_text(encoding="utf-8"))
+    assert (told["brakings"], told["limited"]) == (4, 3)
+    assert capfd.readouterr().err.splitlines() == [
+        f"report: runs/{train}: 1 of its brakings are there twice, and count once: give one of both"
+        for train in ("unit_7", "unit_8 <b>")
+    ]
+
+
 def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     table, empty = tmp_path / "brakings.csv", tmp_path / "rail.csv"
     pd.DataFrame([BRAKINGS[2]]).to_csv(table, index=False)

@@ -204,6 +204,7 @@ def test_guesses_give_way_to_options(importing: Import) -> None:
         (["--full-pressure", "4.1"], "full-pressure = 4.1: give 100000 to 1000000 Pa, gauge"),
         (["--encoding", "base64"], "encoding = 'base64': there is none of this name"),
         (["--encoding", "idna"], "encoding = 'idna': there is none of this name"),
+        (["--encoding", "utf-16"], "FILE: encoding = utf-16: UTF-16 stream does not start with BOM: name another"),
         (["--time-format", "%"], "time-format = '%': "),
         (["--time-format", "%Q"], "time-format = '%Q': "),
     ],

@@ -214,8 +214,14 @@ def test_the_hour_that_is_there_twice_joins_the_rows(importing: Import, begins: 
 
 
 def test_a_date_that_looks_like_no_date_is_cured_by_its_format(importing: Import) -> None:
-    log = "time,speed\n20241121T081503.5Z,1\n20241121T081504.5Z,2\n"
+    log = "time,speed\n20241121 081503.5,1\n20241121 081504.5,2\n"
     assert importing(log) == 2
     assert importing.errors[0].endswith("a date is told by --time-format")
-    assert importing(log, "--time-format", "%Y%m%dT%H%M%S.%fZ") == 0
+    assert importing(log, "--time-format", "%Y%m%d %H%M%S.%f") == 0
+    assert SPEED.read(importing.messages("speed")[0]).t_ns == 1_732_176_903_500_000_000
+
+
+@pytest.mark.parametrize("time", ["20241121T081503.5Z", "20241121T091503.5+0100"])
+def test_a_date_of_iso_needs_no_colons(importing: Import, time: str) -> None:
+    assert importing(f"time,speed\n{time},1\n{time.replace('03.5', '04.5')},2\n") == 0, importing.errors
     assert SPEED.read(importing.messages("speed")[0]).t_ns == 1_732_176_903_500_000_000

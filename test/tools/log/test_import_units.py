@@ -137,11 +137,21 @@ def test_units_of_pressures_are_read_with_what_they_are_above(
     assert pressures == pytest.approx(ride().brake_pressure.tolist(), abs=1.0)
 
 
-def test_a_kind_of_pressures_that_is_said_twice_is_doubted(importing: Import) -> None:
-    log = text(ride().assign(brake_pressure=ride().brake_pressure / 1e5 + 1.0)).replace("brake_pressure", "p_barg")
-    assert importing(log, "--pressure", "p", "--pressure-kind", "absolute") == 1
-    said = "brake_pressure is said to be in 'barg', above the air, and by --pressure-kind absolute: which is right?"
-    assert importing.summary["odd"] == [said]
+@pytest.mark.parametrize(
+    ("unit", "kind", "other", "released_pa"),
+    [("barg", "gauge", "absolute", 1e5), ("bara", "absolute", "gauge", 1e5 + 101_325.0)],
+)
+def test_a_kind_of_pressures_that_is_said_twice_is_doubted(
+    importing: Import, unit: str, kind: str, other: str, released_pa: float
+) -> None:
+    """What the option says counts."""
+    log = text(ride().assign(brake_pressure=ride().brake_pressure / 1e5 + 1.0))
+    log = log.replace("brake_pressure", f"p_{unit}")
+    assert importing(log, "--pressure", "p", "--pressure-kind", other) == 1
+    said = f"brake_pressure is said to be in {unit!r}, {kind}, and by --pressure-kind {other}: which is right?"
+    assert said in importing.summary["odd"]
+    pressures = [message.fluid_pressure for message in importing.messages("brake_pressure")]
+    assert min(pressures) == pytest.approx(released_pa, abs=1.0)
 
 
 def test_dates_are_in_no_unit(importing: Import) -> None:

@@ -57,6 +57,9 @@ _LIKE = (
 )
 """What a date may have otherwise: UTC, a comma before the next part or the fraction, a colon before milliseconds."""
 
+_BASIC = re.compile(r"\s*[0-9]{8}T[0-9]{4}")
+"""How a date without colons begins, 20241121T081503."""
+
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """Times from this number on are counted in such units since 1970."""
 
@@ -140,12 +143,12 @@ def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype
 
 
 def time_formats(cells: Iterable[str]) -> list[str]:
-    """Return those of `FORMATS` that most cells have, in their order; none where no cell has a colon.
+    """Return those of `FORMATS` that most cells have, in their order; none where no cell has a colon, or a T.
 
     >>> time_formats(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_formats(["0.1", "0.2"])
     (['%d.%m.%Y %H:%M:%S.%f'], [])
     """
-    text = pd.Series([cell for cell in cells if ":" in cell], dtype=object).astype(str)
+    text = pd.Series([cell for cell in cells if ":" in cell or _BASIC.match(cell)], dtype=object).astype(str)
     counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS if len(text)}
     return [form for form, count in counts.items() if count == max(counts.values())]
 
