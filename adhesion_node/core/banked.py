@@ -175,7 +175,7 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     verdict = _verdict(memory, findings, told, memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict, findings.known)
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes, findings.ahead, memory.misled)
-    memory = memory._replace(log_likelihood=0.0)
+    memory = memory.having_told(findings.regime, findings.rail)
     return state._replace(memory=memory, knowledge=knowledge, since_estimate=0, seen=estimate), estimate
 
 

@@ -15,6 +15,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..belief.rail import Rail
+from ..belief.regime import Regime
 from ..intake.outcome import Event
 from ..intake.samples import MAX_VARIANCE_M2, SpeedSample
 from ..quick import quick
@@ -63,7 +64,7 @@ class Memory(NamedTuple):
     since_s: float = 0.0
     """Since it was last asked what has changed."""
     known: Rail = Rail(0.0, 1.0, 0.0)
-    """The rail as it was known when the braking began."""
+    """The rail as it was known when the braking began; where it has limited since, no better than it was then."""
     told_s: float = 0.0
     """Until when no change is told: the brake builds up, or the border of the last one lies under the train."""
     changes: int = 0
@@ -121,6 +122,12 @@ class Memory(NamedTuple):
             fixes=self.fixes + fixes,
             log_likelihood=self.log_likelihood + total - HALF_LOG_2PI,
         )
+
+    def having_told(self, regime: Regime, rail: Rail) -> Memory:
+        """An estimate is told."""
+        limits = regime is Regime.ADHESION_LIMITED
+        known = self.known._replace(lower=min(self.known.lower, rail.lower)) if limits else self.known
+        return self._replace(log_likelihood=0.0, known=known)
 
     def leaving_out(self, event: Event) -> Memory:
         """Leave a sample out that is not to be believed."""

@@ -31,10 +31,12 @@ def sampled(
     return [PressureSample(t, pressure((t - S) / S) + noise_pa * rng.standard_normal()) for t in stamps]
 
 
-def seen(config: Config, samples: list[PressureSample], demand_pa: float | None = None) -> list[BrakeSeen]:
+def seen(
+    config: Config, samples: list[PressureSample], demand_pa: float | None = None, rolls: bool | None = None
+) -> list[BrakeSeen]:
     brakes = [BrakeSeen()]
     for sample in samples:
-        brakes.append(brakes[-1].after(config, [sample], demand_pa))
+        brakes.append(brakes[-1].after(config, [sample], demand_pa, rolls))
     return brakes[1:]
 
 

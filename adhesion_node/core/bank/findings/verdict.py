@@ -43,8 +43,8 @@ LOW_95, HIGH_95 = 0.025, 0.975
 WIDTH_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
-SLOWING = 0.02
-"""Net deceleration over g from which a train brakes of whose brake nothing is known, or no gauge shows."""
+SLOWING, SLOWED = 0.02, 0.01
+"""Net deceleration over g from which a train brakes whose brake is unknown, and, surely, one whose gauge shows none."""
 
 LIKELY = 0.5
 """Probability of sliding from which what is used is what the rail gives."""
@@ -116,18 +116,18 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
 
 def _is_slowed(config: Config, memory: Memory, low: float, high: float) -> bool:
     """Whether a brake surely slows the train down though the gauge shows none."""
-    return memory.braking.alone and low > SLOWING and high < ANOTHER * config.train.full_brake
+    return memory.braking.alone and low > SLOWED and high < ANOTHER * config.train.full_brake
 
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     """What limits: the wheels know best; else nothing is claimed that a wrong brake could explain as well."""
     share = memory.wheels.share(memory.t_ns)
     demanded = config.train.specific_brake(memory.brake.demanded_pa)
-    part, error = mu / max(demanded, 1e-6), config.brake_error
+    part, error, fell = mu / max(demanded, 1e-6), config.brake_error, memory.brake.has_fallen(memory.t_ns)
     if share is not None and share >= SLIDES_FROM:
         return Regime.ADHESION_LIMITED
     if share is not None and share < BRAKE_BELOW:
-        return Regime.BRAKE_LIMITED if part > 1.0 - HELD_BACK * error else Regime.COASTING
+        return Regime.BRAKE_LIMITED if part > 1.0 - HELD_BACK * error and not fell else Regime.COASTING
     alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides
     dumped = memory.braking.told > 0.0 and (part < 1.0 - error or not alone)
     gauge = memory.brake.gauged and config.pressure_kind != "demanded"
@@ -137,6 +137,6 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake
     weak = config.train.full_brake <= SLIPPERY  # a film may give what such a brake asks for, to within its error
     near = 1.0 - error < part < 1.0 + 2.0 * error  # more than the brake can give is another one's
-    if share is None and slides < 1.0 - CLAIMED and near and not (dumps or weak):
+    if share is None and slides < 1.0 - CLAIMED and near and not (dumps or weak or fell):
         return Regime.BRAKE_LIMITED
     return Regime.COASTING

@@ -27,6 +27,10 @@ DUMP_PA, DUMP_SHARE, DUMP_NS = 60e3, 0.15, S // 2
 """A fall of the pressure by so much, and by so much of what it was, within this time: no driver releases so fast unless
 his brake lets go as fast as it builds up."""
 
+FELL_PA, FELL_SHARE, FELL_NS = 20e3, 0.1, 8 * S
+"""A fall by so much, and by so much of what it was, within the time of a dump may be slide protection's that holds all
+axles gently, whatever the wheels show: for so long the brake is not said to limit."""
+
 HELD_NS = 4 * S
 """So long behind a dump the brake counts as demanded as before."""
 
@@ -63,6 +67,8 @@ class BrakeSeen(NamedTuple):
     """When the slide protection dumped last."""
     full_ns: int = 0
     """When the cylinder was last not empty."""
+    fell_ns: int | None = None
+    """When the pressure fell last as gentle slide protection lets it fall."""
     gauged: bool = False
     """Whether samples come each by itself: what is said again between them is none."""
 
@@ -89,7 +95,8 @@ class BrakeSeen(NamedTuple):
         empty = pressure < max(config.brake_threshold_pa, 1.0)
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
-            return BrakeSeen(recent, pressure, self._following(config, sample, pressure), None, full_ns, self.gauged)
+            follows = self._following(config, sample, pressure)
+            return BrakeSeen(recent, pressure, follows, None, full_ns, gauged=self.gauged)
         lately = recent[bisect_left(recent, (t_ns - at_least(DUMP_NS, LATELY, every_ns),)) :]
         peak = max([each.pressure_pa for each in lately])
         dumped_ns = None if rolls else self.dumped_ns
@@ -99,6 +106,7 @@ class BrakeSeen(NamedTuple):
             dumps = _falls(lately, config.brake_build_up_s) or _swings(recent, max(DUMP_PA, DUMP_SHARE * peak))
         if dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
+        fell_ns = t_ns if peak - pressure >= max(FELL_PA, FELL_SHARE * peak) else self.fell_ns
         dumped_ns = t_ns if dumps and not rolls else dumped_ns
         held = dumped_ns is not None and (rolls is False or t_ns - dumped_ns < at_least(HELD_NS, HELD, every_ns))
         dumping = held and t_ns - full_ns < at_least(EMPTY_NS, EMPTY, every_ns)
@@ -112,7 +120,7 @@ class BrakeSeen(NamedTuple):
             applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
         if demand_pa is not None:  # what cylinders lack of it an electric brake gives
             applied = max(applied, self._following(config, sample, demand_pa))
-        return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns, self.gauged)
+        return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns, fell_ns, self.gauged)
 
     def _following(self, config: Config, sample: PressureSample, demanded_pa: float) -> float:
         """What presses by now of what is demanded, as the brake builds up and is released."""
@@ -128,6 +136,10 @@ class BrakeSeen(NamedTuple):
     def has_slid(self, now_ns: int) -> bool:
         """Whether the slide protection has been at work of late."""
         return self.dumped_ns is not None and now_ns - self.dumped_ns < SLID_NS
+
+    def has_fallen(self, now_ns: int) -> bool:
+        """Whether the pressure has lately fallen as gentle slide protection lets it fall."""
+        return self.fell_ns is not None and now_ns - self.fell_ns < FELL_NS
 
     @property
     def known(self) -> bool:
