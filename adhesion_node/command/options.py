@@ -44,8 +44,8 @@ NO_ROOM = ": make room, or name a place on another disk"
 ESCAPED = "backslashreplace"
 """What becomes of letters that a terminal's encoding has not, and of bytes in a file's name that are none."""
 
-WRITTEN = ("output", "map", "out", "json")
-"""Options of all tools that name a file to write, or a folder."""
+WRITTEN, READ = ("output", "map", "out", "json"), ("file", "bag", "bags", "check", "estimate", "train", "params", "set")
+"""Options of all tools that name a file to write, or a folder, and one to read, maybe as NAME=FILE."""
 
 NARROWEST = 11
 """Letters to a line of a help, as argparse has it."""
@@ -187,10 +187,13 @@ def _worked(
 def _require_files(options: argparse.Namespace) -> None:
     """Raise, before the work, where a file cannot be written as it is named, or would be in another's place."""
     named = {name: value for name, value in vars(options).items() if value not in (None, "-")}
-    require_folder(named.get("json", "-"), named.get("output"))
-    written = {name: str(named.pop(name)) for name in WRITTEN if name in named}
-    texts = [str(text) for value in named.values() for text in (value if isinstance(value, list) else [value])]
-    require_apart(written, [*texts, *(text.partition("=")[2] for text in texts)])
+    written = {name: str(named[name]) for name in WRITTEN if name in named}
+    for name in ("json", "out", "map"):
+        if name in written:
+            require_folder(written[name], written.get("output"))
+    given = (named[name] for name in READ if name in named)
+    texts = [str(text) for value in given for text in (value if isinstance(value, list) else [value])]
+    require_apart(written, (text if os.path.exists(text) else text.partition("=")[2] for text in texts))
 
 
 def printable(path: str) -> str:

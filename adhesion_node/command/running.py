@@ -18,6 +18,7 @@ import os
 import signal
 import socket
 import sys
+import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
@@ -104,6 +105,7 @@ def run_all(wanted: Sequence[Task], where: Running, *, as_given: bool = False) -
     """Yield the results of all tasks in order; compute those that the cache lacks, heavy ones first or `as_given`."""
     try:
         where.cache.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=where.cache).close()
     except OSError as error:
         remedy = "name a place for finished runs with --cache"
         raise ValueError(f"cache = {where.cache}: {error.strerror}: {remedy}") from error

@@ -10,10 +10,17 @@
 
 import errno
 import os
+import shutil
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from itertools import combinations
 from pathlib import Path
+
+PARTS = (".mcap", ".db3", "metadata.yaml", ".html", ".png", ".pdf")
+"""How files of a recording and of a report end."""
+
+KEPT_LETTERS = 40
+"""Of a file's name in that of its unfinished part, so that no system finds it too long."""
 
 
 @contextmanager
@@ -28,43 +35,75 @@ def naming(path: str | Path) -> Iterator[None]:
 
 
 def require_folder(path: str, made: str | None) -> None:
-    """Raise FileNotFoundError where the folder of a file is not there, nor the one that is made: before the work."""
-    folder = Path(path).parent
-    if not folder.is_dir() and (made is None or Path(made) not in (folder, *folder.parents)):
+    """Raise OSError where a file cannot be: its folder is not there, nor the one that is made, or it is a folder."""
+    folder = Path(path).resolve().parent
+    if path == "" or Path(path).is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
+    if not folder.is_dir() and (made is None or Path(made).resolve() not in (folder, *folder.parents)):
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
 
 
 def require_apart(written: Mapping[str, str], read: Iterable[str]) -> None:
-    """Raise ValueError where two options, by name, write one file, or one writes what is read."""
-    for (one, path), (other, again) in combinations(written.items(), 2):
+    """Raise ValueError where two options, by name, write one file, or one writes what is read or a part of it."""
+    files = {name: path for name, path in written.items() if not os.path.exists(path) or os.path.isfile(path)}
+    for (one, path), (other, again) in combinations(files.items(), 2):
         if os.path.realpath(path) == os.path.realpath(again):
             raise ValueError(f"--{one} {path} and --{other} {again}: both are one file: give each its own")
-    inputs = {os.path.realpath(path) for path in read if os.path.isfile(path)}
-    for name, path in written.items():
-        if os.path.realpath(path) in inputs:
+    inputs = {os.path.realpath(path) for path in read if os.path.exists(path)}
+    folders = {Path(path) for path in inputs if os.path.isdir(path)}
+    folders |= {Path(os.path.realpath(path)) for path in written.values()}
+    for name, path in files.items():
+        final = os.path.realpath(path)
+        if final in inputs and os.path.isfile(final):
             raise ValueError(f"--{name} {path}: is read, and would be lost: name another file")
+        if final.endswith(PARTS) and not folders.isdisjoint(Path(final).parents):
+            raise ValueError(f"--{name} {path}: is a part of that recording or report: name another file")
 
 
 @contextmanager
 def whole(path: str | Path) -> Iterator[str]:
     """Give the name of a file to write that takes the place of `path` at the end, or goes where an error ends it.
 
-    What is no file, or under /dev, is written itself; so is a file in a folder that may not be changed.
+    A file that is there is written itself where nothing can take its place as it is: a device or a pipe, one that is
+    another user's, may not be written or has a second name, one in a folder that may not be changed.
     """
-    final, is_device = os.path.realpath(path), Path("/dev") in Path(path).absolute().parents
-    is_plain = os.path.isfile(path) and os.access(os.path.dirname(final), os.W_OK)
-    if is_device or (os.path.exists(path) and not is_plain):
+    final = os.path.realpath(path)
+    if _is_itself(str(path), final):
         yield str(path)
         return
-    part = f"{final}.{os.getpid()}.part"
+    folder, name = os.path.split(final)
+    part = os.path.join(folder, f"{name[:KEPT_LETTERS]}.{os.getpid()}.part")
     try:
+        Path(part).touch()  # what the system refuses it refuses now, and names the file
         yield part
-        os.replace(part, final)
+        _replace(part, final)
     except BaseException as error:
-        Path(part).unlink(missing_ok=True)
+        with suppress(OSError):
+            os.unlink(part)
         if isinstance(error, OSError) and error.filename == part:
             error.filename = str(path)
         raise
+
+
+def _is_itself(path: str, final: str) -> bool:
+    named = os.path.abspath(path)
+    if named.startswith(("/dev/", "/proc/")) and not named.startswith("/dev/shm/"):
+        return True
+    if not os.path.exists(path):
+        return False
+    found = os.stat(path)
+    is_ours = os.path.isfile(path) and found.st_nlink == 1 and found.st_uid == os.geteuid()
+    return not (is_ours and os.access(path, os.W_OK) and os.access(os.path.dirname(final), os.W_OK))
+
+
+def _replace(part: str, final: str) -> None:
+    if os.path.exists(final):
+        shutil.copymode(final, part)
+    try:
+        os.replace(part, final)
+    except OSError:  # where a file is mounted by itself
+        shutil.copyfile(part, final)
+        os.unlink(part)
 
 
 def write_text(path: str | Path, text: str) -> None:

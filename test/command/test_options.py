@@ -9,11 +9,13 @@
 """How a command line tool ends."""
 
 import argparse
+import errno
 import io
 import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -122,10 +124,12 @@ def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path: Path, caps
 
 
 def reading(args: list[str]) -> int:
-    """A tool that reads LOG and writes a file of its own and JSON."""
+    """A tool that reads files and folders, and writes a file of its own, or into a folder, and JSON."""
     parser = argparse.ArgumentParser("tool", parents=[json_option()])
-    parser.add_argument("log", nargs="+")
+    parser.add_argument("bags", nargs="+")
     parser.add_argument("--out")
+    parser.add_argument("--output")
+    parser.add_argument("--set", action="append", default=[])
 
     def work(options: argparse.Namespace) -> int:
         for path in filter(None, (options.out, options.json)):
@@ -137,32 +141,61 @@ def reading(args: list[str]) -> int:
 
 @pytest.fixture
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Work in an empty folder."""
+    """Work in a folder of a log, a link to it and a recording."""
     monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("log")
+    (tmp_path / "link.csv").symlink_to("log.csv")
+    (tmp_path / "run").mkdir()
+    (tmp_path / "run" / "run_0.mcap").write_text("recorded")
     return tmp_path
 
 
 @pytest.mark.parametrize("option", ["--out", "--json"])
 @pytest.mark.parametrize("path", ["log.csv", "./log.csv", "link.csv"])
-@pytest.mark.parametrize("log", ["log.csv", "unit_7=log.csv"])
+@pytest.mark.parametrize("given", [["log.csv"], ["unit_7=log.csv"], ["run", "--set", "train_file=log.csv"]])
 def test_no_result_takes_the_place_of_what_is_read(
-    option: str, path: str, log: str, here: Path, capsys: pytest.CaptureFixture[str]
+    option: str, path: str, given: list[str], here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """The log was lost."""
-    (here / "log.csv").write_text("log")
-    (here / "link.csv").symlink_to("log.csv")
-    assert reading([log, option, path]) == BAD_INPUT
+    assert reading([*given, option, path]) == BAD_INPUT
     assert capsys.readouterr().err == f"tool: {option} {path}: is read, and would be lost: name another file\n"
     assert (here / "log.csv").read_text() == "log"
-    assert reading([log, option, "result"]) == DONE
-    assert reading([log, option, "result"]) == DONE, "an earlier result is written over"
+    assert reading([*given, option, "result"]) == DONE
+    assert reading([*given, option, "result"]) == DONE, "an earlier result is written over"
 
 
-def test_two_results_are_not_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    file = tmp_path / "result"
-    assert reading(["log.csv", "--out", str(file), "--json", f"{tmp_path}/./result"]) == BAD_INPUT
+@pytest.mark.parametrize("path", ["run/run_0.mcap", "run/metadata.yaml", "made/report.html"])
+def test_no_result_takes_the_place_of_a_part_of_a_recording_or_report(
+    path: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert reading(["run", "--output", "made", "--json", path]) == BAD_INPUT
+    assert capsys.readouterr().err == f"tool: --json {path}: is a part of that recording or report: name another file\n"
+    assert (here / "run" / "run_0.mcap").read_text() == "recorded"
+    for _ in range(2):
+        assert reading(["run", "--json", "run/result.json"]) == DONE
+
+
+@pytest.mark.parametrize("given", [["run", "--set", "method=bank"], ["bank=log.csv"]])
+def test_what_is_no_file_that_is_read_may_be_the_name_of_a_result(given: list[str], here: Path) -> None:
+    (here / "bank=log.csv").write_text("another log")
+    for path in ("bank", "log.csv", "log.csv"):
+        assert reading([*given, "--json", path]) == DONE, "a file of that very name is meant"
+    assert reading([*given, "--json", "/dev/null", "--out", "/dev/null"]) == DONE
+
+
+def test_two_results_are_not_one_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert reading(["log.csv", "--out", "result", "--json", f"{here}/./result"]) == BAD_INPUT
     assert "both are one file: give each its own" in capsys.readouterr().err
-    assert not file.exists()
+    assert not (here / "result").exists()
+
+
+@pytest.mark.parametrize("path", ["", "run", "run/"])
+def test_a_folder_is_no_result_and_told_before_the_work(
+    path: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert reading(["log.csv", "--out", "result", "--json", path]) == FAILED
+    assert capsys.readouterr().err.endswith(": Is a directory: it is a folder; name a file\n")
+    assert not (here / "result").exists()
 
 
 @pytest.mark.parametrize("end", [ValueError, KeyboardInterrupt])
@@ -185,12 +218,44 @@ def begin(file: Path, end: type[BaseException]) -> None:
         raise end
 
 
-def test_what_a_link_names_is_written(tmp_path: Path) -> None:
-    file, link = tmp_path / "out.csv", tmp_path / "link.csv"
+def test_a_file_stays_what_it_is_when_it_is_written_over(tmp_path: Path) -> None:
+    """Its links, and who may read it."""
+    file, link, second = tmp_path / "out.csv", tmp_path / "link.csv", tmp_path / "second.csv"
     link.symlink_to(file)
-    with whole(link) as part:
-        Path(part).write_text("all")
-    assert (file.read_text(), link.is_symlink()) == ("all", True)
+    for text in ("first", "second"):
+        write_text(link, text)
+        assert (file.read_text(), link.is_symlink()) == (text, True)
+        file.chmod(0o600)
+    assert file.stat().st_mode & 0o777 == 0o600
+    os.link(file, second)
+    write_text(file, "third")
+    assert second.read_text() == "third"
+
+
+@pytest.mark.parametrize("name", ["no/out.csv", "out.csv/more"])
+def test_what_the_system_refuses_names_the_file_that_was_meant(name: str, tmp_path: Path) -> None:
+    (tmp_path / "out.csv").write_text("")
+    with pytest.raises(OSError) as raised, whole(tmp_path / name):  # noqa: PT011
+        pass
+    assert raised.value.filename == str(tmp_path / name)
+
+
+def test_a_name_may_be_as_long_as_the_system_lets_it(tmp_path: Path) -> None:
+    write_text(tmp_path / ("n" * 251 + ".csv"), "text")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["text"]
+
+
+def test_where_nothing_can_take_a_files_place_it_is_written_itself(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where it is mounted by itself."""
+
+    def busy(*_: Any) -> None:
+        raise OSError(errno.EBUSY, "busy")
+
+    monkeypatch.setattr(os, "replace", busy)
+    write_text(tmp_path / "out.csv", "text")
+    assert [path.read_text() for path in tmp_path.iterdir()] == ["text"]
 
 
 def test_what_is_no_file_is_written_itself(tmp_path: Path) -> None:

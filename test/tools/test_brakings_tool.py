@@ -101,7 +101,7 @@ def test_a_braking_counts_once_however_often_it_is_given(
     assert brakings.main([str(monday), str(again), str(tuesday), *options]) == 0
     assert (table.read_bytes(), rail.read_bytes()) == once
     said = {
-        True: f"brakings: {again}: 1 of its brakings are those of {monday}, and count once: give one of both",
+        True: f"brakings: {again}: brakings that are in {monday}, too: 1; each counts once: give them once",
         False: f"brakings: {monday}: is given 2 times, and counts once, as of train monday: give it once",
     }
     assert told(capfd) == [said[copied]]

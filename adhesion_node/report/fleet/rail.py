@@ -66,7 +66,7 @@ def read_fleet(paths: Sequence[Path]) -> Fleet:
         (maps if is_map else tables).append(frame)
     if not tables or len(maps) > 1:
         raise ValueError(f"tables = {len(tables)} of brakings, {len(maps)} maps: give one or more, and one map at most")
-    once, copies = without_copies(pd.concat(tables))
+    once, copies = without_copies(pd.concat([table for table in tables if not table.empty] or tables))
     brakings = once.sort_values("t_ns", ignore_index=True)
     if brakings.empty:
         raise ValueError(f"tables = {', '.join(map(str, paths))}: hold no braking, there is nothing to show")

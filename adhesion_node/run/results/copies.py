@@ -23,6 +23,7 @@ DIGITS = 6
 def without_copies(rows: pd.DataFrame) -> tuple[pd.DataFrame, Iterator[str]]:
     """Return the first of each braking, and what is said of the others: no two agree in stamps and in every number."""
     rounded = rows.reset_index(drop=True).round(dict.fromkeys(NUMBERS, DIGITS))
+    rounded["recording"] = rounded["recording"].astype(str)
     copied = rounded.duplicated(NUMBERS)
     first = rounded.groupby(NUMBERS, dropna=False)["recording"].transform("first")
     found = rounded.assign(of=first)[copied].groupby(["recording", "of"]).size()
@@ -30,5 +31,5 @@ def without_copies(rows: pd.DataFrame) -> tuple[pd.DataFrame, Iterator[str]]:
 
 
 def _told(path: str, of: str, count: int) -> str:
-    whose = "are there twice" if path == of else f"are those of {of}"
-    return f"{path}: {count} of its brakings {whose}, and count once: give one of both"
+    where = "there again" if path == of else f"in {of}, too"
+    return f"{path}: brakings that are {where}: {count}; each counts once: give them once"

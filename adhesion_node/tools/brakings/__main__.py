@@ -33,6 +33,7 @@ from ...command.options import (
     setting_options,
 )
 from ...command.running import add_running_options, run_all, running
+from ...command.written import require_folder
 from ...run import offline
 from ...run.results.brakings import CELL_M
 from ...run.results.copies import without_copies
@@ -109,10 +110,12 @@ def _work(options: argparse.Namespace) -> int:
 
 
 def _check_files(options: argparse.Namespace) -> None:
-    """Raise ValueError for a table that cannot be written as it is named."""
+    """Raise for a table that cannot be written as it is named: ValueError by its ending, OSError by its folder."""
     for name, path in (("output", options.output), ("map", options.map)):
         if path and Path(path).suffix not in ENDINGS:
             raise ValueError(f"{name} = {path}: give a file that ends in {' or '.join(ENDINGS)}")
+        if path:
+            require_folder(path, None)
 
 
 if __name__ == "__main__":

@@ -118,9 +118,18 @@ def test_a_braking_of_two_tables_counts_once(table: Path, tmp_path: Path, capfd:
     told = json.loads(result.read_text(encoding="utf-8"))
     assert (told["brakings"], told["limited"]) == (4, 3)
     assert capfd.readouterr().err.splitlines() == [
-        f"report: runs/{train}: 1 of its brakings are there twice, and count once: give one of both"
+        f"report: runs/{train}: brakings that are there again: 1; each counts once: give them once"
         for train in ("unit_7", "unit_8 <b>")
     ]
+
+
+@pytest.mark.parametrize("turned", [1, -1])
+def test_a_table_without_any_braking_changes_nothing(turned: int, table: Path, tmp_path: Path) -> None:
+    """As of a day on which no train braked."""
+    empty = tmp_path / "empty.csv"
+    pd.DataFrame(BRAKINGS).iloc[:0].to_csv(empty, index=False)
+    fleet = read_fleet([table, empty][::turned])
+    pd.testing.assert_frame_equal(fleet.rail, read_fleet([table]).rail)
 
 
 def test_nothing_identified_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
