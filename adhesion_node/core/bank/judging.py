@@ -38,13 +38,16 @@ DOUBTED, PASSED, CERTAIN, CHANGED = 0.1, 0.5, 0.99, 0.2
 and by how much it must have changed."""
 
 SURELY = 2.0
-"""Standard deviations of what is used now by which it must have changed, or not, to be told so: else it is waited."""
+"""Standard deviations of what is used that leave no doubt: of a change, else it is waited, or of a brake at work."""
 
 SETTLING_S = 6.0
 """For so long, and the brake's build-up, behind its opening a braking tells no change."""
 
 SLID = 0.9
 """Probability from which axles slid."""
+
+SLOWED = 0.01
+"""Net deceleration over g from which, surely, a braking goes on that no gauge shows any more."""
 
 FORGOTTEN = 0.002
 """Least probability of a hypothesis while no brake is applied: sensors change."""
@@ -56,7 +59,8 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     pressed = memory.is_pressed(config)
     if memory.misled:
         return memory._replace(bank=forwards(bank)) if pressed else led_again(memory)
-    braked, before = pressed and bank.mean_of(SPEED) >= config.slowest_mps, memory.braked
+    before = memory.braked
+    braked = (pressed or (before and _is_slowed(config, memory))) and bank.mean_of(SPEED) >= config.slowest_mps
     if braked and not before:
         known = rail()
         told_s = now_s + SETTLING_S + config.brake_build_up_s
@@ -75,6 +79,12 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
         kept = tuple(each for each in memory.past if memory.t_ns - each[0] <= PAST_NS)
         memory = memory._replace(since_s=0.0, past=(*kept, (memory.t_ns, bank)))
     return _with_changes(config, memory, pruned(bank))
+
+
+def _is_slowed(config: Config, memory: Memory) -> bool:
+    """Whether another brake surely slows the train, now that the gauge shows none any more."""
+    mean, std = _used(config, memory.bank, memory.braking)
+    return memory.braking.alone and mean - SURELY * std > SLOWED
 
 
 def _coasted(memory: Memory) -> Memory:

@@ -62,7 +62,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
     if not measurement.wheels:
         return memory
-    pressed = memory.is_pressed(config) or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
+    pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
     rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
