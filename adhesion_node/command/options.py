@@ -192,7 +192,8 @@ def _require_files(options: argparse.Namespace) -> None:
         if name in written:
             require_folder(written[name], written.get("output"))
     given = (named[name] for name in READ if name in named)
-    texts = [str(text) for value in given for text in (value if isinstance(value, list) else [value])]
+    every = [each for value in given for each in (value if isinstance(value, list) else [value])]
+    texts = [each for each in every if isinstance(each, str)]
     require_apart(written, (text if os.path.exists(text) else text.partition("=")[2] for text in texts))
 
 

@@ -103,18 +103,23 @@ def running(options: argparse.Namespace) -> Running:
 
 def run_all(wanted: Sequence[Task], where: Running, *, as_given: bool = False) -> Iterator[Arrays]:
     """Yield the results of all tasks in order; compute those that the cache lacks, heavy ones first or `as_given`."""
-    try:
-        where.cache.mkdir(parents=True, exist_ok=True)
-        tempfile.TemporaryFile(dir=where.cache).close()
-    except OSError as error:
-        remedy = "name a place for finished runs with --cache"
-        raise ValueError(f"cache = {where.cache}: {error.strerror}: {remedy}") from error
     by_file = {file_name(task): task for task in wanted}
     missing = [task for file, task in by_file.items() if not _is_kept(where.cache / file)]
     if missing:
+        _require_room(where.cache)
         _compute_all(missing if as_given else sorted(missing, key=lambda task: -task.weight), where)
     for task in wanted:
         yield load(task, where.cache)
+
+
+def _require_room(cache: Path) -> None:
+    """Raise ValueError where finished runs cannot be kept."""
+    try:
+        cache.mkdir(parents=True, exist_ok=True)
+        tempfile.TemporaryFile(dir=cache).close()
+    except OSError as error:
+        remedy = "name a place for finished runs with --cache"
+        raise ValueError(f"cache = {cache}: {error.strerror}: {remedy}") from error
 
 
 def _compute_all(missing: Sequence[Task], where: Running) -> None:

@@ -13,14 +13,16 @@ import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from itertools import combinations
+from itertools import combinations, count
 from pathlib import Path
 
-PARTS = (".mcap", ".db3", "metadata.yaml", ".html", ".png", ".pdf")
+PARTS = (".mcap", ".db3", ".zstd", "-wal", "metadata.yaml", "report.html", ".png", ".pdf")
 """How files of a recording and of a report end."""
 
-KEPT_LETTERS = 40
+KEPT_LETTERS = 20
 """Of a file's name in that of its unfinished part, so that no system finds it too long."""
+
+_numbers = count()
 
 
 @contextmanager
@@ -36,10 +38,10 @@ def naming(path: str | Path) -> Iterator[None]:
 
 def require_folder(path: str, made: str | None) -> None:
     """Raise OSError where a file cannot be: its folder is not there, nor the one that is made, or it is a folder."""
-    folder = Path(path).resolve().parent
+    folder = Path(os.path.realpath(path)).parent
     if path == "" or Path(path).is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
-    if not folder.is_dir() and (made is None or Path(made).resolve() not in (folder, *folder.parents)):
+    if not folder.is_dir() and (made is None or Path(os.path.realpath(made)) not in (folder, *folder.parents)):
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
 
 
@@ -49,14 +51,13 @@ def require_apart(written: Mapping[str, str], read: Iterable[str]) -> None:
     for (one, path), (other, again) in combinations(files.items(), 2):
         if os.path.realpath(path) == os.path.realpath(again):
             raise ValueError(f"--{one} {path} and --{other} {again}: both are one file: give each its own")
-    inputs = {os.path.realpath(path) for path in read if os.path.exists(path)}
-    folders = {Path(path) for path in inputs if os.path.isdir(path)}
-    folders |= {Path(os.path.realpath(path)) for path in written.values()}
+    inputs = [path for path in read if os.path.exists(path)]
+    folders = {os.path.realpath(path) for path in (*inputs, *written.values())}
     for name, path in files.items():
-        final = os.path.realpath(path)
-        if final in inputs and os.path.isfile(final):
+        if os.path.isfile(path) and any(os.path.samefile(path, each) for each in inputs):
             raise ValueError(f"--{name} {path}: is read, and would be lost: name another file")
-        if final.endswith(PARTS) and not folders.isdisjoint(Path(final).parents):
+        final = os.path.realpath(path)
+        if final.lower().endswith(PARTS) and not folders.isdisjoint(map(str, Path(final).parents)):
             raise ValueError(f"--{name} {path}: is a part of that recording or report: name another file")
 
 
@@ -72,9 +73,9 @@ def whole(path: str | Path) -> Iterator[str]:
         yield str(path)
         return
     folder, name = os.path.split(final)
-    part = os.path.join(folder, f"{name[:KEPT_LETTERS]}.{os.getpid()}.part")
+    part = os.path.join(folder, f"{name[:KEPT_LETTERS]}.{os.getpid()}.{next(_numbers)}.part")
     try:
-        Path(part).touch()  # what the system refuses it refuses now, and names the file
+        Path(part).touch(exist_ok=False)  # what the system refuses it refuses now, and names the file
         yield part
         _replace(part, final)
     except BaseException as error:
@@ -99,9 +100,13 @@ def _is_itself(path: str, final: str) -> bool:
 def _replace(part: str, final: str) -> None:
     if os.path.exists(final):
         shutil.copymode(final, part)
+    with open(part, "rb") as file:
+        os.fsync(file.fileno())
     try:
         os.replace(part, final)
-    except OSError:  # where a file is mounted by itself
+    except OSError as error:
+        if error.errno != errno.EBUSY:  # a file that is mounted by itself
+            raise
         shutil.copyfile(part, final)
         os.unlink(part)
 

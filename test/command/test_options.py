@@ -175,6 +175,20 @@ def test_no_result_takes_the_place_of_a_part_of_a_recording_or_report(
         assert reading(["run", "--json", "run/result.json"]) == DONE
 
 
+def test_a_second_name_of_what_is_read_is_no_result(here: Path) -> None:
+    os.link(here / "log.csv", here / "second.csv")
+    assert reading(["log.csv", "--out", "second.csv"]) == BAD_INPUT
+    assert (here / "log.csv").read_text() == "log"
+
+
+def test_two_files_that_are_begun_at_once_are_two(tmp_path: Path) -> None:
+    one, other = (tmp_path / f"{'n' * 100}{index}.csv" for index in range(2))
+    with whole(one) as first, whole(other) as second:
+        Path(first).write_text("one")
+        Path(second).write_text("other")
+    assert (one.read_text(), other.read_text()) == ("one", "other")
+
+
 @pytest.mark.parametrize("given", [["run", "--set", "method=bank"], ["bank=log.csv"]])
 def test_what_is_no_file_that_is_read_may_be_the_name_of_a_result(given: list[str], here: Path) -> None:
     (here / "bank=log.csv").write_text("another log")
@@ -241,7 +255,7 @@ def test_what_the_system_refuses_names_the_file_that_was_meant(name: str, tmp_pa
 
 
 def test_a_name_may_be_as_long_as_the_system_lets_it(tmp_path: Path) -> None:
-    write_text(tmp_path / ("n" * 251 + ".csv"), "text")
+    write_text(tmp_path / ("n" * (os.pathconf(tmp_path, "PC_NAME_MAX") - 4) + ".csv"), "text")
     assert [path.read_text() for path in tmp_path.iterdir()] == ["text"]
 
 

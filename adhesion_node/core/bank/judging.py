@@ -21,10 +21,10 @@ from .blind import forwards, led_again, misled
 from .branching import branched, opened, pruned
 from .free import closed, mixed
 from .kernels import weighing
-from .labels.kinds import HELD, PASSING, SLIDES
-from .layout import ROUGH, SPEED, Bank
+from .labels.kinds import HELD, OTHER, PASSING, SLIDES
+from .layout import MU, ROUGH, SPEED, Bank
 from .memory import Memory, S
-from .motion import Braking, resistance, use
+from .motion import SLOWED, Braking, resistance, use
 from .seeing import wheels_seen
 
 if TYPE_CHECKING:
@@ -46,8 +46,8 @@ SETTLING_S = 6.0
 SLID = 0.9
 """Probability from which axles slid."""
 
-SLOWED = 0.01
-"""Net deceleration over g from which, surely, a braking goes on that no gauge shows any more."""
+LIKELY = 0.5
+"""Probability of another brake from which a braking goes on that no gauge shows any more."""
 
 FORGOTTEN = 0.002
 """Least probability of a hypothesis while no brake is applied: sensors change."""
@@ -60,7 +60,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if memory.misled:
         return memory._replace(bank=forwards(bank)) if pressed else led_again(memory)
     before = memory.braked
-    braked = (pressed or (before and _is_slowed(config, memory))) and bank.mean_of(SPEED) >= config.slowest_mps
+    braked = (pressed or (before and _goes_on(memory))) and bank.mean_of(SPEED) >= config.slowest_mps
     if braked and not before:
         known = rail()
         told_s = now_s + SETTLING_S + config.brake_build_up_s
@@ -81,10 +81,13 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     return _with_changes(config, memory, pruned(bank))
 
 
-def _is_slowed(config: Config, memory: Memory) -> bool:
-    """Whether another brake surely slows the train, now that the gauge shows none any more."""
-    mean, std = _used(config, memory.bank, memory.braking)
-    return memory.braking.alone and mean - SURELY * std > SLOWED
+def _goes_on(memory: Memory) -> bool:
+    """Whether another brake is likely to slow the train, now that the gauge shows none any more."""
+    if not memory.braking.alone:
+        return False
+    bank = memory.bank
+    least = bank.mean[:, MU] - SURELY * np.sqrt(bank.covariance[:, MU, MU])
+    return float(bank.weight @ ((bank.kind == OTHER) & (least > SLOWED))) > LIKELY
 
 
 def _coasted(memory: Memory) -> Memory:

@@ -64,7 +64,7 @@ class Memory(NamedTuple):
     since_s: float = 0.0
     """Since it was last asked what has changed."""
     known: Rail = Rail(0.0, 1.0, 0.0)
-    """The rail as it was known when the braking began; where it has limited since, no better than it was then."""
+    """The rail as it was known when the braking began; where it has limited since, no better than the bounds told."""
     told_s: float = 0.0
     """Until when no change is told: the brake builds up, or the border of the last one lies under the train."""
     changes: int = 0
@@ -124,7 +124,7 @@ class Memory(NamedTuple):
         )
 
     def having_told(self, regime: Regime, rail: Rail) -> Memory:
-        """An estimate is told."""
+        """An estimate is told: where the rail limits, no more than its bound counts as known of it in this braking."""
         limits = regime is Regime.ADHESION_LIMITED
         known = self.known._replace(lower=min(self.known.lower, rail.lower)) if limits else self.known
         return self._replace(log_likelihood=0.0, known=known)

@@ -40,8 +40,9 @@ if TYPE_CHECKING:
 STRONGER, LEAST_BRAKE_ERROR = 2.0, 0.1
 """Errors of the brake, of such a size at least, by which the train is braked harder than by what is known to press."""
 
-ANOTHER = 1.5
-"""Times the full brake, by what is told of it, that is used at most where another one works beside."""
+SLOWED, ANOTHER = 0.01, 1.5
+"""Net deceleration over g from which, surely, another brake is at work while the gauge shows none; and times the full
+brake, by what is told of it, that is used at most where one is."""
 
 BIAS_DRIFT = 1e-4
 """Of an accelerometer's bias over g, within 1 s."""

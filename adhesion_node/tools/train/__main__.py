@@ -30,7 +30,7 @@ from ...command.options import (
     run_tool,
     setting_options,
 )
-from ...command.written import write_text
+from ...command.written import require_folder, write_text
 from ...run import offline
 from ...wire.files.train import read_train
 from ...wire.settings.given import given
@@ -76,6 +76,8 @@ def _estimate(options: argparse.Namespace) -> int:
     refuse(options, ["seed"], "nothing is drawn by chance: leave it out")
     if options.output and Path(options.output).exists():
         raise ValueError(f"output = {options.output}: is there already: name a new file")
+    if options.output:
+        require_folder(options.output, None)
     setup = setup_of(given(options, "estimator", SETTINGS))
     with BagReader(options.estimate) as reader:
         for loss in reader.damage:

@@ -24,7 +24,7 @@ from adhesion_node.core.bank.findings.ahead import constant
 from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.gear.wheels import WheelsSeen
-from adhesion_node.core.bank.labels.kinds import HELD, KINDS, STEADY
+from adhesion_node.core.bank.labels.kinds import HELD, KINDS, OTHER, STEADY
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED
 from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail
@@ -101,6 +101,20 @@ def test_a_gauge_that_shows_no_brake_while_the_train_is_slowed(used: float, alon
         assert max(findings.ahead.mu) <= NOTHING.lower
 
 
+@pytest.mark.parametrize("seen", [0, 3])
+@pytest.mark.parametrize("axles", [0, 4])
+def test_while_the_gauge_shows_no_brake_nothing_is_claimed_and_learnt(seen: int, axles: int) -> None:
+    """It may be a grade that no profile tells, or a brake on the rail itself; axles that roll name no brake then."""
+    bank = bank_of([OTHER if seen else STEADY], spread=0.0)
+    bank.mean[:, MU] = 0.04
+    memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(0.0, alone=True), seen)
+    released = memory.brake._replace(demanded_pa=0.0, applied_pa=0.0)
+    wheels = WheelsSeen((1.0,) * axles, 0, 0.03, (None,) * axles, (10 * S,) * axles)
+    findings = found(CONFIG, memory._replace(brake=released, wheels=wheels), NOTHING, NOTHING)
+    assert findings.rail.mu == pytest.approx(0.04)
+    assert (findings.regime, findings.known) == (Regime.COASTING, NOTHING)
+
+
 def test_a_train_of_whose_brake_nothing_is_known_brakes_from_a_fiftieth_of_g_on() -> None:
     """Then the rail gives so much; else it is believed as before."""
     for used, brakes in ((0.018, False), (0.024, True)):
@@ -129,7 +143,7 @@ def test_what_limits_is_said_by_the_wheels_and_where_some_slide_by_nothing(slidi
 
 
 @pytest.mark.parametrize("wheels", [(), (None,) * 4], ids=["no wheels", "wheels that roll"])
-@pytest.mark.parametrize("rises_pa_s", [40e3, 0.0], ids=["the protection", "the driver"])
+@pytest.mark.parametrize("rises_pa_s", [18e3, 12e3, 0.0], ids=["the protection", "a valve's play", "the driver"])
 def test_while_the_pressure_falls_and_rises_the_brake_is_not_said_to_limit(
     wheels: tuple[None, ...], rises_pa_s: float
 ) -> None:
@@ -143,7 +157,7 @@ def test_while_the_pressure_falls_and_rises_the_brake_is_not_said_to_limit(
     brake = seen_by(CONFIG, samples, rolls=True)[-1]
     pressed = memory.brake._replace(fell_ns=brake.fell_ns)
     memory = memory._replace(wheels=slid, brake=pressed, t_ns=samples[-1].t_ns)
-    regime = Regime.COASTING if rises_pa_s else Regime.BRAKE_LIMITED
+    regime = Regime.COASTING if rises_pa_s > 15e3 else Regime.BRAKE_LIMITED
     assert found(CONFIG, memory, NOTHING, NOTHING).regime is regime
 
 

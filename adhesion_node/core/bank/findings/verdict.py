@@ -20,7 +20,7 @@ from ..following import SPEED_ERROR_MPS
 from ..gear.wheels import BRAKE_BELOW
 from ..labels.laws import SLIPPERY
 from ..memory import Memory
-from ..motion import ANOTHER, resistance, use
+from ..motion import ANOTHER, SLOWED, resistance, use
 from .ahead import (
     KNOWN_SHARE,
     PARTIAL,
@@ -43,8 +43,8 @@ LOW_95, HIGH_95 = 0.025, 0.975
 WIDTH_95 = 3.92
 """Width of the 95 % interval of a Gaussian over its standard deviation."""
 
-SLOWING, SLOWED = 0.02, 0.01
-"""Net deceleration over g from which a train brakes whose brake is unknown, and, surely, one whose gauge shows none."""
+SLOWING = 0.02
+"""Net deceleration over g from which a train brakes of whose brake nothing is known."""
 
 LIKELY = 0.5
 """Probability of sliding from which what is used is what the rail gives."""
@@ -111,7 +111,8 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     ahead = for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
-    return Findings(regime, rail, ahead, known if memory.braked else before)
+    is_shown = memory.braked and memory.is_pressed(config)  # else it may be a grade, or a brake on the rail itself
+    return Findings(regime, rail, ahead, known if is_shown else before)
 
 
 def _is_slowed(config: Config, memory: Memory, low: float, high: float) -> bool:
@@ -126,6 +127,8 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     part, error, fell = mu / max(demanded, 1e-6), config.brake_error, memory.brake.has_fallen(memory.t_ns)
     if share is not None and share >= SLIDES_FROM:
         return Regime.ADHESION_LIMITED
+    if not memory.is_pressed(config):
+        return Regime.COASTING
     if share is not None and share < BRAKE_BELOW:
         return Regime.BRAKE_LIMITED if part > 1.0 - HELD_BACK * error and not fell else Regime.COASTING
     alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides

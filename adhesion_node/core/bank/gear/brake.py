@@ -27,7 +27,7 @@ DUMP_PA, DUMP_SHARE, DUMP_NS = 60e3, 0.15, S // 2
 """A fall of the pressure by so much, and by so much of what it was, within this time: no driver releases so fast unless
 his brake lets go as fast as it builds up."""
 
-FELL_PA, FELL_SHARE, FELL_NS = 20e3, 0.1, 8 * S
+FELL_PA, FELL_SHARE, FELL_NS = 30e3, 0.1, 8 * S
 """A fall by so much, and by so much of what it was, within the time of a dump may be slide protection's that holds all
 axles gently, whatever the wheels show: for so long the brake is not said to limit."""
 
@@ -106,7 +106,10 @@ class BrakeSeen(NamedTuple):
             dumps = _falls(lately, config.brake_build_up_s) or _swings(recent, max(DUMP_PA, DUMP_SHARE * peak))
         if dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
-        fell_ns = t_ns if peak - pressure >= max(FELL_PA, FELL_SHARE * peak) else self.fell_ns
+        fell = peak - pressure >= max(FELL_PA, FELL_SHARE * peak) and (
+            demand_pa is None or pressure < (1.0 - FELL_SHARE) * demand_pa
+        )
+        fell_ns = t_ns if fell else self.fell_ns
         dumped_ns = t_ns if dumps and not rolls else dumped_ns
         held = dumped_ns is not None and (rolls is False or t_ns - dumped_ns < at_least(HELD_NS, HELD, every_ns))
         dumping = held and t_ns - full_ns < at_least(EMPTY_NS, EMPTY, every_ns)

@@ -143,7 +143,7 @@ def times_ns(cells: "pd.Series[Any]", form: Format) -> "np.ndarray[Any, np.dtype
 
 
 def time_formats(cells: Iterable[str]) -> list[str]:
-    """Return those of `FORMATS` that most cells have, in their order; none where no cell has a colon, or a T.
+    """Return those of `FORMATS` that most cells have, in their order; none where all look like numbers.
 
     >>> time_formats(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_formats(["0.1", "0.2"])
     (['%d.%m.%Y %H:%M:%S.%f'], [])
