@@ -22,8 +22,6 @@ PARTS = (".mcap", ".db3", ".zstd", "-wal", "metadata.yaml", "report.html", ".png
 KEPT_LETTERS = 20
 """Of a file's name in that of its unfinished part, so that no system finds it too long."""
 
-_numbers = count()
-
 
 @contextmanager
 def naming(path: str | Path) -> Iterator[None]:
@@ -72,10 +70,12 @@ def whole(path: str | Path) -> Iterator[str]:
     if _is_itself(str(path), final):
         yield str(path)
         return
-    folder, name = os.path.split(final)
-    part = os.path.join(folder, f"{name[:KEPT_LETTERS]}.{os.getpid()}.{next(_numbers)}.part")
     try:
-        Path(part).touch(exist_ok=False)  # what the system refuses it refuses now, and names the file
+        part = _begun(final)
+    except OSError as error:
+        error.filename = str(path)
+        raise
+    try:
         yield part
         _replace(part, final)
     except BaseException as error:
@@ -84,6 +84,17 @@ def whole(path: str | Path) -> Iterator[str]:
         if isinstance(error, OSError) and error.filename == part:
             error.filename = str(path)
         raise
+
+
+def _begun(final: str) -> str:
+    """Make a part of a file, of a name that none has: another process may be killed, or be at it."""
+    folder, name = os.path.split(final)
+    numbers = count()
+    while True:
+        part = Path(folder, f"{name[:KEPT_LETTERS]}.{next(numbers)}.part")
+        with suppress(FileExistsError):
+            part.touch(exist_ok=False)
+            return str(part)
 
 
 def _is_itself(path: str, final: str) -> bool:

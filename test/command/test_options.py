@@ -182,7 +182,9 @@ def test_a_second_name_of_what_is_read_is_no_result(here: Path) -> None:
 
 
 def test_two_files_that_are_begun_at_once_are_two(tmp_path: Path) -> None:
+    """Nor is what a killed tool has left in the way."""
     one, other = (tmp_path / f"{'n' * 100}{index}.csv" for index in range(2))
+    (tmp_path / f"{'n' * 20}.0.part").write_text("left")
     with whole(one) as first, whole(other) as second:
         Path(first).write_text("one")
         Path(second).write_text("other")
