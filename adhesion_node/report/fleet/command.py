@@ -9,6 +9,7 @@
 """`report BRAKINGS.parquet`: the page of a table of brakings."""
 
 import argparse
+import math
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -45,7 +46,8 @@ def report_fleet(paths: Sequence[str], options: argparse.Namespace) -> int:
     write_text(page, html)
     limited = int(fleet.brakings["mu"].notna().sum())
     result: dict[str, Any] = {"page": str(page), "brakings": len(fleet.brakings), "limited": limited}
-    result["low_spots"] = [spot._asdict() for spot in spots]
+    unknown = {"mu_lower": None}
+    result["low_spots"] = [spot._asdict() | (unknown if math.isnan(spot.mu_lower) else {}) for spot in spots]
     lines = [f"{len(fleet.brakings)} brakings, the adhesion limited in {limited}; low spots: {len(spots)}"]
     lines += [f"{s.from_m:.0f} to {s.to_m:.0f} m: {s.lowest:.4f}, {s.low_dates} of {s.dates} dates" for s in spots]
     report(options.json, result, "\n".join([*lines, str(page)]))

@@ -8,7 +8,7 @@
 
 """Tables of brakings and of the rail as `brakings` writes them, and where the rail was low."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,13 +16,10 @@ import numpy as np
 import pandas as pd
 
 from ...core.physics.train import KMH
-from ...run.results.brakings import BRAKING, CELL_M
+from ...run.results.brakings import CELL_M
 from ...run.results.copies import without_copies
 from ...run.results.rail_map import map_of
-
-RAIL = ("place_m", "length_m", "date", "seen", "limited", "mu", "mu_lowest", "used", "mu_lower")
-
-WRITTEN_BY = "give what `brakings` writes; `import_csv` makes a recording of a log"
+from .tables import read_table
 
 
 class Fleet(NamedTuple):
@@ -33,7 +30,7 @@ class Fleet(NamedTuple):
     by_piece: bool
     """The rail is a map that was written beside the brakings; else each braking counts alike along its whole way."""
     remarks: Sequence[str] = ()
-    """Which brakings are there twice, and count once."""
+    """Which brakings are there twice, and count once; which the map lacks."""
 
 
 class Spot(NamedTuple):
@@ -58,11 +55,7 @@ def read_fleet(paths: Sequence[Path]) -> Fleet:
     """Read tables of brakings and at most one map. Raises ValueError with what to mend."""
     tables, maps = list[pd.DataFrame](), list[pd.DataFrame]()
     for path in paths:
-        frame = _read(path)
-        is_map = "length_m" in frame
-        wanted = RAIL if is_map else ("train", "recording", *(BRAKING.names or ()))
-        if lacking := [name for name in wanted if name not in frame]:
-            raise ValueError(f"table = {path}: lacks the columns {', '.join(lacking)}: {WRITTEN_BY}")
+        frame, is_map = read_table(path)
         (maps if is_map else tables).append(frame)
     if not tables or len(maps) > 1:
         raise ValueError(f"tables = {len(tables)} of brakings, {len(maps)} maps: give one or more, and one map at most")
@@ -72,7 +65,18 @@ def read_fleet(paths: Sequence[Path]) -> Fleet:
         raise ValueError(f"tables = {', '.join(map(str, paths))}: hold no braking, there is nothing to show")
     brakings["time"] = pd.to_datetime(brakings["t_ns"], utc=True)
     rail = maps[0] if maps else spread(brakings)
-    return Fleet(brakings, rail.sort_values(["date", "place_m"], ignore_index=True), bool(maps), tuple(copies))
+    remarks = (*copies, *_unmapped(brakings, rail))
+    return Fleet(brakings, rail.sort_values(["date", "place_m"], ignore_index=True), bool(maps), remarks)
+
+
+def _unmapped(brakings: pd.DataFrame, rail: pd.DataFrame) -> Iterator[str]:
+    """What is said of brakings on dates of which the map has no piece."""
+    dates = brakings["time"].dt.strftime("%Y-%m-%d")
+    lacking = dates[~dates.isin(rail["date"])]
+    if len(lacking):
+        which = ", ".join(sorted(set(lacking))[:3]) + (", ..." if lacking.nunique() > 3 else "")
+        remedy = "give the map that the same call of `brakings` wrote"
+        yield f"the map has no piece of {which}, on which {len(lacking)} of the brakings are: {remedy}"
 
 
 def spread(brakings: pd.DataFrame, cell_m: float = CELL_M) -> pd.DataFrame:
@@ -118,14 +122,3 @@ def _spot(rows: pd.DataFrame, to_m: float, low: float) -> Spot:
         low_dates=int(was_low["date"].nunique()),
         newest=str(was_low["date"].max()),
     )
-
-
-def _read(path: Path) -> pd.DataFrame:
-    if not path.exists():
-        raise ValueError(f"table = {path}: is not there")
-    try:
-        return pd.read_parquet(path) if path.suffix.lower() == ".parquet" else pd.read_csv(path)
-    except ImportError as error:
-        raise ValueError(f"table = {path}: needs pyarrow, pip install '.[parquet]', or give a .csv") from error
-    except (OSError, ValueError) as error:
-        raise ValueError(f"table = {path}: not readable ({error}): {WRITTEN_BY}") from error

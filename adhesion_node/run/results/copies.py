@@ -10,24 +10,34 @@
 
 from collections.abc import Iterator
 
+import numpy as np
 import pandas as pd
 
 from .brakings import BRAKING
 
 NUMBERS = list(BRAKING.names or ())
 
-DIGITS = 6
-"""To which numbers are compared: a CSV file may read as another in the last place."""
+ALIKE, SOON_NS = 1e-3, 1_000_000
+"""To within which numbers of copies agree, relative, and stamps: files round them."""
 
 
 def without_copies(rows: pd.DataFrame) -> tuple[pd.DataFrame, Iterator[str]]:
     """Return the first of each braking, and what is said of the others: no two agree in stamps and in every number."""
-    rounded = rows.reset_index(drop=True).round(dict.fromkeys(NUMBERS, DIGITS))
-    rounded["recording"] = rounded["recording"].astype(str)
-    copied = rounded.duplicated(NUMBERS)
-    first = rounded.groupby(NUMBERS, dropna=False)["recording"].transform("first")
-    found = rounded.assign(of=first)[copied].groupby(["recording", "of"]).size()
-    return rows[~copied.to_numpy()], (_told(path, of, count) for (path, of), count in found.items())
+    stamps = rows["t_ns"].to_numpy(np.int64)
+    numbers = rows[NUMBERS].to_numpy(np.float64)
+    of = np.arange(len(rows))
+    lately = list[int]()
+    for row in np.argsort(stamps, kind="stable").tolist():
+        lately = [one for one in lately if stamps[row] - stamps[one] <= SOON_NS]
+        alike = [one for one in lately if np.allclose(numbers[row], numbers[one], ALIKE, ALIKE, equal_nan=True)]
+        if alike:
+            of[row] = alike[0]
+        else:
+            lately.append(row)
+    copied = of != np.arange(len(rows))
+    recording = rows["recording"].astype(str).to_numpy()
+    found = pd.DataFrame({"path": recording, "of": recording[of]})[copied].groupby(["path", "of"]).size()
+    return rows[~copied], (_told(path, first, count) for (path, first), count in found.items())
 
 
 def _told(path: str, of: str, count: int) -> str:

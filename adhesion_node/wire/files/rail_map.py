@@ -10,13 +10,16 @@
 
 import csv
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from decimal import Decimal
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from ...core.belief.rail_map import Piece, RailMap
 
 COLUMNS = ("place_m", "length_m", "t_ns", "seen", "mu", "mu_std", "used", "mu_lower", "speed_mps")
+
+Number = TypeVar("Number", int, float)
 
 UNKNOWN_STD = 0.02
 """Of the adhesion where only what was used is known."""
@@ -27,7 +30,7 @@ def read_rail_map(path: str) -> RailMap:
     source = f"rail_map = {path}"
     try:
         return map_of_rows(_parquet(path) if Path(path).suffix.lower() == ".parquet" else _csv(path))
-    except (OSError, UnicodeDecodeError, ImportError) as error:
+    except (OSError, UnicodeDecodeError, ImportError, csv.Error) as error:
         raise ValueError(f"{source}: not readable ({error}): `brakings --map` writes one") from error
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
@@ -36,12 +39,20 @@ def read_rail_map(path: str) -> RailMap:
 def map_of_rows(rows: Iterable[Mapping[str, Any]]) -> RailMap:
     """The map of rows of `COLUMNS`. Raises ValueError naming a row."""
     pieces = [_piece(number, row) for number, row in enumerate(rows, 1)]
+    first = dict[tuple[float, float, int], int]()
+    for number, piece in enumerate(pieces, 1):
+        before = first.setdefault(piece[:3], number)
+        if before != number:  # else what one braking showed would count as if two had
+            raise ValueError(f"rows {before} and {number}: one piece at {piece.place_m:g} m, one stamp: give it once")
     return RailMap(tuple(sorted(pieces, key=lambda piece: (piece.place_m, piece.t_ns))))
 
 
 def _csv(path: str) -> Iterator[Mapping[str, Any]]:
-    with Path(path).open(encoding="utf-8", newline="") as file:
-        yield from csv.DictReader(file)
+    with Path(path).open(encoding="utf-8-sig", newline="") as file:  # spreadsheets write a mark in front
+        rows = csv.DictReader(file)
+        if not rows.fieldnames:
+            raise ValueError("is empty: `brakings --map` writes one")
+        yield from rows
 
 
 def _parquet(path: str) -> Iterator[Mapping[str, Any]]:
@@ -50,17 +61,25 @@ def _parquet(path: str) -> Iterator[Mapping[str, Any]]:
     yield from parquet.read_table(path).to_pylist()
 
 
+def _whole(given: object) -> int:
+    """A float holds no stamp; a spreadsheet writes one as 1.7E+18."""
+    return int(Decimal(str(given)))
+
+
+def _number(number: int, row: Mapping[str, Any], name: str, kind: Callable[[Any], Number]) -> Number:
+    given = math.nan if row[name] in (None, "") else row[name]
+    try:
+        return kind(given)
+    except (TypeError, ValueError, ArithmeticError) as error:
+        raise ValueError(f"row {number}: {name} = {row[name]!r}: give a number") from error
+
+
 def _piece(number: int, row: Mapping[str, Any]) -> Piece:
     missing = [name for name in COLUMNS if name not in row]
     if missing:
         raise ValueError(f"lacks the columns {', '.join(missing)}: `brakings --map` writes them")
-    try:
-        numbers = {
-            name: math.nan if row[name] in (None, "") else float(row[name]) for name in COLUMNS if name != "t_ns"
-        }
-        stamp, seen = int(row["t_ns"]), int(float(row["seen"]))
-    except (TypeError, ValueError) as error:
-        raise ValueError(f"row {number}: {error}: give numbers") from error
+    numbers = {name: _number(number, row, name, float) for name in COLUMNS}
+    stamp, seen = (_number(number, row, name, _whole) for name in ("t_ns", "seen"))
     limited = not math.isnan(numbers["mu"])
     mu, std = (numbers["mu"], numbers["mu_std"]) if limited else (numbers["used"], UNKNOWN_STD)
     lower = min(max(numbers["mu_lower"], 0.0), mu)

@@ -59,8 +59,17 @@ def test_what_was_written_is_read(ending: str, tmp_path: Path) -> None:
         ("place_m,date\n0,today\n", "lacks the columns length_m, t_ns, seen"),
         (
             "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,100,soon,1,,,0.1,0.1,30\n",
-            "row 1: .*: give numbers",
+            "row 1: t_ns = 'soon': give a number",
         ),
+        (
+            "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,100,1,inf,,,0.1,0.1,30\n",
+            "row 1: seen = 'inf': give a number",
+        ),
+        (
+            "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n" + 2 * "0,100,1,1,,,0.1,0.1,30\n",
+            "rows 1 and 2: one piece at 0 m, one stamp: give it once",
+        ),
+        ("", "is empty: `brakings --map` writes one"),
         (
             "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,0,1,1,,,0.1,0.1,30\n",
             "a length above 0",
@@ -72,6 +81,16 @@ def test_what_is_no_map_is_refused_with_its_file(text: str, message: str, tmp_pa
     path.write_text(text, encoding="utf-8")
     with pytest.raises(ValueError, match=rf"rail_map = {path}: .*{message}"):
         read_rail_map(str(path))
+
+
+def test_what_a_spreadsheet_saved_is_read(tmp_path: Path) -> None:
+    """With a mark of its encoding in front, and stamps of 15 digits."""
+    path = tmp_path / "rail.csv"
+    rail().to_csv(path, index=False, encoding="utf-8-sig")
+    assert read_rail_map(str(path)).pieces == PIECES
+    saved = path.read_text(encoding="utf-8").replace("1700000000000000000", "1.70000000000000E+18")
+    path.write_text(saved, encoding="utf-8")
+    assert read_rail_map(str(path)).pieces == PIECES
 
 
 def test_a_missing_file_is_said() -> None:
