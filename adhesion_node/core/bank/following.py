@@ -148,7 +148,7 @@ def followed(
             memory = _felt(config, memory, felt, braking, (until_ns - since_ns) / S) if felt else memory
         first_ns = -math.inf if until_ns == ends[0] else since_ns  # late ones count by now
         for speed in speeds:
-            if first_ns < speed.t_ns <= until_ns and not (config.speed_source == "axle" and _may_slide(memory)):
+            if first_ns < speed.t_ns <= until_ns and not (config.speed_source == "axle" and _may_slide(config, memory)):
                 memory = _with_speed(config, memory, speed)
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
@@ -175,9 +175,10 @@ def off(config: Config, memory: Memory, measurement: Measurement) -> Foreseen:
     return foreseen(config, *before, measurement.position_m, white)
 
 
-def _may_slide(memory: Memory) -> bool:
+def _may_slide(config: Config, memory: Memory) -> bool:
     """Whether an axle may slide; where its speed is all there is, it is believed while nothing tells of a brake."""
-    return memory.braked or (memory.untold and memory.is_placed)
+    lingers = memory.brake.lingers(config, memory.t_ns) and not memory.is_pressed(config)
+    return memory.braked or (memory.is_placed and (memory.untold or lingers))
 
 
 def _with_speed(config: Config, memory: Memory, sample: SpeedSample) -> Memory:

@@ -20,9 +20,9 @@ from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
-from .layout import RADIUS, SPEED, Bank
+from .layout import MU, RADIUS, SPEED, Bank
 from .memory import Memory, S
-from .motion import slowing
+from .motion import SLOWED, slowing
 from .seeing import CLIPPED, corrected, fall_seen, speed_seen
 
 if TYPE_CHECKING:
@@ -63,6 +63,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     if not measurement.wheels:
         return memory
     pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
+    pressed = pressed or _is_slowed(config, memory)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
     rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
@@ -82,6 +83,12 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
         return _rolling(memory, middle, pressed)
     dark = memory.asks and not measurement.has_position and rims
     return _slow(memory, max(rims) if pressed else middle) if dark else memory
+
+
+def _is_slowed(config: Config, memory: Memory) -> bool:
+    """Whether wheels may slide though no brake is applied: it still lets go, or another one slows the train down."""
+    used = memory.bank.mean_of(MU)
+    return (used > SLOWED and memory.braking.alone) or (used > -SLOWED and memory.brake.lingers(config, memory.t_ns))
 
 
 def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:

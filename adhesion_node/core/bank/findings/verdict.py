@@ -111,7 +111,8 @@ def found(config: Config, memory: Memory, before: Rail, nothing: Rail) -> Findin
     ahead = for_the_fastest(config, bank, lower)[0] if is_lost else ahead.at_least(floor)
     rail = rail._replace(lower=min(lower, rail.mu))
     known = rail if slides > LIKELY else Rail(max(before.mu, rail.mu), max(before.std, rail.std), lower)
-    is_shown = memory.braked and memory.is_pressed(config)  # else it may be a grade, or a brake on the rail itself
+    # else it may be a grade, a brake on the rail itself, or one that is released
+    is_shown = memory.braked and memory.is_pressed(config) and not memory.brake.lets_go(config)
     return Findings(regime, rail, ahead, known if is_shown else before)
 
 

@@ -47,6 +47,9 @@ SLID_NS = 2 * S
 LEFT = 0.1
 """Part of the pressure that is left once a brake has let go: within `brake_build_up_s`, as it builds up."""
 
+RELEASED = 4.0
+"""Times its build-up that a brake takes to let go where no gauge shows it: 15 to 20 s for 3 to 5 (UIC 540)."""
+
 SWING_SHARE = 0.03
 """Behind a dump the protection is at work as long as the pressure falls and rises, or rises and falls, by so much of
 what is demanded within a second: a driver's hand is steadier."""
@@ -65,7 +68,7 @@ class BrakeSeen(NamedTuple):
     """What the cylinders press with, on the mean, as far as is known."""
     dumped_ns: int | None = None
     """When the slide protection dumped last."""
-    full_ns: int = 0
+    full_ns: int | None = None
     """When the cylinder was last not empty."""
     fell_ns: int | None = None
     """When the pressure fell last as gentle slide protection lets it fall."""
@@ -112,7 +115,7 @@ class BrakeSeen(NamedTuple):
         fell_ns = t_ns if fell else self.fell_ns
         dumped_ns = t_ns if dumps and not rolls else dumped_ns
         held = dumped_ns is not None and (rolls is False or t_ns - dumped_ns < at_least(HELD_NS, HELD, every_ns))
-        dumping = held and t_ns - full_ns < at_least(EMPTY_NS, EMPTY, every_ns)
+        dumping = held and full_ns is not None and t_ns - full_ns < at_least(EMPTY_NS, EMPTY, every_ns)
         demanded = demand_pa
         if demanded is None:
             demanded = max(self.demanded_pa, peak) if dumping else pressure  # it fell before that was a dump
@@ -143,6 +146,24 @@ class BrakeSeen(NamedTuple):
     def has_fallen(self, now_ns: int) -> bool:
         """Whether the pressure has lately fallen as gentle slide protection lets it fall."""
         return self.fell_ns is not None and now_ns - self.fell_ns < FELL_NS
+
+    def lets_go(self, config: Config) -> bool:
+        """Whether the pressure falls or is gone: by slide protection, or a release, which tells nothing of the rail."""
+        peak = max((each.pressure_pa for each in self.recent), default=0.0)
+        least = max(config.brake_threshold_pa, 1.0, (1.0 - FELL_SHARE) * peak)
+        return self.pressure_pa < least
+
+    def lingers(self, config: Config, now_ns: int) -> bool:
+        """Whether cylinders may press still, though nothing is demanded any more."""
+        if self.full_ns is None:
+            return False
+        demanded = config.pressure_kind == "demanded"
+        return now_ns - self.full_ns < (RELEASED * config.brake_build_up_s * S if demanded else EMPTY_NS)
+
+    @property
+    def pressure_pa(self) -> float:
+        """The newest pressure; 0: nothing was measured."""
+        return self.recent[-1].pressure_pa if self.recent else 0.0
 
     @property
     def known(self) -> bool:
