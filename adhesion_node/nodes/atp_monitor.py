@@ -16,6 +16,7 @@ Every message, and every tick of two watchdogs, is a step of `core.atp.monitor`,
 is no message, so one watchdog ticks by the ROS clock, and one by the machine's own for the case that the first stands.
 """
 
+import sys
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -211,3 +212,7 @@ def _log(node: Node, decision: Decision, awaited: bool) -> None:
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
     return runtime.run("atp_monitor", AtpMonitor, args, PARAMETERS, EXAMPLES)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -16,6 +16,7 @@
 Nothing is published on creep/* while the data cannot tell the peak; /diagnostics says why.
 """
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -79,3 +80,7 @@ KIND = Kind(
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
     return runtime.run("creep_estimator", CreepEstimator, args, PARAMETERS, EXAMPLES)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

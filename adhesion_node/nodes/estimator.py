@@ -14,6 +14,7 @@
     ~/reset, ~/set_enabled                            services
 """
 
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -135,3 +136,7 @@ KIND = Kind(
 def main(args: Sequence[str] | None = None) -> int:
     """Run the node as a program."""
     return runtime.run("estimator", Estimator, args, PARAMETERS, EXAMPLES)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -254,3 +254,7 @@ def _parser() -> argparse.ArgumentParser:
     room = "end before less is free on the disk"
     add("--min-free-mb", metavar="MB", type=float, default=MIN_FREE_MB, help=room)
     return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

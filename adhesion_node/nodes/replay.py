@@ -128,3 +128,7 @@ def _parser() -> argparse.ArgumentParser:
     out_option(straight)
     setting_options(straight)
     return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())

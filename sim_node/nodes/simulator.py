@@ -17,6 +17,7 @@ The parameter `fault` lets something go wrong. The scenarios of a real train hav
 `sensors` of such trains: each message comes when it arrives, and truth/mu is the adhesion that the train uses.
 """
 
+import sys
 from collections.abc import Iterator, Sequence
 from typing import Any
 
@@ -131,3 +132,7 @@ class Simulator(RunNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the simulator until its scenario ends or a signal comes."""
     return runtime.run("simulator", Simulator, args, PARAMETERS, EXAMPLES)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

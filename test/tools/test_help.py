@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import re
+import runpy
 import subprocess
 import sys
 
@@ -46,6 +47,20 @@ def test_help_says_the_purpose_and_gives_examples(
     assert examples
     assert all(line.startswith(f"  {called}") for line in examples)
     assert all(told.startswith("default: ") for told in re.findall(r"\bdefault\b.*", options_of(shown)))
+
+
+@pytest.mark.parametrize("node", ["estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "simulator"])
+def test_python_m_runs_the_program(
+    node: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A program that began and ended without a word looked as if it had done its work."""
+    module = f"{'sim_node' if node == 'simulator' else 'adhesion_node'}.nodes.{node}"
+    monkeypatch.setattr(sys, "argv", [module, "--help"])
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    with pytest.raises(SystemExit) as ended:
+        runpy.run_module(module, run_name="__main__", alter_sys=True)
+    assert ended.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: {node} ")
 
 
 def options_of(shown: str) -> str:
