@@ -21,6 +21,7 @@ from rclpy.publisher import Publisher
 from rclpy.qos import ReliabilityPolicy
 
 from ..bag import BagReader, Record
+from ..bag.read.turns import in_turn
 from ..core.atp.supervision import Severity
 from ..wire import topics
 from ..wire.settings.telling import TELLING
@@ -76,7 +77,7 @@ class Replay(SettingsNode):
         # Not for what expires: DDS would wait in vain for a subscriber that came too late for it.
         awaited = [end for source, end in self._outputs.items() if not expires(reader.infos[source].offered)]
         self._acknowledged = Acknowledged(awaited, self.get_logger().warning)
-        self._steps = groupby(reader.messages(selection), key=lambda record: record.log_ns)
+        self._steps = groupby(in_turn(reader.messages(selection)), key=lambda record: record.log_ns)
         self._next: tuple[int, Iterator[Record]] | None = None
         self._origin: tuple[float, int] | None = None
         self._waiting_since = time.monotonic()

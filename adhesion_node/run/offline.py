@@ -19,6 +19,7 @@ import numpy as np
 
 from ..bag import BagReader, Record
 from ..bag.read.together import read_together
+from ..bag.read.turns import in_turn
 from ..command.options import DONE, FAILED, progress, report
 from ..core import Outcome
 from ..core.intake.samples import PressureSample, Sample
@@ -208,7 +209,7 @@ def messages(reader: BagReader, selection: Mapping[str, str], line: Line) -> Ite
     Of a sensor's messages that can be read together it is their samples.
     """
     sensors = {theirs: topic for theirs, ours in selection.items() for topic in SENSORS if topic.name == ours}
-    for record, sample in read_together(reader.messages(selection), sensors, line):
+    for record, sample in read_together(in_turn(reader.messages(selection)), sensors, line):
         yield selection[record.topic], _message(record) if sample is None else sample, record.log_ns
 
 
