@@ -22,11 +22,15 @@ from typing import Any
 
 REMEDY = "source /opt/ros/jazzy/setup.bash (apt install ros-jazzy-ros-base), or pip install '.[ros]' on x86-64"
 
-_OF_ROS = re.compile(r"rclpy|\w+_(msgs|srvs|interfaces)")
+_OF_ROS = re.compile(
+    "rclpy|rmw_dds_common|std_srvs|(builtin|composition|rcl|rosbag2|type_description)_interfaces|"
+    "(action|actionlib|diagnostic|geometry|lifecycle|nav|rosgraph|sensor|service|shape|statistics|std|stereo|tf2|"
+    "trajectory|unique_identifier|visualization)_msgs"
+)
 
 
 def is_of_ros(module: str) -> bool:
-    """Whether ROS brings a module."""
+    """Whether ROS itself brings a module; messages of others have names of the same form."""
     return _OF_ROS.fullmatch(module.partition(".")[0]) is not None
 
 

@@ -25,6 +25,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from test_replay_waits import turned_by_hand
 
 from adhesion_node.bag import BagReader, BagWriter, select, serialize, typestore
+from adhesion_node.bag.types import Definition
 from adhesion_node.command.options import DONE
 from adhesion_node.nodes import replay
 from adhesion_node.nodes.player import Replay
@@ -150,6 +151,16 @@ def test_what_does_not_fit_is_one_line_and_code_2(
     assert replay.main([str(tmp_path / "bag"), *options]) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert message in line
+
+
+def test_messages_of_others_need_their_workspace(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic("/foo", "my_msgs/msg/Foo", known_as=Definition("ros2msg", "int32 bar"))
+        writer.write("/foo", "my_msgs/msg/Foo", b"\0\1\0\0\7\0\0\0", 0)
+    assert replay.main([str(tmp_path / "bag"), "--topics", "/foo"]) == 2
+    (line,) = capfd.readouterr().err.splitlines()
+    remedy = "my_msgs is missing: source the workspace that has it"
+    assert line == f"replay: message type = my_msgs/msg/Foo: {remedy}"
 
 
 def test_an_unreadable_bag_is_one_line_and_code_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -20,6 +20,9 @@ from conftest import ROOT, made_once
 from forked import Ended, ended
 from test_package import NODES, console_scripts
 
+from adhesion_node.bag import typestore
+from adhesion_node.command.without_ros import is_of_ros
+
 BLOCKED = """
 import re, sys
 from importlib.abc import MetaPathFinder
@@ -72,6 +75,11 @@ def test_what_needs_ros_says_how_to_get_it_in_one_line(program: str, without_ros
     assert told.stderr.startswith(f"{program}: rclpy is missing: ")
     assert "source /opt/ros/jazzy/setup.bash" in told.stderr
     assert "pip install '.[ros]'" in told.stderr
+
+
+def test_the_messages_of_ros_are_told_from_those_of_others() -> None:
+    assert all(is_of_ros(name.partition("/")[0]) for name in typestore().fielddefs)
+    assert not is_of_ros("my_msgs")
 
 
 def test_an_offline_replay_needs_none(tmp_path: Path) -> None:

@@ -137,6 +137,11 @@ def _open_directory(path: Path, metadata: Metadata) -> Recording:
         recording = McapRecording(mcaps)
     elif databases := _numbered(path, ".db3"):
         recording = ForeignRecording(databases)
+    elif compressed := sorted(path.glob("*.zstd")):
+        files = " ".join(str(file) for file in compressed)
+        raise ValueError(
+            f"bag = {path}: is compressed and has no readable metadata.yaml: decompress it: zstd -d {files}"
+        )
     else:
         inner = sorted(file.parent for ending in ("mcap", "db3") for file in path.glob(f"*/*.{ending}"))
         hint = f", as {inner[0]}" if inner else ""

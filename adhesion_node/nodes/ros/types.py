@@ -12,12 +12,21 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
+from adhesion_node.command.without_ros import is_of_ros
+
 
 @cache
 def message_class(type_name: str) -> type[Any]:
-    """Return the class of a message type in ROS spelling."""
+    """Return the class of a message type in ROS spelling. Raises ValueError where the package of others is missing."""
     package, _, name = type_name.split("/")
-    found: type[Any] = getattr(import_module(f"{package}.msg"), name)
+    try:
+        module = import_module(f"{package}.msg")
+    except ModuleNotFoundError as error:
+        if is_of_ros(package):
+            raise
+        missing = f"message type = {type_name}: {package} is missing: source the workspace that has it"
+        raise ValueError(missing) from error
+    found: type[Any] = getattr(module, name)
     return found
 
 

@@ -62,6 +62,13 @@ def test_directories_without_a_recording_are_refused(tmp_path: Path) -> None:
         BagReader(tmp_path)
 
 
+@pytest.mark.parametrize("name", ["x.mcap.zstd", "x.db3.zstd"])
+def test_compressed_files_without_metadata_are_to_be_decompressed(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    with pytest.raises(ValueError, match=rf"no readable metadata\.yaml: decompress it: zstd -d {tmp_path / name}$"):
+        BagReader(tmp_path)
+
+
 def test_recordings_within_a_folder_are_named(tmp_path: Path) -> None:
     for name in ("tuesday", "monday"):
         (tmp_path / name).mkdir()
