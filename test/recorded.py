@@ -14,14 +14,16 @@ import dataclasses
 from collections.abc import Iterator
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import cdrs
 import numpy as np
+from mcap.writer import Writer
 from rosbags.interfaces import QosDurability
 
 from adhesion_node.bag import BagWriter, Record
 from adhesion_node.bag.qos import RELIABLE
+from adhesion_node.bag.types import definition
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
@@ -88,3 +90,43 @@ def write_steps(path: Path, steps: int, first: int = 0) -> list[Record]:
         for record in records:
             writer.write(*record)
     return records
+
+
+class Beside(NamedTuple):
+    """A topic as another program writes it: the name of its type, how that is defined, and its messages."""
+
+    topic: str
+    encoding: str
+    type: str = ""
+    defined: tuple[str, bytes] | None = None
+    messages: tuple[bytes, ...] = ()
+
+
+TEXT, NUMBER = "std_msgs/msg/String", "std_msgs/msg/Float64"
+
+JSON = Beside("/log", "json", "Log", ("jsonschema", b"{}"), (b"{}", b"[]"))
+PROTOBUF = Beside("/log", "protobuf", "foxglove.Log", ("protobuf", bytes(range(128, 256))), (b"a", b"b"))
+UNDEFINED = Beside("/log", "", messages=(b"a", b"b"))
+
+
+def cdr_beside(topic: str, type_name: str, *messages: bytes) -> Beside:
+    return Beside(topic, "cdr", type_name, ("ros2msg", definition(type_name).text.encode()), messages)
+
+
+def write_beside(file: Path, *others: Beside, steps: int = 3) -> Path:
+    """Write an MCAP file of other topics and, in the same chunk, of what `write_steps` writes."""
+    ours: dict[str, list[bytes]] = {}
+    for step in range(steps):
+        ours.setdefault("/brake_pressure", []).append(cdrs.brake_pressure(step * S // 10, 101325.0))
+        ours.setdefault("/position", []).append(cdrs.position(step * S // 10, step / 3, 0.25))
+    types = {"/brake_pressure": BRAKE_PRESSURE.type, "/position": POSITION.type}
+    with file.open("wb") as stream:
+        writer: Any = Writer(stream)
+        writer.start(profile="ros2")
+        for one in (*others, *(cdr_beside(name, types[name], *messages) for name, messages in ours.items())):
+            schema = writer.register_schema(one.type, *one.defined) if one.defined else 0
+            channel = writer.register_channel(one.topic, one.encoding, schema)
+            for step, data in enumerate(one.messages):
+                writer.add_message(channel, log_time=step * S // 10, data=data, publish_time=0)
+        writer.finish()
+    return file

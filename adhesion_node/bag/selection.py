@@ -9,6 +9,7 @@
 """Which topics of a recording stand for which of ours: whose train, remapping, and clear words when they do not fit."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 from ..wire import topics
 from ..wire.topic import Topic
@@ -77,13 +78,14 @@ def select(
     remaps: Sequence[tuple[str, str]] = (),
     names: Iterable[str] | None = None,
     namespace: str = "",
+    unread: Mapping[str, str] = MappingProxyType({}),
 ) -> dict[str, str]:
     """Return the topics to replay: from the name in the recording to the name after remapping.
 
     `recorded` holds the types by name. Replayed are `names` (after remapping), or else the sensors and the truth,
     not recorded results; of several trains that of `namespace`. Our own topics come out under their relative names, so
-    that namespaces apply. Raises ValueError when a remapped or named topic is missing, has the wrong type, or when
-    there is neither a position nor a speed nor, for the creep curve, a wheel speed.
+    that namespaces apply. Raises ValueError when a remapped or named topic is missing, has the wrong type, when one is
+    `unread`, which says why, or when there is neither a position nor a speed nor, for the creep curve, a wheel speed.
     """
     renamed = _rename(recorded, remaps, namespace)
     has_any = any(same_name(target, topic.name) for target in renamed.values() for topic in _ENOUGH)
@@ -93,6 +95,8 @@ def select(
         source = next((source for source, target in renamed.items() if same_name(target, name)), None)
         own = name.lstrip("/")
         if source is not None:
+            if source in unread:
+                raise ValueError(f"{unread[source]}: convert it, or leave it out by --remap {source}:=unused")
             selection[source] = own if own in _OURS else name
             if (kind := recorded[source]) != (needed := _OURS.get(own, kind)):
                 what = _what_there_is(name, recorded)
@@ -114,7 +118,7 @@ def select_from(
     if namespace is not None or names is None:
         choose_train(reader, namespace, remapped=bool(remaps))
     try:
-        return select(reader.topics, [parse_remap(text) for text in remaps], names, reader.namespace)
+        return select(reader.topics, [parse_remap(text) for text in remaps], names, reader.namespace, reader.unread)
     except ValueError as error:
         raise ValueError(f"bag = {reader.path}: {error}") from error
 

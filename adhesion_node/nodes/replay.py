@@ -102,7 +102,8 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
     for loss in reader.damage:
         print(f"replay: {loss}", file=sys.stderr)
     selection = select_from(reader, options.remap, options.topics, options.namespace)
-    for hint in overlooked(reader.topics, selection, reader.namespace) if options.topics is None else ():
+    hints = [*reader.left_out, *overlooked(reader.topics, selection, reader.namespace)]
+    for hint in hints if options.topics is None else ():
         print(f"replay: {hint}", file=sys.stderr)
     return selection
 

@@ -141,6 +141,8 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         if not options.remap:
             choose_train(reader, options.namespace)
         if all(reader.resolve(topic.name) for topic in RESULTS) and not options.estimate:
+            for hint in reader.left_out:
+                print(f"report: {name}: {hint}", file=sys.stderr)
             run, source = read_run(reader, setup.line, KEYS if options.out else (), targets), RECORDED
             lost: Mapping[str, int] = reader.undecodable
             if told := odd(run.counts):
@@ -149,7 +151,7 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
                 write(row)
         else:
             selection = select_from(reader, options.remap, namespace=options.namespace)
-            for hint in overlooked(reader.topics, selection, reader.namespace):
+            for hint in (*reader.left_out, *overlooked(reader.topics, selection, reader.namespace)):
                 print(f"report: {name}: {hint}", file=sys.stderr)
             run, lost = estimate_run(reader, selection, setup, write, targets)
             source = "estimated from the recorded sensors"

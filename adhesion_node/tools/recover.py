@@ -33,7 +33,8 @@ def main(args: Sequence[str] | None = None) -> int:
 def recover(source: Path, output: Path, drop_undecodable: bool = False) -> dict[str, Any]:
     """Copy every readable message, unchanged and in the order of log time, into a new recording.
 
-    With `drop_undecodable` a message whose bytes do not fit its type is left out; one of an unknown type stays.
+    What is not CDR, or of a second type of its topic, is left out: other readers refuse it. With `drop_undecodable` so
+    is a message whose bytes do not fit its type; one of a type that is unknown, or defined otherwise, stays.
 
     Returns the summary: messages by topic, those left out, lost ones as far as the metadata tells, and a sentence for
     each loss.
@@ -43,9 +44,10 @@ def recover(source: Path, output: Path, drop_undecodable: bool = False) -> dict[
         writer, dropped = BagWriter(output), Counter[str]()
         try:
             for name, info in reader.infos.items():
-                writer.add_topic(name, info.type, offered=info.offered, known_as=info.definition)
+                if info.is_cdr:
+                    writer.add_topic(name, info.type, offered=info.offered, known_as=info.definition)
             for record in progress(reader.messages(), "messages", sum(reader.counts.values())):
-                if drop_undecodable and not record.is_whole:
+                if drop_undecodable and record.topic not in reader.unread and not record.is_whole:
                     dropped[record.topic] += 1
                 else:
                     writer.write(record.topic, record.type, record.cdr, record.log_ns)
@@ -53,8 +55,11 @@ def recover(source: Path, output: Path, drop_undecodable: bool = False) -> dict[
         except BaseException:
             writer.discard()
             raise
-        said = {"complete": reader.complete, "damage": list(reader.damage)}
-        return {**said, "messages": writer.counts, "undecodable": dict(dropped), "lost": reader.lost}
+        copied = writer.counts
+        left = {name: more for name in reader.unread if (more := reader.counts[name] - copied.get(name, 0))}
+        damage = [*reader.damage, *(f"{reader.unread[name]}: {left[name]} messages are left out" for name in left)]
+        said = {"complete": not damage, "damage": damage, "messages": copied, "undecodable": dict(dropped)}
+        return {**said, "left_out": left, "lost": reader.lost}
 
 
 def _work(options: argparse.Namespace) -> int:

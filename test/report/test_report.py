@@ -24,6 +24,7 @@ from std_msgs.msg import Float64
 from test_offline import samples, write_run
 
 from adhesion_node.bag import BagReader, BagWriter
+from adhesion_node.bag.types import Definition
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
 from adhesion_node.wire.topics import TRUTH_MU
@@ -145,10 +146,14 @@ def test_messages_that_do_not_decode_are_left_out_and_told(
             last = one.topic in spoilt or one.log_ns < START_NS + 5 * S
             writer.write(one.topic, one.type, one.cdr if last else b"\0\1\0\0\xff", one.log_ns)
             spoilt |= set() if last else {one.topic}
+        writer.add_topic("/odd", TRUTH_MU.type, known_as=Definition("ros2msg", "int8 data"))
+        writer.write("/odd", TRUTH_MU.type, b"\0\1\0\0\7", 0)
     result, _ = make(tmp_path, str(tmp_path / "bag"), *(() if results else QUICK))
     assert result["runs"][0]["source"] == "as recorded" if results else "estimated from the recorded sensors"
     told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("report: ")]
     assert len(spoilt) > 3
+    odd = f"recorded with another definition of {TRUTH_MU.type} (its fields are int8 data, ours float64 data)"
+    told.remove(f"report: bag: topic /odd: {odd}: 1 messages are left out")
     assert set(told) <= {f"report: {topic}: 1 messages do not decode and are left out" for topic in spoilt}
     assert len(told) >= 3
 

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import cdrs
 import pytest
+from recorded import JSON, PROTOBUF, write_beside
 from test_offline import (
     FAST_CONFIG,
     KEYS,
@@ -247,6 +248,21 @@ def test_an_unreadable_bag_is_one_line_and_code_2(
     assert line.startswith("replay: ")
     assert "x.mcap" in line
     assert message in line
+
+
+def test_what_is_no_cdr_beside_the_sensors_is_told_and_changes_nothing(tmp_path: Path, offline: Offline) -> None:
+    alone, beside = (
+        offline(write_beside(tmp_path / f"{len(others)}.mcap", *others, steps=300)) for others in ((), (PROTOBUF,))
+    )
+    assert (alone.result["measurements"], alone.result["digest"]) == (300, beside.result["digest"])
+    told = "replay: topic /log: encoding = 'protobuf': only CDR (ROS 2) is read: 2 messages are left out"
+    assert beside.err == [told, *alone.err]
+
+
+def test_a_sensor_that_is_no_cdr_is_refused(tmp_path: Path, offline: Offline) -> None:
+    code, result, out, (line,) = offline(write_beside(tmp_path / "x.mcap", JSON._replace(topic="/speed")))
+    assert (code, result, out) == (2, None, "")
+    assert line.endswith("only CDR (ROS 2) is read: convert it, or leave it out by --remap /speed:=unused")
 
 
 def test_bad_usage_ends_with_code_2(bag: Path, capfd: pytest.CaptureFixture[str]) -> None:

@@ -18,13 +18,14 @@ import cdrs
 import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
-from recorded import LATCHED
+from recorded import JSON, LATCHED, NUMBER, TEXT, cdr_beside, write_beside
+from rosbags.highlevel import AnyReader
 from rosbags.rosbag2 import Reader
 from test_bag_damaged import index_of
 from test_recording_survives import file_size_limit
 
 from adhesion_node.bag import BagReader, BagWriter, Limits
-from adhesion_node.bag.types import Definition
+from adhesion_node.bag.types import Definition, definition, type_hash
 from adhesion_node.bag.write.writer import file_name
 from adhesion_node.tools import recover
 from adhesion_node.wire.topics import BRAKE_PRESSURE, BRAKING_CURVE, POSITION
@@ -165,6 +166,37 @@ def test_types_of_others_are_kept(tmp_path: Path) -> None:
         assert reader.infos["/bar"].definition.text == "int32 baz"
         with pytest.raises(ValueError, match="/bar at 5 ns: message type = 'foo_msgs/msg/Bar'"):
             _ = record.message
+
+
+def test_what_other_readers_refuse_is_left_out_and_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = cdr_beside("/foo", TEXT, b"\0\1\0\0\1\0\0\0\0"), cdr_beside("/foo", NUMBER, bytes(12), bytes(12))
+    file = write_beside(tmp_path / "x.mcap", JSON, *both)
+    assert recover.main([str(file), "--output", str(tmp_path / "whole"), "--json", "-"]) == 0
+    out, err = capsys.readouterr()
+    summary = json.loads(out)
+    assert summary["messages"] == {"/brake_pressure": 3, "/position": 3, "/foo": 1}
+    assert (summary["left_out"], summary["complete"]) == ({"/foo": 2, "/log": 2}, False)
+    assert [f"recover: {loss}" for loss in summary["damage"]] == err.splitlines()
+    assert "recover: topic /log: encoding = 'json': only CDR (ROS 2) is read: 2 messages are left out" in err
+    with AnyReader([tmp_path / "whole"]) as it:
+        assert it.message_count == 7
+
+
+def test_a_type_that_is_defined_otherwise_is_kept_as_it_is(tmp_path: Path) -> None:
+    """Whatever is asked to be dropped: by its own definition it decodes."""
+    other = Definition("ros2msg", "int8 data\n")
+    with BagWriter(tmp_path / "bag") as writer:
+        writer.add_topic("/ours", NUMBER)
+        writer.add_topic("/theirs", NUMBER, known_as=other)
+        for name, cdr in {"/ours": bytes(12), "/theirs": b"\0\1\0\0\7"}.items():
+            writer.write(name, NUMBER, cdr, 0)
+    summary = recover.recover(tmp_path / "bag", tmp_path / "whole", drop_undecodable=True)
+    assert (summary["messages"], summary["complete"]) == ({"/ours": 1, "/theirs": 1}, True)
+    with BagReader(tmp_path / "whole") as reader:
+        assert [reader.infos[name].definition for name in ("/ours", "/theirs")] == [definition(NUMBER), other]
+    summary = recover.recover(tmp_path / "bag", tmp_path / "whole2")
+    with Reader(tmp_path / "whole2") as it:
+        assert [connection.digest for connection in it.connections] == [type_hash(NUMBER), ""]
 
 
 @pytest.mark.parametrize("content", [b"", b"garbage" * 50])

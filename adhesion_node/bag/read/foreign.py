@@ -39,12 +39,12 @@ class ForeignRecording:
             for connection in reader.connections:
                 yield _info(connection), connection.msgcount
 
-    def records(self, wanted: Callable[[str], bool]) -> Iterator[Record]:
+    def records(self, wanted: Callable[[TopicInfo], bool]) -> Iterator[Record]:
         """Yield the records of all files merged; each file comes sorted from its database."""
         streams = []
         for reader in self._readers:
             # Without any connection rosbags would yield them all.
-            if connections := [connection for connection in reader.connections if wanted(connection.topic)]:
+            if connections := [connection for connection in reader.connections if wanted(_info(connection))]:
                 streams.append(reader.messages(connections))
         with self._translated():
             for connection, log_ns, cdr in heapq.merge(*streams, key=lambda entry: entry[1]):

@@ -57,6 +57,11 @@ class TopicInfo(NamedTuple):
     definition: Definition
     offered: tuple[Qos, ...] = ()
 
+    @property
+    def is_cdr(self) -> bool:
+        """Whether its messages are those of ROS 2."""
+        return self.encoding == "cdr"
+
 
 class McapFile:
     """An MCAP file: `topics` and message `counts` by channel, `blocks`, and `damage`: a sentence per loss.
@@ -151,17 +156,22 @@ class McapFile:
         """
         for record in records:
             if isinstance(record, Schema):
-                self._types.setdefault(record.id, (record.name, Definition(record.encoding, record.data.decode())))
+                text = record.data.decode(errors="replace")  # that of a protobuf is none
+                self._types.setdefault(record.id, (record.name, Definition(record.encoding, text)))
             else:
                 self._channels.setdefault(record.id, record)
 
     def _name_topics(self) -> None:
-        """Give the channels their types, which a damaged chunk took along where the end does not repeat them."""
+        """Give the channels their types, which a damaged chunk took along where the end does not repeat them.
+
+        JSON needs none.
+        """
         for number, channel in self._channels.items():
             kind, known_as = self._types.get(channel.schema_id, ("", Definition("", "")))
-            if kind:
-                offered = parse(channel.metadata.get("offered_qos_profiles", ""))
-                self.topics[number] = TopicInfo(channel.topic, kind, channel.message_encoding, known_as, offered)
+            offered = parse(channel.metadata.get("offered_qos_profiles", ""))
+            info = TopicInfo(channel.topic, kind, channel.message_encoding, known_as, offered)
+            if kind or not info.is_cdr:
+                self.topics[number] = info
             elif count := self.counts[number]:
                 self.damage.append(f"{self.path}: {count} messages of {channel.topic} are left out, their type is lost")
 

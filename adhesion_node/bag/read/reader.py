@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from ...wire.messages.refused import Rejected
+from ..definitions import difference
 from ..metadata import Metadata, read_metadata
 from ..types import same_name
 from .foreign import ForeignRecording
@@ -29,7 +30,8 @@ class BagReader:
     `topics` are the types and `counts` the numbers of messages by topic name, for topics that hold messages.
     `complete` is False when something of the recording is lost or was never written; `damage` then says what, a
     sentence each, and `lost` how many messages of which topic, where the metadata tells. What is there can be read all
-    the same. Raises ValueError when there is no such recording or nothing in it is readable.
+    the same. `unread` says of topics why they are not read: of another encoding, of two types, or of a type that is
+    defined otherwise. Raises ValueError when there is no such recording or nothing in it is readable.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -37,7 +39,7 @@ class BagReader:
         metadata = read_metadata(self.path)
         self._recording = _open(self.path, metadata)
         try:
-            self.infos, self.counts = self._survey()
+            self.infos, self.counts, self.unread = self._survey()
         except BaseException:
             self.close()
             raise
@@ -54,10 +56,13 @@ class BagReader:
     def messages(self, names: Iterable[str] | None = None) -> Iterator[Record]:
         """Yield the records in the order of (log time, arrival), of all topics or of those named.
 
-        Names match with or without the leading slash; a topic that is not there yields nothing.
+        Names match with or without the leading slash; a topic that is not there, or is not read, yields nothing. Of all
+        topics come those that are defined otherwise, too, and what is of the type that `topics` tells.
         """
         chosen = set(self.topics) if names is None else {self.resolve(name) for name in names}
-        return self._recording.records(chosen.__contains__)
+        return self._recording.records(
+            lambda info: info.is_cdr and info.name in chosen and info.type == self.topics[info.name]
+        )
 
     def decoded(self, records: Iterable[Record]) -> Iterator[tuple[Record, Any]]:
         """Yield records, each with its message; those that do not decode are left out.
@@ -77,10 +82,15 @@ class BagReader:
         """Numbers of the messages that `decoded` has left out so far, by topic."""
         return dict(Counter(record.topic for record in self._undecodable))
 
+    @property
+    def left_out(self) -> list[str]:
+        """A sentence for each topic that is not read."""
+        return [f"{why}: {self.counts[name]} messages are left out" for name, why in self.unread.items()]
+
     def resolve(self, name: str) -> str | None:
-        """Return the name under which a topic is recorded, or None when it is not there."""
+        """Return the name under which a topic is recorded, or None when it is not there, or is not read."""
         whole = name if name.startswith("/") else f"{self.namespace}/{name}"
-        return next((recorded for recorded in self.topics if same_name(recorded, whole)), None)
+        return next((one for one in self.topics if same_name(one, whole) and one not in self.unread), None)
 
     def close(self) -> None:
         """Close the files."""
@@ -92,22 +102,31 @@ class BagReader:
     def __exit__(self, *_: object) -> None:
         self.close()
 
-    def _survey(self) -> tuple[dict[str, TopicInfo], dict[str, int]]:
+    def _survey(self) -> tuple[dict[str, TopicInfo], dict[str, int], dict[str, str]]:
         infos: dict[str, TopicInfo] = {}
         counts: Counter[str] = Counter()
-        for info, count in self._recording.infos():
+        unread: dict[str, str] = {}
+        # What is CDR comes first: a topic is what can be read of it.
+        for info, count in sorted(self._recording.infos(), key=lambda each: not each[0].is_cdr):
             if not count:
                 continue
-            if info.encoding != "cdr":
-                raise ValueError(f"bag = {self.path}: topic {info.name} is {info.encoding!r}: only CDR (ROS 2) is read")
             known = infos.setdefault(info.name, info)
-            if known.type != info.type:
-                raise ValueError(f"bag = {self.path}: topic {info.name} is both {known.type} and {info.type}: split it")
             counts[info.name] += count
-        if self._recording.damage and not infos:
-            first = self._recording.damage[0]
-            raise ValueError(f"bag = {self.path}: holds no readable message ({first}): name another recording")
-        return infos, dict(counts)
+            if (why := _why_unread(info, known)) is not None:
+                unread.setdefault(info.name, f"topic {info.name}: {why}")
+        lacking = [*self._recording.damage, *unread.values()]
+        if lacking and not any(info.is_cdr for info in infos.values()):
+            raise ValueError(f"bag = {self.path}: holds no readable message ({lacking[0]}): name another recording")
+        return infos, dict(counts), unread
+
+
+def _why_unread(info: TopicInfo, known: TopicInfo) -> str | None:
+    """Say what keeps a topic, `known` as another one of its name, from being read; None where nothing does."""
+    if not info.is_cdr:
+        return f"encoding = {info.encoding!r}: only CDR (ROS 2) is read"
+    if info.type != known.type:
+        return f"recorded as {known.type} and as {info.type}"
+    return difference(info.type, info.definition)
 
 
 def _open(path: Path, metadata: Metadata) -> Recording:

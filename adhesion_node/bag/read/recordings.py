@@ -56,8 +56,8 @@ class Recording(Protocol):
     def infos(self) -> Iterator[tuple[TopicInfo, int]]:
         """Yield the topics with their numbers of messages; a topic may come several times."""
 
-    def records(self, wanted: Callable[[str], bool]) -> Iterator[Record]:
-        """Yield the records of the topics whose name is wanted."""
+    def records(self, wanted: Callable[[TopicInfo], bool]) -> Iterator[Record]:
+        """Yield the records of the topics that are wanted."""
 
     def close(self) -> None:
         """Close the files."""
@@ -76,14 +76,14 @@ class McapRecording:
             for channel, info in file.topics.items():
                 yield info, file.counts[channel]
 
-    def records(self, wanted: Callable[[str], bool]) -> Iterator[Record]:
+    def records(self, wanted: Callable[[TopicInfo], bool]) -> Iterator[Record]:
         """Yield the records: a block is read once no earlier message can follow, so few are in memory at a time."""
         blocks = sorted(
             (block.start_ns, number, block.offset, block)
             for number, file in enumerate(self._files)
             for block in file.blocks
         )
-        topics = [{at: info for at, info in file.topics.items() if wanted(info.name)} for file in self._files]
+        topics = [{at: info for at, info in file.topics.items() if wanted(info)} for file in self._files]
         pending: list[tuple[int, int, int, int, Record]] = []
         for (_, number, offset, block), following in zip_longest(blocks, blocks[1:]):
             of_channel = topics[number].get

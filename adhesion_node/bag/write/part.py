@@ -49,7 +49,7 @@ class Part:
         self._path = path
         self._span_ns = span_ns
         self._channels: dict[str, int] = {}
-        self._schemas: dict[str, int] = {}
+        self._schemas: dict[tuple[str, Definition], int] = {}
         self._chunk_start_ns: int | None = None
         self._chunk_bytes = 0
         self._summary_bytes = 4096
@@ -77,10 +77,11 @@ class Part:
         self._set_aside(2 * size)
         self._chunk_bytes += size
         self._summary_bytes += size
-        if topic.type not in self._schemas:
+        kind = topic.type, definition
+        if kind not in self._schemas:
             schema = self._writer.register_schema(topic.type, definition.encoding, definition.text.encode())
-            self._schemas[topic.type] = schema
-        self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[topic.type], qos)
+            self._schemas[kind] = schema
+        self._channels[topic.name] = self._writer.register_channel(topic.name, "cdr", self._schemas[kind], qos)
 
     def write(self, topic: str, cdr: bytes, log_ns: int) -> None:
         """Append a message of a declared topic."""

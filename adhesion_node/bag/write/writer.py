@@ -18,6 +18,7 @@ from typing import NamedTuple, Self
 
 from rosbags.interfaces import Qos
 
+from ..definitions import difference
 from ..metadata import LATEST_NS, File, Topic, document
 from ..qos import RELIABLE
 from ..types import Definition, definition, type_hash
@@ -80,7 +81,8 @@ class BagWriter:
         """
         if name not in self._topics:
             defined = known_as if known_as and known_as.text else definition(type_name)
-            self._topics[name] = Topic(name, type_name, type_hash(type_name), tuple(offered) or (RELIABLE,)), defined
+            digest = "" if difference(type_name, defined) else type_hash(type_name)  # readers compare it
+            self._topics[name] = Topic(name, type_name, digest, tuple(offered) or (RELIABLE,)), defined
 
     def write(self, topic_name: str, type_name: str, cdr: bytes, log_ns: int) -> None:
         """Append one message. Raises ValueError when the topic has another type or the time is out of range."""

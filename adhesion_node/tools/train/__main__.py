@@ -83,7 +83,7 @@ def _estimate(options: argparse.Namespace) -> int:
         for loss in reader.damage:
             print(f"train: {loss}", file=sys.stderr)
         selection = select_from(reader, options.remap, namespace=options.namespace)
-        for hint in overlooked(reader.topics, selection, reader.namespace):
+        for hint in (*reader.left_out, *overlooked(reader.topics, selection, reader.namespace)):
             print(f"train: {hint}", file=sys.stderr)
         recorded = progress(offline.messages(reader, selection, setup.line), "messages")
         found = slowing.find(setup.config, slowing.read(recorded, setup.line))
