@@ -63,7 +63,8 @@ def units_read(form: Format) -> Iterator[str]:
     told = {ours: unit for ours, unit in form.told.items() if form.given(ours) in (None, unit)}
     options = dict.fromkeys(f"--{FAMILIES[ours]}-unit" for ours in told if ours in FAMILIES)
     if told:
-        units = ", ".join(f"{ours} in {unit}{' absolute' * (ours in form.absolute)}" for ours, unit in told.items())
+        absolute = form.absolute if form.is_gauge is None else ()
+        units = ", ".join(f"{ours} in {unit}{' absolute' * (ours in absolute)}" for ours, unit in told.items())
         yield f"units that the log names: {units}" + (f"; otherwise: {', '.join(options)}" if options else "")
 
 

@@ -84,6 +84,14 @@ def test_letters_that_may_be_wrong_are_said_with_the_encoding(
     assert ("are its letters wrong? --encoding" in importing.errors[0]) == wrong
 
 
+@pytest.mark.parametrize(("options", "kind"), [((), " absolute"), (("--pressure-kind", "gauge"), "")])
+def test_what_an_option_says_of_pressures_is_not_told_otherwise(
+    importing: Import, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], kind: str
+) -> None:
+    importing("time,speed,brake_pressure [bara]\n1,20,1.5\n2,20,1.5\n")
+    assert f"brake_pressure in bar{kind};" in str(read_as(importing, capsys, *options))
+
+
 def test_columns_are_found_despite_their_case(importing: Import) -> None:
     assert importing("Time,SPEED,Brake_Pressure,Wheel_Speed_1\n1,20,0,40\n2,20,0,40\n") == 0
     topics = {"/speed": 2, "/brake_pressure": 2, "/wheel_speed": 2}

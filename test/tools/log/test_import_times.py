@@ -221,7 +221,9 @@ def test_a_date_that_looks_like_no_date_is_cured_by_its_format(importing: Import
     assert SPEED.read(importing.messages("speed")[0]).t_ns == 1_732_176_903_500_000_000
 
 
-@pytest.mark.parametrize("time", ["20241121T081503.5Z", "20241121T091503.5+0100"])
-def test_a_date_of_iso_needs_no_colons(importing: Import, time: str) -> None:
+@pytest.mark.parametrize(
+    "time", ["20241121T081503.5Z", "20241121T091503.5+0100", "2024-11-21T081503.5z", "2024-11-21t08:15:03.5z"]
+)
+def test_a_date_of_iso_needs_no_colons_nor_capitals(importing: Import, time: str) -> None:
     assert importing(f"time,speed\n{time},1\n{time.replace('03.5', '04.5')},2\n") == 0, importing.errors
     assert SPEED.read(importing.messages("speed")[0]).t_ns == 1_732_176_903_500_000_000

@@ -51,14 +51,17 @@ FORMATS = (
 
 _LIKE = (
     (r"\s*(?:UTC|GMT)$", ""),
+    (r"(?<=[0-9])t(?=[0-9])", "T"),
+    (r"(?<=[0-9])z$", "Z"),
     (r",\s+", " "),
     (",", "."),
     (r"(:[0-9]{2}:[0-9]{2}):(?=[0-9]{3}(?![0-9]))", r"\g<1>."),
 )
-"""What a date may have otherwise: UTC, a comma before the next part or the fraction, a colon before milliseconds."""
+"""What a date may have otherwise: UTC, small letters, a comma before the next part or the fraction, a colon before
+milliseconds."""
 
-_BASIC = re.compile(r"\s*[0-9]{8}T[0-9]{4}")
-"""How a date without colons begins, 20241121T081503."""
+_BASIC = re.compile(r"\s*[0-9]{4}(-?)[0-9]{2}\1[0-9]{2}[Tt][0-9]{4}")
+"""How a date without colons begins, 20241121T081503 or 2024-11-21T081503."""
 
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """Times from this number on are counted in such units since 1970."""
