@@ -46,8 +46,9 @@ class Reader:
 
         What is a sample already only takes its turn.
         """
+        if self.source is not None and self.source.name in self.line.unused:
+            self.source = None  # another one takes over, though this one may never be heard again
         if topic.name in self.line.unused:
-            self.source = None if self.source is topic else self.source
             raise Rejected(Reason.SWITCHED_OFF, f"{USE}{topic.name} = false")
         is_better = topic is not self.source and topic in self.anchors
         if is_better and self.source is not None and self.anchors.index(topic) > self.anchors.index(self.source):

@@ -130,6 +130,20 @@ def test_two_estimators_of_a_monitor_are_told(make_line: Callable[..., Line]) ->
     line.wait_until_said("2 publishers of /train1/adhesion/braking_curve: stop all but one")
 
 
+@pytest.mark.parametrize(
+    ("asked", "left_out"),
+    [("deadline", ["deadline"]), ("liveliness_lease_duration", ["liveliness", "liveliness_lease_duration"])],
+)
+def test_what_no_publisher_offers_is_to_be_left_out(
+    make_line: Callable[..., Line], asked: str, left_out: list[str]
+) -> None:
+    override = "qos_overrides./position.subscription."
+    line = make_line(Estimator, diagnostics_period_s=0.1, **{override + asked: S // 10})
+    line.driver.create_publisher(messages.message_class(topics.POSITION), "position", 1)
+    remedy = " and ".join(override + policy for policy in left_out)
+    line.wait(lambda: any(f"nothing of it arrives: leave {remedy} out" in one.status[0].message for one in line.told))
+
+
 def test_a_receiver_that_sends_what_is_refused_is_silent(make_line: Callable[..., Line]) -> None:
     line = make_line(Estimator, diagnostics_period_s=0.1, sensor_timeout_s=0.5)
     position = line.outlet(topics.POSITION)

@@ -6,7 +6,10 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Processes that are killed: a sensor is missed, an estimator inherits nothing and works again within one window."""
+"""Processes that are killed: a sensor is missed, an estimator inherits nothing and works again within one window.
+
+One that is stopped counts what it has lost.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +19,7 @@ from functools import partial
 import messages
 from conftest import PATIENCE_S, SpinUntil
 from diagnostic_msgs.msg import DiagnosticStatus
+from faulty import S
 from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -46,6 +50,41 @@ def test_a_sensor_whose_process_is_killed_is_stale(
     simulator.send_signal(signal.SIGKILL)
     spin_until(executor, lambda: operator.levels[-1] == DiagnosticStatus.STALE)
     spin_until(executor, lambda: estimator.count_publishers(topics.POSITION.name) == 0, PATIENCE_S)
+
+
+def test_what_a_stopped_estimator_has_lost_is_counted_by_topic(
+    started: list[Program], context: Context, executor: SingleThreadedExecutor, spin_until: SpinUntil
+) -> None:
+    """Of thousands of messages its queue keeps the last 100; that some are missing shows by the next one that comes."""
+    operator, driver = Operator(context), Node("driver", context=context)
+    for node in (operator, driver):
+        executor.add_node(node)
+    position = qos.advertise(driver, topics.POSITION)
+    estimator = start("estimator", "--ros-args", "-p", "diagnostics_period_s:=0.1")
+    started.append(estimator)
+    spin_until(executor, lambda: position.get_subscription_count() and operator.heard, START_S)
+    assert not [name for name in operator.heard[-1] if name.startswith("lost.")]
+    sent = 0
+
+    def send() -> None:
+        nonlocal sent
+        sent += 1
+        position.publish(messages.position(S + sent * S // 100, 0.3 * sent, 0.5))
+
+    def lost() -> bool:
+        send()
+        return "lost.position" in operator.heard[-1]
+
+    estimator.send_signal(signal.SIGSTOP)
+    for _ in range(5000):
+        send()
+    estimator.send_signal(signal.SIGCONT)
+    spin_until(executor, lost)
+    told = len(operator.heard)
+    spin_until(executor, lambda: len(operator.heard) > told + 5)  # it is told for good
+    values = operator.heard[-1]
+    assert 1 <= int(values["lost.position"]) <= sent - int(values["measurements"])
+    assert [name for name in values if name.startswith("lost.")] == ["lost.position"]
 
 
 def measured(operator: Operator, count: int) -> bool:

@@ -146,6 +146,8 @@ def test_a_sensor_that_is_switched_off_makes_room_for_the_next_one() -> None:
     reader.line = Line()
     reader.read(POSITION, position)
     assert reader.source is POSITION
+    reader.line = setup_of({"use_position": False}).line
+    assert reader.read(ODOMETRY, odometry) == (10, 5.0, 1.0), "though no position comes any more"
 
 
 def test_stamps_that_are_late_are_put_right(way: list[tuple[float, float]]) -> None:

@@ -143,21 +143,18 @@ class EstimatingNode(ManagedNode, Generic[P]):
         """Use what still waits and publish what it gives."""
         if not self.configured:
             return
-        self._publish(self.pipeline.finish())
+        self.publish(self.pipeline.finish())
         tally, dropped = self.pipeline.tally, self.pipeline.dropped or "none"
         self.get_logger().info(f"{tally}, dropped {dropped}, digest {self.digest}")
 
-    def take(self, sample: Any) -> tuple[Event, ...]:
-        """Use a sample and publish what it completes."""
-        outputs = self.pipeline.push(sample)
-        events = self.pipeline.events
-        self._publish(outputs)
-        return events
+    def take(self, sample: Any) -> tuple[Sequence[Any], tuple[Event, ...]]:
+        """Use a sample."""
+        return self.pipeline.push(sample), self.pipeline.events
 
     def settle(self, silent_s: float) -> None:
         """Publish what has waited for others of its time; late ones may still come within the lag."""
         if silent_s * 1e9 >= self.pipeline.state.gate.max_lag_ns:
-            self._publish(self.pipeline.settle())
+            self.publish(self.pipeline.settle())
 
     def refuse(self, topic: Topic, refusal: Rejected) -> None:
         """Count a refused message."""
@@ -178,7 +175,8 @@ class EstimatingNode(ManagedNode, Generic[P]):
         stamp = {"stamp_ns": str(self.latest.t_ns) if self.latest is not None else "none"}
         unused = sorted(self._reader.line.unused)
         off = {"switched_off": ", ".join(unused)} if unused else {}
-        return found, stamp | self._kind.values(self.pipeline) | chosen | off
+        lost = {f"lost.{topic.name}": str(count) for topic, count in self._intake.lost.items()}
+        return found, stamp | self._kind.values(self.pipeline) | chosen | off | lost
 
     def _often_reset(self) -> list[Finding]:
         """Say when it starts anew again and again."""
@@ -191,13 +189,13 @@ class EstimatingNode(ManagedNode, Generic[P]):
         return [Finding(Severity.WARN, f"{text}; does a recording loop, is there a second publisher?")]
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._publish(self.pipeline.reset())
+        self.publish(self.pipeline.reset())
         self._reader.source = None
         return self._answered(response, "reset", "started anew")
 
     def _on_set_enabled(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if self._intake.enabled and not request.data:
-            self._publish(self.pipeline.reset())
+            self.publish(self.pipeline.reset())
         self._intake.enabled = request.data
         return self._answered(response, "set_enabled", "enabled" if request.data else "disabled: nothing is identified")
 
@@ -207,7 +205,8 @@ class EstimatingNode(ManagedNode, Generic[P]):
         self.report()
         return response
 
-    def _publish(self, outputs: Sequence[Any]) -> None:
+    def publish(self, outputs: Sequence[Any]) -> None:
+        """Publish what was completed."""
         for output in outputs if self.active else ():
             for topic in self._kind.results:
                 message = topic.build(new, output)

@@ -9,24 +9,23 @@
 """The way of sensor messages into a node: subscribed, counted, read or refused, and what an operator must know."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, Protocol
 
 from rclpy.node import Node
 
 from adhesion_node.core import Event
 from adhesion_node.core.atp.supervision import Severity
+from adhesion_node.core.intake.outcome import KEPT_OUT
 from adhesion_node.run.reader import Reader
-from adhesion_node.wire import topics
 from adhesion_node.wire.line import Line
 from adhesion_node.wire.messages.refused import Reason, Rejected
 from adhesion_node.wire.topic import Topic
 
 from . import qos
 from .diagnostics import Finding, doubled, unlike
-from .silence import Silence
-
-BY_SPEED = "no position: the train is followed by its speed or its wheels alone, wherever it is on the track"
+from .hearing import Hearing
 
 AS_WANTED = (Reason.OTHER_SOURCE.name, Reason.SWITCHED_OFF.name)
 UNUSED = (*AS_WANTED, Reason.DISABLED.name)
@@ -38,8 +37,11 @@ class Listener(Protocol):
 
     active: bool
 
-    def take(self, sample: Any) -> Iterable[Event]:
-        """Use a sample; return what it brought about other than that it was used."""
+    def take(self, sample: Any) -> tuple[Sequence[Any], Iterable[Event]]:
+        """Use a sample; return what it completes, and what it brought about other than that it was used."""
+
+    def publish(self, outputs: Sequence[Any]) -> None:
+        """Publish what was completed."""
 
     def refuse(self, topic: Topic, refusal: Rejected) -> None:
         """Count a message that was refused."""
@@ -54,30 +56,31 @@ class Listener(Protocol):
 class Intake:
     """Subscribes what `reader` reads; its anchor must not fall silent for longer than `timeout_s`.
 
-    `heard` counts the messages by topic, refused ones included. While `enabled` is False all are refused.
+    `heard` counts the messages by topic, refused ones included, `lost` those that were lost on the way, of which a gap
+    may count as one. While `enabled` is False all are refused.
     """
 
     def __init__(self, node: Node, listener: Listener, reader: Reader, timeout_s: float) -> None:
         self.heard: Counter[Topic] = Counter()
+        self.lost: Counter[Topic] = Counter()
         self.enabled = True
         self._node, self._listener, self._reader = node, listener, reader
         self._counts: Counter[str] = Counter()
         self._refusals: dict[str, str] = {}
         self._events: dict[str, str] = {}
-        self._refused = ""
-        self._silence = Silence(node, timeout_s, self._on_silence)
+        self._hearing = Hearing(node, reader, timeout_s, self._on_silence)
         for topic in reader.inputs:
-            qos.subscribe(node, topic, self._receiver(topic), tell=self.tell)
-        node.get_logger().info(f"ready: waiting for {' or '.join(self._watched)}")
+            qos.subscribe(node, topic, self._receiver(topic), tell=self.tell, lost=partial(self._on_lost, topic))
+        node.get_logger().info(f"ready: waiting for {' or '.join(self._hearing.awaited)}")
 
     def resume(self) -> None:
         """Begin to wait anew."""
-        self._silence.wait()
+        self._hearing.wait()
 
     def change(self, line: Line, timeout_s: float) -> None:
         """Read and wait from now on with what has changed."""
         self._reader.line = line
-        self._silence.change(timeout_s)
+        self._hearing.silence.change(timeout_s)
 
     def note(self, reason: str, text: str) -> None:
         """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of a reason is told at once."""
@@ -99,36 +102,21 @@ class Intake:
         found = [Finding(Severity.WARN, text) for text in (*self._refusals.values(), *self._events.values())]
         self._refusals.clear()
         # What happened to the watched topic stands until that is heard again: it may be why it is silent.
-        self._events = {name: text for name, text in self._events.items() if name in self._watched}
-        if self._silence.for_s is not None:
-            moves = self.heard[topics.SPEED] + self.heard[topics.WHEEL_SPEED] > 0
-            by_speed = moves and self._reader.source is None and topics.POSITION in self._reader.anchors
-            text = BY_SPEED if by_speed else self._silent(self._silence.for_s)
-            found.append(Finding(Severity.WARN if by_speed else Severity.STALE, text))
+        awaited = self._hearing.awaited
+        self._events = {name: text for name, text in self._events.items() if name in awaited}
+        found += self._hearing.findings()
         if not self.enabled:
             found.append(Finding(Severity.WARN, f"disabled: {Reason.DISABLED.value}"))
-        unheard = [topic for topic in self._reader.inputs if not self.heard[topic]]
+        fell_silent = self._hearing.silent_s
+        unheard = [topic for topic in self._reader.inputs if not self.heard[topic] or fell_silent(topic) is not None]
         return [*found, *unlike(self._node, unheard), *doubled(self._node, self._reader.inputs)]
 
-    @property
-    def _watched(self) -> list[str]:
-        """The full names of what must not fall silent: of the anchor, before that is known of all that may be it."""
-        source = self._reader.source
-        return [self._node.resolve_topic_name(one.name) for one in ((source,) if source else self._reader.anchors)]
-
-    def _silent(self, for_s: float) -> str:
-        names = self._watched
-        name = " or ".join(names)
-        if self._refused:
-            return f"{name}: nothing that can be used for {for_s:.1f} s: {self._refused}"
-        if self._silence.ever_heard:
-            return f"{name}: nothing for {for_s:.1f} s: is the sensor alive? If it is that slow, raise sensor_timeout_s"
-        publishers = sum(map(self._node.count_publishers, names))
-        return f"{name}: nothing received yet, publishers: {publishers}: is the sensor running, its topic remapped?"
+    def _on_lost(self, topic: Topic, event: Any) -> None:
+        self.lost[topic] = event.total_count
 
     def _on_silence(self) -> None:
         if self._listener.active:
-            self._listener.settle(self._silence.for_s or 0.0)
+            self._listener.settle(self._hearing.silence.for_s or 0.0)
             self._listener.report()
 
     def _receiver(self, topic: Topic) -> Callable[[Any], None]:
@@ -144,20 +132,18 @@ class Intake:
                 if refusal.reason not in AS_WANTED:  # nothing is wrong: it is counted
                     self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
             else:
-                self._heard(topic)
-                for event in self._listener.take(sample):
+                outputs, events = self._listener.take(sample)
+                self._heard(topic, next((str(event) for event in events if event.outcome in KEPT_OUT), ""))
+                self._listener.publish(outputs)
+                for event in events:
                     if event.is_told:
                         self.note(event.outcome.name, str(event))
 
         return receive
 
-    def _heard(self, topic: Topic, refused: str = "") -> None:
-        """Note that the watched topic is not silent; with what is refused it is."""
-        if topic in self._reader.anchors and self._reader.source in (None, topic):
-            self._refused = refused
-            if not refused:
-                self._silence.heard()
-                self._events.pop(self._node.resolve_topic_name(topic.name), None)
+    def _heard(self, topic: Topic, unusable: str) -> None:
+        if self._hearing.heard(topic, unusable):
+            self._events.pop(self._node.resolve_topic_name(topic.name), None)
 
     def _sample(self, topic: Topic, message: Any) -> Any:
         if not self.enabled:

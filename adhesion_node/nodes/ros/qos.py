@@ -92,7 +92,7 @@ def subscribe(
     """Subscribe `node` to `topic`, parameters overriding its profile; ValueError when an override is bad.
 
     `profile` takes the place of the one that the table gives the topic. `tell` hears of the events of DDS; without it
-    rclpy logs what does not fit, and `lost` hears of messages that were lost on the way.
+    rclpy logs what does not fit. `lost` hears of messages that were lost on the way.
     """
     try:
         return node.create_subscription(
@@ -103,7 +103,7 @@ def subscribe(
             copy(profile or PROFILES[topic.quality].subscription),
             qos_overriding_options=OVERRIDES,
             raw=raw,
-            event_callbacks=of_subscription(node.resolve_topic_name(topic.name), tell)
+            event_callbacks=of_subscription(node.resolve_topic_name(topic.name), tell, lost)
             if tell
             else SubscriptionEventCallbacks(message_lost=lost),
         )

@@ -19,15 +19,29 @@ Tell = Callable[[str], None]
 _MODEST = {"reliability": "best_effort", "durability": "volatile"}
 """What every publisher offers."""
 
+_ASKED = {"deadline": ("deadline",), "liveliness": ("liveliness", "liveliness_lease_duration")}
+"""What is asked for by these parameters alone: DDS does not tell which of two it is."""
 
-def of_subscription(topic: str, tell: Tell) -> SubscriptionEventCallbacks:
-    """Return the callbacks of a subscription to `topic` (its resolved name); each tells one line."""
+
+def of_subscription(topic: str, tell: Tell, lost: Callable[[Any], None] | None) -> SubscriptionEventCallbacks:
+    """Return the callbacks of a subscription to `topic` (its resolved name); each tells one line.
+
+    `lost` hears of lost messages before that is told.
+    """
+    tell_lost = _counted(tell, f"{topic}: messages lost on the way")
 
     def incompatible(event: Any) -> None:
-        policy = _policy(event)
-        modest = _MODEST.get(policy)
-        remedy = f": start this node with -p qos_overrides.{topic}.subscription.{policy}:={modest}" if modest else ""
-        tell(f"{topic}: a publisher offers less {policy} than is asked for, so nothing of it arrives{remedy}")
+        policy, override = _policy(event), f"qos_overrides.{topic}.subscription."
+        remedy = f"start this node with -p {override}{policy}:={_MODEST[policy]}" if policy in _MODEST else ""
+        if policy in _ASKED:
+            remedy = f"leave {' and '.join(override + name for name in _ASKED[policy])} out"
+        text = f"{topic}: a publisher offers less {policy} than is asked for, so nothing of it arrives"
+        tell(f"{text}: {remedy}" if remedy else text)
+
+    def message_lost(event: Any) -> None:
+        if lost is not None:
+            lost(event)
+        tell_lost(event)
 
     def liveliness(event: Any) -> None:
         if event.alive_count_change < 0:
@@ -41,7 +55,7 @@ def of_subscription(topic: str, tell: Tell) -> SubscriptionEventCallbacks:
         deadline=_counted(tell, f"{topic}: deadline missed"),
         incompatible_qos=incompatible,
         liveliness=liveliness,
-        message_lost=_counted(tell, f"{topic}: messages lost on the way"),
+        message_lost=message_lost,
         matched=matched,
     )
 
