@@ -157,3 +157,7 @@ def _work(options: argparse.Namespace) -> int:
         print(f"import_csv: odd: {text}", file=sys.stderr)
     report(options.json, summary, "\n".join(lines))
     return FAILED if summary["refused"] or summary["odd"] else DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -71,3 +71,7 @@ def _work(options: argparse.Namespace) -> int:
     lines += [f"{count} {name} left out, they do not decode" for name, count in summary["undecodable"].items()]
     report(options.json, summary, "\n".join(lines))
     return DONE
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -15,6 +15,7 @@
 It paces itself as the simulator does.
 """
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -58,3 +59,7 @@ class SlipSimulator(RunNode):
 def main(args: Sequence[str] | None = None) -> int:
     """Run the slip simulator until its scenario ends or a signal comes."""
     return runtime.run("slip_simulator", SlipSimulator, args, PARAMETERS, EXAMPLES)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

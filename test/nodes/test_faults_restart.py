@@ -75,6 +75,11 @@ def test_what_a_stopped_estimator_has_lost_is_counted_by_topic(
         send()
         return "lost.position" in operator.heard[-1]
 
+    def met() -> bool:  # of what is lost before the first message nothing tells
+        send()
+        return measured(operator, 0)
+
+    spin_until(executor, met)
     estimator.send_signal(signal.SIGSTOP)
     for _ in range(5000):
         send()
@@ -85,6 +90,8 @@ def test_what_a_stopped_estimator_has_lost_is_counted_by_topic(
     values = operator.heard[-1]
     assert 1 <= int(values["lost.position"]) <= sent - int(values["measurements"])
     assert [name for name in values if name.startswith("lost.")] == ["lost.position"]
+    estimator.send_signal(signal.SIGINT)  # killed it would leave its part of the shared memory locked
+    spin_until(executor, lambda: estimator.poll() is not None)
 
 
 def measured(operator: Operator, count: int) -> bool:

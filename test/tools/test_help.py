@@ -25,6 +25,10 @@ from test_package import console_scripts
 from adhesion_node.command.options import help_texts
 from adhesion_node.study.__main__ import STUDIES, main
 
+MAIN = (ROOT / "adhesion_node" / "main.py").read_text(encoding="utf-8")
+MODULES = {"replay": "adhesion_node.nodes.replay"} | dict(re.findall(r'^(\w+) = _\w+\("(.*)"\)$', MAIN, re.MULTILINE))
+"""Of the programs."""
+
 
 @pytest.mark.parametrize(
     ("program", "args"),
@@ -49,18 +53,17 @@ def test_help_says_the_purpose_and_gives_examples(
     assert all(told.startswith("default: ") for told in re.findall(r"\bdefault\b.*", options_of(shown)))
 
 
-@pytest.mark.parametrize("node", ["estimator", "creep_estimator", "atp_monitor", "recorder", "replay", "simulator"])
+@pytest.mark.parametrize(("program", "module"), MODULES.items())
 def test_python_m_runs_the_program(
-    node: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    program: str, module: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """A program that began and ended without a word looked as if it had done its work."""
-    module = f"{'sim_node' if node == 'simulator' else 'adhesion_node'}.nodes.{node}"
     monkeypatch.setattr(sys, "argv", [module, "--help"])
     monkeypatch.delitem(sys.modules, module, raising=False)
     with pytest.raises(SystemExit) as ended:
         runpy.run_module(module, run_name="__main__", alter_sys=True)
     assert ended.value.code == 0
-    assert capsys.readouterr().out.startswith(f"usage: {node} ")
+    assert capsys.readouterr().out.startswith(f"usage: {program} ")
 
 
 def options_of(shown: str) -> str:

@@ -199,6 +199,22 @@ def test_a_type_that_is_defined_otherwise_is_kept_as_it_is(tmp_path: Path) -> No
         assert [connection.digest for connection in it.connections] == [type_hash(NUMBER), ""]
 
 
+@pytest.mark.parametrize("turned", [1, -1])
+def test_what_a_later_file_defines_otherwise_is_left_out_and_counted(turned: int, tmp_path: Path) -> None:
+    """Under the definition of the first file it would be read as something else."""
+    defined = [Definition("ros2msg", "int8 data\n"), definition(NUMBER)][::turned]
+    (tmp_path / "bag").mkdir()
+    for number, known_as in enumerate(defined):
+        with BagWriter(tmp_path / str(number)) as writer:
+            writer.add_topic("/foo", NUMBER, known_as=known_as)
+            writer.write("/foo", NUMBER, bytes(12) if known_as == definition(NUMBER) else b"\0\1\0\0\7", number)
+        (tmp_path / str(number) / "bag_0.mcap").rename(tmp_path / "bag" / f"bag_{number}.mcap")
+    summary = recover.recover(tmp_path / "bag", tmp_path / "whole")
+    assert (summary["messages"], summary["left_out"]) == ({"/foo": 1}, {"/foo": 1})
+    with BagReader(tmp_path / "whole") as reader:
+        assert reader.infos["/foo"].definition == defined[0]
+
+
 @pytest.mark.parametrize("content", [b"", b"garbage" * 50])
 def test_nothing_to_recover(tmp_path: Path, content: bytes, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "x.mcap").write_bytes(content)

@@ -57,12 +57,10 @@ class BagReader:
         """Yield the records in the order of (log time, arrival), of all topics or of those named.
 
         Names match with or without the leading slash; a topic that is not there, or is not read, yields nothing. Of all
-        topics come those that are defined otherwise, too, and what is of the type that `topics` tells.
+        topics come those that are defined otherwise, too, and what is of the type and the definition of the first.
         """
         chosen = set(self.topics) if names is None else {self.resolve(name) for name in names}
-        return self._recording.records(
-            lambda info: info.is_cdr and info.name in chosen and info.type == self.topics[info.name]
-        )
+        return self._recording.records(lambda info: info.name in chosen and _is_alike(info, self.infos[info.name]))
 
     def decoded(self, records: Iterable[Record]) -> Iterator[tuple[Record, Any]]:
         """Yield records, each with its message; those that do not decode are left out.
@@ -118,6 +116,12 @@ class BagReader:
         if lacking and not any(info.is_cdr for info in infos.values()):
             raise ValueError(f"bag = {self.path}: holds no readable message ({lacking[0]}): name another recording")
         return infos, dict(counts), unread
+
+
+def _is_alike(info: TopicInfo, known: TopicInfo) -> bool:
+    """Whether a topic is read as `known`: a later file may define it otherwise."""
+    differences = (difference(one.type, one.definition) for one in (info, known))
+    return info.is_cdr and info.type == known.type and len(set(differences)) == 1
 
 
 def _why_unread(info: TopicInfo, known: TopicInfo) -> str | None:

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Messages of one time, each topic in its turn: as a node takes them that hears all topics at once."""
+"""Messages of one log time, the topics side by side: a telegram may bundle seconds of several sensors."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator
@@ -16,13 +16,17 @@ from .recordings import Record
 
 
 def in_turn(records: Iterable[Record]) -> Iterator[Record]:
-    """Yield records in order; of those of one log time the first of every topic, then the second of every topic.
+    """Yield records in order; those of one log time as if each topic had come at a rate of its own until then.
 
-    A telegram that bundles seconds of several sensors is recorded one topic behind the other.
+    They are recorded one topic behind the other, or as they came: that order stays.
     """
     for _, each in groupby(records, key=lambda record: record.log_ns):
-        now, seen, turns = list(each), Counter[str](), list[int]()
+        now = list(each)
+        if len(now) == 1:
+            yield from now
+            continue
+        counts, seen, parts = Counter(record.topic for record in now), Counter[str](), list[float]()
         for record in now:
+            parts.append((seen[record.topic] + 0.5) / counts[record.topic])
             seen[record.topic] += 1
-            turns.append(seen[record.topic])
-        yield from (now[at] for at in sorted(range(len(now)), key=turns.__getitem__))  # equals stay in their order
+        yield from (now[at] for at in sorted(range(len(now)), key=parts.__getitem__))  # equals stay in their order

@@ -88,7 +88,8 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
 def _is_slowed(config: Config, memory: Memory) -> bool:
     """Whether wheels may slide though no brake is applied: it still lets go, or another one slows the train down."""
     used = memory.bank.mean_of(MU)
-    return (used > SLOWED and memory.braking.alone) or (used > -SLOWED and memory.brake.lingers(config, memory.t_ns))
+    slowed = used > SLOWED and memory.braking.alone and not memory.wheels.agree(memory.t_ns)  # else it is a grade
+    return slowed or (used > -SLOWED and memory.brake.lingers(config, memory.t_ns))
 
 
 def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:

@@ -84,8 +84,8 @@ DROPS = tuple(outcome for outcome in Outcome if outcome.name not in ("ACCEPTED",
 """Outcomes of a sample that is not used."""
 
 KEPT_OUT = tuple(map(Outcome.__getitem__, ("LATE", "DUPLICATE", "REPEATED", "OVERTAKEN", "STRAY", "TOO_OFTEN")))
-"""Those of them that a sample's own stamp brings about as it comes: a sensor of which all are kept out is as good as
-silent. The others may be of an earlier sample, or of another sensor's."""
+"""Those of them that a stamp brings about as a sample comes, its own or, of STRAY, that of the one before: a sensor of
+which all are kept out is as good as silent. The others may be of a sample long before, or of another sensor's."""
 
 QUIET = ("ACCEPTED", "TICK", "REPEATED", "HELD", "OUTLIER", "SLOW", "IDLE", "CHANGED")
 """Names of those that an operator need not hear of beyond their counts: they are part of good days."""

@@ -51,6 +51,7 @@ class Hearing:
         """Begin to wait anew."""
         self.silence.wait()
         self._moments.clear()
+        self._unusable.clear()
 
     def heard(self, topic: Topic, unusable: str) -> bool:
         """Note a message, which is as none where it is `unusable`; return whether one is that was awaited."""

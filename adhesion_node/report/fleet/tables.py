@@ -62,7 +62,7 @@ TEXTS = ("train", "recording", "date")
 def read_table(path: Path) -> tuple[pd.DataFrame, bool]:
     """Read a table, and tell whether it is a map. Raises ValueError naming file, column, row and value."""
     try:
-        frame = _read(path).dropna(how="all").reset_index(drop=True)
+        frame = _read(path).dropna(how="all")
         is_map = "length_m" in frame
         columns, texts = (MAP, TEXTS[2:]) if is_map else (BRAKINGS, TEXTS[:2])
         if lacking := [name for name in (*texts, *(each.name for each in columns)) if name not in frame]:
@@ -74,7 +74,7 @@ def read_table(path: Path) -> tuple[pd.DataFrame, bool]:
         (_check_dates if is_map else _check_stamps)(frame)
     except ValueError as error:
         raise ValueError(f"table = {path}: {error}") from error
-    return frame, is_map
+    return frame.reset_index(drop=True), is_map
 
 
 def _read(path: Path) -> pd.DataFrame:
@@ -111,15 +111,16 @@ def _numbers(given: pd.Series, column: Column) -> NDArray[Any]:
         said = "it is empty" if is_empty[wrong[0]] else repr(given.iloc[wrong[0]])
         ends = f" from {column.least:g} to {column.most:g}" if column.least > -inf else ""
         remedy = f"give a number{ends}" + ("" if column.needed else ", or leave it empty")
-        raise ValueError(f"column {column.name}, row {wrong[0] + 1}: {said}: {remedy}")
+        raise ValueError(f"column {column.name}, row {given.index[wrong[0]] + 1}: {said}: {remedy}")
     return numbers.to_numpy(np.int64) if column.name == "t_ns" else values
 
 
 def _check_dates(rail: pd.DataFrame) -> None:
-    wrong = pd.to_datetime(rail["date"], format="%Y-%m-%d", errors="coerce").isna()
+    known = pd.to_datetime(rail["date"], format="%Y-%m-%d", errors="coerce").dt.strftime("%Y-%m-%d")
+    wrong = (known != rail["date"]).to_numpy()  # they are sorted as texts
     if wrong.any():
         row = int(np.argmax(wrong))
-        raise ValueError(f"column date, row {row + 1}: {rail['date'].iloc[row]!r}: give YYYY-MM-DD")
+        raise ValueError(f"column date, row {rail.index[row] + 1}: {rail['date'].iloc[row]!r}: give YYYY-MM-DD")
 
 
 def _check_stamps(brakings: pd.DataFrame) -> None:
@@ -128,9 +129,11 @@ def _check_stamps(brakings: pd.DataFrame) -> None:
         return
     stamped = pd.to_datetime(brakings["t_ns"], utc=True)
     told = pd.to_datetime(brakings["time"], utc=True, errors="coerce", format="ISO8601")
-    wrong = (stamped - told).abs() > APART
+    wrong = ((stamped - told).abs() > APART).to_numpy()
     if wrong.any():
         row = int(np.argmax(wrong))
         which = f"{brakings['t_ns'].iloc[row]} is {stamped.iloc[row]:%Y-%m-%d %H:%M:%S}"
         other = f"the time beside it {told.iloc[row]:%Y-%m-%d %H:%M:%S}"
-        raise ValueError(f"column t_ns, row {row + 1}: {which}, {other}: give every digit, as `brakings` wrote it")
+        raise ValueError(
+            f"column t_ns, row {brakings.index[row] + 1}: {which}, {other}: give every digit, as `brakings` wrote it"
+        )

@@ -17,8 +17,8 @@ from .brakings import BRAKING
 
 NUMBERS = list(BRAKING.names or ())
 
-ALIKE, SOON_NS = 1e-3, 1_000_000
-"""To within which numbers of copies agree, relative, and stamps: files round them."""
+ALIKE, APART, SOON_NS = 1e-6, 1e-4, 1_000_000
+"""To within which numbers of copies agree, relative and absolute, and stamps: files round them."""
 
 
 def without_copies(rows: pd.DataFrame) -> tuple[pd.DataFrame, Iterator[str]]:
@@ -29,9 +29,9 @@ def without_copies(rows: pd.DataFrame) -> tuple[pd.DataFrame, Iterator[str]]:
     lately = list[int]()
     for row in np.argsort(stamps, kind="stable").tolist():
         lately = [one for one in lately if stamps[row] - stamps[one] <= SOON_NS]
-        alike = [one for one in lately if np.allclose(numbers[row], numbers[one], ALIKE, ALIKE, equal_nan=True)]
-        if alike:
-            of[row] = alike[0]
+        alike = np.isclose(numbers[row], numbers[lately], ALIKE, APART, equal_nan=True).all(axis=1)
+        if alike.any():
+            of[row] = lately[int(alike.argmax())]
         else:
             lately.append(row)
     copied = of != np.arange(len(rows))

@@ -136,6 +136,7 @@ CASES = tuple(
         ("wet_falls", "gnss gnss_wheels gnss_doppler"),
         ("leaves_rough", "gnss gnss_wheels gnss_doppler"),
         ("leaves_falls", "gnss gnss_wheels gnss_doppler"),
+        ("sequence_leaves", "mean_cylinder mean_cylinder_wheels"),
         ("downhill_leaves", "gnss_wheels"),
         ("salisbury", "gnss_doppler"),
         ("patches", "gnss gnss_recorded gnss_wheels full"),

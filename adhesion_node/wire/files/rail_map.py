@@ -10,7 +10,9 @@
 
 import csv
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from datetime import date
 from decimal import Decimal
 from pathlib import Path
 from typing import Any, TypeVar
@@ -20,6 +22,11 @@ from ...core.belief.rail_map import Piece, RailMap
 COLUMNS = ("place_m", "length_m", "t_ns", "seen", "mu", "mu_std", "used", "mu_lower", "speed_mps")
 
 Number = TypeVar("Number", int, float)
+
+DAY_NS, EPOCH = 86_400_000_000_000, date(1970, 1, 1).toordinal()
+
+ISO = re.compile("[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])")
+"""A date as `brakings` writes it: a spreadsheet that rounds stamps leaves it."""
 
 UNKNOWN_STD = 0.02
 """Of the adhesion where only what was used is known."""
@@ -80,6 +87,9 @@ def _piece(number: int, row: Mapping[str, Any]) -> Piece:
         raise ValueError(f"lacks the columns {', '.join(missing)}: `brakings --map` writes them")
     numbers = {name: _number(number, row, name, float) for name in COLUMNS}
     stamp, seen = (_number(number, row, name, _whole) for name in ("t_ns", "seen"))
+    days, told = stamp // DAY_NS, str(row.get("date"))[:10]
+    if ISO.fullmatch(told) and date.fromisoformat(told).toordinal() - EPOCH != days:
+        raise ValueError(f"row {number}: t_ns = {row['t_ns']} is of another day than {told}: give every digit")
     limited = not math.isnan(numbers["mu"])
     mu, std = (numbers["mu"], numbers["mu_std"]) if limited else (numbers["used"], UNKNOWN_STD)
     lower = min(max(numbers["mu_lower"], 0.0), mu)

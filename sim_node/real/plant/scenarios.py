@@ -107,6 +107,7 @@ SCENARIOS: Mapping[str, Scenario] = {
         ),
         replace(_WET, name="sequence", demands=_STEPS),
         replace(_UNIT, name="sequence_dry", demands=_STEPS),
+        replace(_LEAVES, name="sequence_leaves", demands=_STEPS),
         replace(
             _UNIT,
             name="mixed",

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -26,13 +27,32 @@ AXLES, USED = 8, 0.035
 Shape = Callable[[float], float]
 
 
+def by_gauge(heard: PressureSample) -> dict[str, Any]:
+    """What a gauge tells of the brake."""
+    return {"brake_pressure_pa": heard.pressure_pa, "pressures": (heard,)}
+
+
+def by_handle(heard: PressureSample) -> dict[str, Any]:
+    """What a driver's handle tells of it."""
+    return {"demand_pa": heard.pressure_pa}
+
+
 def ridden(
-    config: Config, seed: int, seconds: float, used: Shape, creep: Shape, pressure: Shape, every: int = 1
+    config: Config,
+    seed: int,
+    seconds: float,
+    used: Shape,
+    creep: Shape,
+    pressure: Shape,
+    *,
+    told_by: Callable[[PressureSample], dict[str, Any]] = by_gauge,
+    every: int = 1,
+    dark_s: float = np.inf,
 ) -> list[tuple[float, float, Estimate]]:
     """Coast for 15 s from 30 m/s, then use so much adhesion; time behind that, true speed and estimate of each.
 
     Axles creep by so much, one after the other; all is heard 10 times a second, a position at `every` of them with an
-    error of 0.3 m.
+    error of 0.3 m, from `dark_s` on none.
     """
     rng, state, speed, place = np.random.default_rng(seed), init(config, 1), 30.0, 0.0
     told = list[tuple[float, float, Estimate]]()
@@ -43,9 +63,8 @@ def ridden(
         wheels = (WheelSample(t_ns, tuple((rims / config.train.wheel_radius_m).tolist())),)
         heard = PressureSample(t_ns, pressure(time) + 300.0 * abs(float(rng.standard_normal())))
         seen = place + 0.3 * float(rng.standard_normal())
-        measured = Measurement(
-            t_ns, seen, 1.0 if tick % every == 0 else np.inf, heard.pressure_pa, pressures=(heard,), wheels=wheels
-        )
+        variance_m2 = 1.0 if tick % every == 0 and time < dark_s else np.inf
+        measured = Measurement(t_ns, seen, variance_m2, wheels=wheels, **told_by(heard))
         state, estimate = step(config, state, measured)
         if estimate is not None:
             told.append((time, speed, estimate))
@@ -74,16 +93,20 @@ def test_a_release_on_leaves_leaves_what_was_known_of_the_rail(seed: int, kind: 
     assert all(0.5 * USED < estimate.mu_lower <= USED for estimate in coasted)
 
 
+@pytest.mark.parametrize(("kind", "told_by"), [("demanded", by_gauge), ("cylinder", by_handle)])
 @pytest.mark.parametrize("seed", range(3))
-def test_wheels_may_slide_for_long_behind_a_demand(seed: int) -> None:
+def test_wheels_may_slide_for_long_behind_a_demand(
+    seed: int, kind: str, told_by: Callable[[PressureSample], dict[str, Any]]
+) -> None:
     """No gauge shows how a brake lets go: the wheels that it still held were taken for the train."""
     told = ridden(
-        Config(method="bank", pressure_kind="demanded", brake_build_up_s=3.0),
+        Config(method="bank", pressure_kind=kind, brake_build_up_s=3.0),
         seed,
         26.0,
         used=lambda time: USED * (0.5 < time < 18.0),
         creep=lambda time: 0.03 * min(max(time, 0.0), 5.0) * (time < 18.0),
         pressure=lambda time: FULL_PA * (0.0 < time < 12.0),
+        told_by=told_by,
         every=10,
     )
     off = [(estimate.speed_mps - speed) / estimate.speed_std_mps for time, speed, estimate in told if time > 12.0]
@@ -103,3 +126,20 @@ def test_wheels_that_a_brake_holds_which_no_gauge_shows_are_not_taken_for_the_tr
     )
     off = [(estimate.speed_mps - speed) / estimate.speed_std_mps for _, speed, estimate in told]
     assert np.max(np.abs(off)) < 4.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_wheels_that_agree_are_believed_on_a_slope_that_nobody_told(seed: int) -> None:
+    """In a tunnel they are all there is: a slope of 15 ‰ was taken for a brake, and the speed known to 2 to 7 m/s."""
+    told = ridden(
+        Config(method="bank"),
+        seed,
+        40.0,
+        used=lambda time: 0.015 * (time > -5.0),
+        creep=lambda _: 0.0,
+        pressure=lambda _: 0.0,
+        dark_s=0.0,
+    )
+    assert told[-1][0] > 35.0
+    assert all(estimate.speed_std_mps < 0.3 for time, _, estimate in told if time > -10.0)
+    assert all(abs(estimate.speed_mps - speed) < 0.6 for time, speed, estimate in told if time > -10.0)

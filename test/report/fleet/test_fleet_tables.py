@@ -78,6 +78,9 @@ def test_a_copy_counts_once_whatever_types_it_went_through(
 
 def test_brakings_that_differ_count_each(tmp_path: Path) -> None:
     """As of two trains with one clock."""
+    far = as_saved(tmp_path / "far.csv", brakings().assign(place_m=300e3, place_end_m=300.25e3))
+    beside = as_saved(tmp_path / "beside.csv", brakings().assign(place_m=300.25e3, place_end_m=300.5e3))
+    assert len(read_fleet([far, beside]).brakings) == 4
     other = as_saved(tmp_path / "other.csv", brakings().assign(place_m=[3000.0, 7000.0], place_end_m=[3250.0, 7250.0]))
     assert len(read_fleet([as_saved(tmp_path / "table.csv", brakings()), other]).brakings) == 4
 
@@ -136,10 +139,19 @@ def test_cells_without_a_name_are_said(tmp_path: Path) -> None:
         read_table(table)
 
 
-def test_a_map_needs_dates_that_sort(tmp_path: Path) -> None:
-    rail = as_saved(tmp_path / "rail.csv", spread(brakings()).assign(date="28.11.2023"))
-    with pytest.raises(ValueError, match=re.escape("column date, row 1: '28.11.2023': give YYYY-MM-DD")):
+@pytest.mark.parametrize("day", ["28.11.2023", "2023-1-5"])
+def test_a_map_needs_dates_that_sort(day: str, tmp_path: Path) -> None:
+    rail = as_saved(tmp_path / "rail.csv", spread(brakings()).assign(date=day))
+    with pytest.raises(ValueError, match=re.escape(f"column date, row 1: {day!r}: give YYYY-MM-DD")):
         read_table(rail)
+
+
+def test_a_row_is_counted_with_the_empty_ones(tmp_path: Path) -> None:
+    table = as_saved(tmp_path / "table.csv", brakings().assign(mu=[0.05, 5.0]))
+    head, *rows = table.read_text(encoding="utf-8").splitlines()
+    table.write_text("\n".join([head, rows[0], "," * head.count(","), rows[1]]), encoding="utf-8")
+    with pytest.raises(ValueError, match="column mu, row 3: "):
+        read_table(table)
 
 
 def test_dates_that_the_map_lacks_are_told(tmp_path: Path) -> None:

@@ -71,6 +71,11 @@ def test_what_was_written_is_read(ending: str, tmp_path: Path) -> None:
         ),
         ("", "is empty: `brakings --map` writes one"),
         (
+            "date,place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n"
+            "2023-11-14,0,100,1.7E+18,1,,,0.1,0.1,30\n2024-06-01,100,100,1.72E+18,1,,,0.1,0.1,30\n",
+            "row 2: .* is of another day than 2024-06-01: give every digit",
+        ),
+        (
             "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,0,1,1,,,0.1,0.1,30\n",
             "a length above 0",
         ),

@@ -157,8 +157,8 @@ class BrakeSeen(NamedTuple):
         """Whether cylinders may press still, though nothing is demanded any more."""
         if self.full_ns is None:
             return False
-        demanded = config.pressure_kind == "demanded"
-        return now_ns - self.full_ns < (RELEASED * config.brake_build_up_s * S if demanded else EMPTY_NS)
+        measured = self.gauged and config.pressure_kind != "demanded"
+        return now_ns - self.full_ns < (EMPTY_NS if measured else RELEASED * config.brake_build_up_s * S)
 
     @property
     def pressure_pa(self) -> float:

@@ -205,8 +205,12 @@ class WheelsSeen(NamedTuple):
         """Note whether all rims are as fast as each other, and as one that rolls is at least: then no fall counts."""
         if len(rims) < FEWEST or min(rims) < max((1.0 - UNEQUAL) * max(rims), least_mps):
             return self._replace(agree_ns=None)
-        since_ns = t_ns if self.agree_ns is None else self.agree_ns
-        return self._replace(agree_ns=since_ns, fell_ns=self.fell_ns if t_ns - since_ns < AGREE_NS else None)
+        agreeing = self._replace(agree_ns=t_ns if self.agree_ns is None else self.agree_ns)
+        return agreeing._replace(fell_ns=None) if agreeing.agree(t_ns) else agreeing
+
+    def agree(self, now_ns: int) -> bool:
+        """Whether all of them roll, as they have agreed for long enough."""
+        return self.agree_ns is not None and now_ns - self.agree_ns >= AGREE_NS
 
     def share(self, now_ns: int, late_ns: int = SLID_NS) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
