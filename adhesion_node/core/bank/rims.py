@@ -48,6 +48,10 @@ FEW = 6
 MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
 
+BACK_MPS = 0.3
+"""Speed from which a train that runs back, to within its standard deviation, is left to its other sensors: wheels tell
+no direction. Where there are none it is soon known too badly for that."""
+
 SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
 
@@ -60,7 +64,7 @@ UNSEEN = 1e12
 
 def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
-    if not measurement.wheels:
+    if not measurement.wheels or memory.bank.mean_of(SPEED) + memory.bank.std_of(SPEED) < -BACK_MPS:
         return memory
     pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     pressed = pressed or _is_slowed(config, memory)

@@ -107,6 +107,19 @@ def test_behind_a_dump_a_single_dip_or_hump_tells_it_too(size: float) -> None:
             assert brake.demanded_pa == sample.pressure_pa, time
 
 
+@pytest.mark.parametrize("from_pa", [150e3, 250e3, FULL_PA])
+@pytest.mark.parametrize("every_ms", [50, 100, 200])
+def test_a_driver_who_releases_in_even_steps_as_fast_as_he_applies_is_no_dump(every_ms: int, from_pa: float) -> None:
+    """From a part of the brake that is more of it in half a second than as cylinders empty by themselves."""
+    rate = FULL_PA / CYLINDER.brake_build_up_s
+
+    def pressure(time: float) -> float:
+        return min(rate * time, from_pa) if time < 6.0 else max(from_pa - rate * (time - 6.0), 0.0)
+
+    samples = sampled(pressure, 12.0, every_ms)
+    assert not any(brake.has_slid(sample.t_ns) for sample, brake in zip(samples, seen(CYLINDER, samples), strict=True))
+
+
 def test_a_valve_that_holds_a_cylinder_low_for_two_seconds_is_no_release() -> None:
     samples = sampled(lambda time: cycling(10.0, 150e3)(min(time, 5.0)), 6.3)
     assert samples[-1].pressure_pa == 150e3

@@ -143,3 +143,24 @@ def test_wheels_that_agree_are_believed_on_a_slope_that_nobody_told(seed: int) -
     assert told[-1][0] > 35.0
     assert all(estimate.speed_std_mps < 0.3 for time, _, estimate in told if time > -10.0)
     assert all(abs(estimate.speed_mps - speed) < 0.6 for time, speed, estimate in told if time > -10.0)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_wheels_tell_nothing_of_a_train_that_runs_back(seed: int) -> None:
+    """They turn without a sign: at 5 m/s backwards the speed leapt to 5 m/s forwards, sure to 0.1."""
+    config = Config(method="bank")
+    rng, state, speed, place = np.random.default_rng(seed), init(config, 1), 3.0, 0.0
+    off = list[float]()
+    for tick in range(700):
+        t_ns = S + tick * S // 10
+        rims = abs(speed) * (1.0 + 5e-4 * rng.standard_normal(AXLES))
+        wheels = (WheelSample(t_ns, tuple((rims / config.train.wheel_radius_m).tolist())),)
+        heard = PressureSample(t_ns, 0.0)
+        seen = place + 0.3 * float(rng.standard_normal())
+        placed = Measurement(t_ns, seen, 4.0 if tick % 10 == 0 else np.inf, wheels=wheels, **by_gauge(heard))
+        state, estimate = step(config, state, placed)
+        if estimate is not None and speed < -4.0:
+            off.append((estimate.speed_mps - speed) / estimate.speed_std_mps)
+        place, speed = place + 0.1 * speed, speed - 0.025 * (tick > 100)
+    assert speed < -10.0
+    assert np.max(np.abs(off)) < 5.0

@@ -47,6 +47,9 @@ SLID_NS = 2 * S
 LEFT = 0.1
 """Part of the pressure that is left once a brake has let go: within `brake_build_up_s`, as it builds up."""
 
+DRIVEN = 1.2
+"""Times as fast as it builds up a driver releases a brake in even steps."""
+
 RELEASED = 4.0
 """Times its build-up that a brake takes to let go where no gauge shows it: 15 to 20 s for 3 to 5 (UIC 540)."""
 
@@ -106,7 +109,10 @@ class BrakeSeen(NamedTuple):
         if demand_pa is not None or rolls is not None:
             dumps = _falls(lately) and (demand_pa is None or pressure < (1.0 - DUMP_SHARE) * demand_pa)
         else:  # nothing tells it from a release but that it is quicker, or comes back
-            dumps = _falls(lately, config.brake_build_up_s) or _swings(recent, max(DUMP_PA, DUMP_SHARE * peak))
+            least_pa = DRIVEN * config.train.full_pressure_pa / config.brake_build_up_s
+            dumps = _falls(lately, config.brake_build_up_s, least_pa) or _swings(
+                recent, max(DUMP_PA, DUMP_SHARE * peak)
+            )
         if dumped_ns is not None:
             dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
         fell = peak - pressure >= max(FELL_PA, FELL_SHARE * peak) and (
@@ -178,12 +184,20 @@ class BrakeSeen(NamedTuple):
         return self.recent[-1].pressure_pa > (1.0 + RISING_SHARE) * self.recent[0].pressure_pa
 
 
-def _falls(lately: Sequence[PressureSample], released_s: float = math.inf) -> bool:
-    """Whether the newest pressure is that of a dump, where a driver releases no more than 90 % within so long."""
+def _falls(lately: Sequence[PressureSample], released_s: float = math.inf, released_pa: float = 0.0) -> bool:
+    """Whether the newest pressure is that of a dump.
+
+    A driver releases no more than 90 % within `released_s`, nor `released_pa` in a second.
+    """
     now_ns, pressure_pa = lately[-1]
     return any(
         before_pa - pressure_pa
-        >= max(DUMP_PA, DUMP_SHARE * before_pa, before_pa * (1.0 - LEFT ** ((now_ns - t_ns) / S / released_s)))
+        >= max(
+            DUMP_PA,
+            DUMP_SHARE * before_pa,
+            before_pa * (1.0 - LEFT ** ((now_ns - t_ns) / S / released_s)),
+            released_pa * (now_ns - t_ns) / S,
+        )
         for t_ns, before_pa in lately
     )
 
