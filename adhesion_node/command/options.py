@@ -21,7 +21,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, TypeVar
 
-from .signals import interrupted
+from .signals import interrupted, interrupted_by_sigterm
 from .streams import open_closed_streams
 from .written import require_apart, require_folder, write_text
 
@@ -143,9 +143,9 @@ def run_tool(
 ) -> int:
     """Parse the command line, do the work and return the exit code.
 
-    A ValueError is bad input (2), an OSError or Ctrl-C a failure (1): one line on standard error, no traceback, and
-    none at all where nobody reads on, as behind `| head`, or a stream is closed. Bad usage ends the program with 2
-    (SystemExit). Asked by a shell, it says how the command line may go on and ends.
+    A ValueError is bad input (2), an OSError or Ctrl-C a failure (1), SIGTERM 143: one line on standard error, no
+    traceback, and none at all where nobody reads on, as behind `| head`, or a stream is closed. Bad usage ends the
+    program with 2 (SystemExit). Asked by a shell, it says how the command line may go on and ends.
     """
     open_closed_streams()
     try:
@@ -170,8 +170,9 @@ def _worked(
     complete(parser)
     options = parser.parse_args(args)
     try:
-        _require_files(options)
-        return work(options)
+        with interrupted_by_sigterm():
+            _require_files(options)
+            return work(options)
     except ValueError as error:
         return complain(parser.prog, error, BAD_INPUT)
     except BrokenPipeError:

@@ -15,14 +15,12 @@ goes on with the tasks that are missing, and a change of the code, of a setting 
 import argparse
 import hashlib
 import os
-import signal
 import socket
 import sys
 import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, wait
-from contextlib import contextmanager
 from functools import cache as once
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
@@ -33,6 +31,7 @@ from numpy.typing import NDArray
 
 from . import engines
 from .checks import at_least, refuse
+from .signals import stop_on_signals
 
 Arrays = Mapping[str, NDArray[Any]]
 """A task's result by name."""
@@ -50,7 +49,7 @@ PROGRESS_S = 5.0
 """Time between two signs of life."""
 
 LISTEN_S = 0.5
-"""Longest time until a Ctrl-C is minded."""
+"""Longest time until a Ctrl-C or SIGTERM is minded."""
 
 
 class Task(Protocol):
@@ -126,7 +125,8 @@ def _compute_all(missing: Sequence[Task], where: Running) -> None:
     """Compute tasks into the cache, and draw the bar on standard error, by weights; short work stays silent."""
     workers = min(where.workers, len(missing))
     engine = engines.cluster(where.scheduler) if where.scheduler else engines.processes(workers)
-    with _interrupts() as interrupts, engine as executor:
+    # a signal is noted, not raised anywhere: within a lock of the executor it would be lost, or hold the lock
+    with stop_on_signals() as stop, engine as executor:
         futures = {executor.submit(_compute, task, file_name(task)): task for task in missing}
         started, finished, total = time.monotonic(), 0.0, sum(task.weight for task in missing)
         due = started + PROGRESS_S
@@ -135,22 +135,11 @@ def _compute_all(missing: Sequence[Task], where: Running) -> None:
                 task = futures.pop(future)
                 save(task, future.result(), where.cache)
                 finished += task.weight
-            if interrupts:
+            if stop.requested:
                 raise KeyboardInterrupt
             if time.monotonic() >= due:
                 due = time.monotonic() + PROGRESS_S
                 _draw_bar(finished / total, time.monotonic() - started)
-
-
-@contextmanager
-def _interrupts() -> Iterator[list[int]]:
-    """Note Ctrl-C instead of raising it anywhere: within a lock of the executor it would be lost, or hold the lock."""
-    noted: list[int] = []
-    earlier = signal.signal(signal.SIGINT, lambda number, _: noted.append(number))
-    try:
-        yield noted
-    finally:
-        signal.signal(signal.SIGINT, earlier)
 
 
 def _draw_bar(share: float, spent_s: float) -> None:

@@ -10,6 +10,7 @@
 
 import signal
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -26,14 +27,41 @@ class StopRequest:
         self.requested = False
 
 
-def interrupted(program: str) -> int:
-    """Say that a tool was; return its exit code, which is that of a failure."""
-    print(f"{program}: interrupted", file=sys.stderr)
-    return 1
-
-
 _watching: list[StopRequest] = []
 """The request that the handlers in force note in."""
+
+_came: list[int] = []
+"""The signals since a tool or a request began."""
+
+
+def interrupted(program: str) -> int:
+    """Say that a tool was; return its exit code: that of a failure, or of SIGTERM as shells have it, 143."""
+    print(f"{program}: interrupted", file=sys.stderr)
+    return 128 + signal.SIGTERM if signal.SIGTERM in _came else 1
+
+
+def _interrupt(number: int, _frame: FrameType | None) -> None:
+    _came.append(number)
+    raise KeyboardInterrupt
+
+
+@contextmanager
+def interrupted_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM interrupt a tool as Ctrl-C does, so that no unfinished file is left; not where it is minded already.
+
+    By itself it would end the process where that stands.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if not is_main or signal.getsignal(signal.SIGTERM) is not signal.SIG_DFL:
+        yield
+        return
+    _came.clear()
+    signal.signal(signal.SIGTERM, _interrupt)
+    try:
+        yield
+    finally:
+        if signal.getsignal(signal.SIGTERM) is _interrupt:  # else it stays ignored behind a request to stop
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 @contextmanager
@@ -48,10 +76,12 @@ def stop_on_signals() -> Iterator[StopRequest]:
         return
     stop = StopRequest()
 
-    def note(_signal: int, _frame: FrameType | None) -> None:
+    def note(number: int, _frame: FrameType | None) -> None:
         stop.requested = True
+        _came.append(number)
 
     _watching.append(stop)
+    _came.clear()
     earlier = {number: signal.signal(number, note) for number in _SIGNALS}
     try:
         yield stop

@@ -39,8 +39,8 @@ EXAMPLES = (
 OUTCOME = """\
 Exit code 0: every row was good. 1: some rows were refused, or the data are odd, which standard error says with the
 option that cures it; the good rows are in the recording. Or reading or writing failed, or Ctrl-C: then there is no
-recording. 2: nothing was written (bad usage, missing column, no good row). A time without zone is UTC. Equal logs
-give equal recordings, byte by byte."""
+recording, nor behind SIGTERM (143). 2: nothing was written (bad usage, missing column, no good row). A time without
+zone is UTC. Equal logs give equal recordings, byte by byte."""
 
 SHOWN = 5
 """Rows of --dry-run."""

@@ -270,7 +270,7 @@ def endless(tmp_path: Path) -> Iterator[tuple[subprocess.Popen[str], list[socket
 
 
 @pytest.mark.parametrize(
-    ("sent", "code"), [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGTERM, -signal.SIGTERM), (signal.SIGINT, 1)]
+    ("sent", "code"), [(signal.SIGKILL, -signal.SIGKILL), (signal.SIGTERM, 143), (signal.SIGINT, 1)]
 )
 def test_no_worker_outlives_its_study(
     endless: tuple[subprocess.Popen[str], list[socket.socket]], sent: signal.Signals, code: int

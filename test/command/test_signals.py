@@ -6,12 +6,14 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A Ctrl-C before the tool itself minds it: one line and code 1, and nothing is said of a node that has not begun."""
+"""A signal that ends a tool, at work or before it minds it: one line and its code; of a node not yet begun, nothing."""
 
 from __future__ import annotations
 
+import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from conftest import ROOT
@@ -33,6 +35,33 @@ del sys.argv[:2]
 sys.exit(program())
 """
 """A program that gets a Ctrl-C as the import of a module begins."""
+
+
+WRITING = """
+import argparse, signal, sys
+from adhesion_node.command.options import run_tool
+from adhesion_node.command.written import whole
+
+def work(_):
+    with whole(sys.argv[1]):
+        signal.raise_signal(int(sys.argv[2]))
+    return 0
+
+signal.signal(signal.SIGINT, signal.default_int_handler)  # in the background it may be ignored
+code = run_tool(argparse.ArgumentParser("tool"), work, [])
+assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+sys.exit(code)
+"""
+"""A tool that gets a signal while it writes a file."""
+
+
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 1), (signal.SIGTERM, 143)])
+def test_a_signal_leaves_no_unfinished_file(number: int, code: int, tmp_path: Path) -> None:
+    """SIGTERM left a file that ends in .part."""
+    call = [sys.executable, "-c", WRITING, str(tmp_path / "rows.csv"), str(int(number))]
+    ended = subprocess.run(call, capture_output=True, text=True, timeout=60.0, cwd=ROOT, check=False)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", "tool: interrupted\n")
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
