@@ -185,10 +185,15 @@ def _worked(
         return interrupted(parser.prog)
 
 
+def written_by(options: argparse.Namespace) -> dict[str, str]:
+    """The files and folders that are written, by option."""
+    given = vars(options)
+    return {name: str(given[name]) for name in WRITTEN if given.get(name) not in (None, "-")}
+
+
 def _require_files(options: argparse.Namespace) -> None:
     """Raise, before the work, where a file cannot be written as it is named, or would be in another's place."""
-    named = {name: value for name, value in vars(options).items() if value not in (None, "-")}
-    written = {name: str(named[name]) for name in WRITTEN if name in named}
+    named, written = {name: value for name, value in vars(options).items() if value is not None}, written_by(options)
     for name in ("json", "out", "map"):
         if name in written:
             require_folder(written[name], written.get("output"))

@@ -36,10 +36,10 @@ def naming(path: str | Path) -> Iterator[None]:
 
 def require_folder(path: str, made: str | None) -> None:
     """Raise OSError where a file cannot be: its folder is not there, nor the one that is made, or it is a folder."""
-    folder = Path(os.path.realpath(path)).parent
+    folder = os.path.dirname(os.path.realpath(path))
     if path == "" or Path(path).is_dir():
         raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
-    if not folder.is_dir() and (made is None or Path(os.path.realpath(made)) not in (folder, *folder.parents)):
+    if not os.path.isdir(folder) and (made is None or os.path.realpath(made) != folder):
         raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), path)
 
 

@@ -16,6 +16,7 @@ wrote, with its map or without: a row for each braking, the rail over place and 
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -38,7 +39,7 @@ from ..core.physics.train import KMH, Train
 from ..core.setting import settings_of
 from ..run.offline import parameters_of
 from ..run.pipeline import off_track
-from ..run.results.rows import rows_to
+from ..run.results.rows import Write, rows_to
 from ..wire.settings.nodes import TRAIN_FILE
 from ..wire.settings.setup import Setup, setup_of
 from ..wire.settings.shared import AMBIENT, DIRECTION
@@ -135,7 +136,7 @@ def _page(output: Path, subjects: Sequence[Subject], options: argparse.Namespace
 
 def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:
     targets = (0.0, options.target * KMH)
-    with BagReader(path) as reader, rows_to(options.out) as write:
+    with BagReader(path) as reader, _rows(options) as write:
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
         if not options.remap:
@@ -160,6 +161,13 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         for topic, count in lost.items():
             print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)
         return Subject(name, source, run, setup.config, setup.train)
+
+
+def _rows(options: argparse.Namespace) -> AbstractContextManager[Write]:
+    """What takes the estimates as rows; they may go into the folder of the report, which is made last."""
+    if options.out:
+        Path(options.out).resolve().parent.mkdir(parents=True, exist_ok=True)
+    return rows_to(options.out)
 
 
 def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:

@@ -112,12 +112,13 @@ def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path: Path, caps
         worked.append(options)
         return DONE
 
-    def tables(*options: str) -> int:
+    def tables(*options: str, file: str = "no/x") -> int:
         parser = argparse.ArgumentParser("tables", parents=[json_option()])
         parser.add_argument("--output")
-        return run_tool(parser, work, ["--json", str(tmp_path / "no" / "x"), *options])
+        return run_tool(parser, work, ["--json", str(tmp_path / file), *options])
 
     assert tables() == FAILED
+    assert tables("--output", str(tmp_path / "no"), file="no/deeper/x") == FAILED  # the work makes no folder in it
     assert not worked
     assert tables("--output", str(tmp_path / "no")) == DONE  # a folder that the work makes
     assert "No such file or directory: name one that is there" in capsys.readouterr().err

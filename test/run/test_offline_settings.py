@@ -89,6 +89,19 @@ def test_the_nearer_setting_wins(tmp_path: Path, bag: Path, offline: Offline) ->
     assert low["mu_lower_final"] > offline(bag, *options, fast=False).result["mu_lower_final"]
 
 
+@pytest.mark.parametrize("setting", ["train_file", "track_line", "rail_map"])
+def test_no_result_takes_the_place_of_a_file_that_the_parameters_name(
+    setting: str, tmp_path: Path, bag: Path, offline: Offline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was read, and then lost."""
+    monkeypatch.chdir(tmp_path)
+    Path("named").write_text("read")
+    Path("params.yaml").write_text(f"estimator:\n  ros__parameters:\n    {setting}: {tmp_path / 'named'}\n")
+    code, _, _, err = offline(bag, "--params", "params.yaml", "--json", "named", fast=False)
+    assert (code, err) == (2, ["replay: --json named: is read, and would be lost: name another file"])
+    assert Path("named").read_text() == "read"
+
+
 def test_other_nodes_in_the_parameter_file_are_left_alone(tmp_path: Path, bag: Path, offline: Offline) -> None:
     file = tmp_path / "params.yaml"
     file.write_text(PARAMS.format(name="estimator") + "simulator:\n  ros__parameters:\n    scenario: cruise\n")

@@ -14,19 +14,22 @@ from difflib import get_close_matches
 from typing import Any
 
 from ...command.checks import refuse
+from ...command.options import written_by
+from ...command.written import require_apart
 from ...core.setting import Setting
 from ..files import parameters
 from .nodes import SETTINGS, TRAIN_FILE
 
 
 def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:
-    """Values of `--params` and, before them, of `--set`, by name; ValueError when one cannot be read.
+    """Values of `--params` and, before them, of `--set`, by name; ValueError where one is not read, or is written over.
 
     `--node` names the node whose parameters are meant where a file has them for several.
     """
     if not options.params:
         refuse(options, ["node"], "says whose of --params: add that, or leave this out")
     values = parameters.read(options.params, options.node or node) if options.params else {}
+    require_apart(written_by(options), map(str, values.values()))  # a train, a track, a rail by the name of its file
     if options.train:
         values |= {TRAIN_FILE.name: options.train}
     return values | dict(parse_setting(text, settings) for text in options.set)

@@ -25,7 +25,7 @@ __all__ = ["undrawn"]
 
 @pytest.mark.usefixtures("undrawn")
 def test_of_sensors_alone_the_rows_are_those_of_an_offline_replay(tmp_path: Path) -> None:
-    bag, ours, theirs = str(tmp_path / "bag"), tmp_path / "ours.csv", tmp_path / "theirs.csv"
+    bag, ours, theirs = str(tmp_path / "bag"), tmp_path / "report" / "ours.csv", tmp_path / "theirs.csv"
     write_run(tmp_path / "bag", samples(), names=NO_TRUTH)
     assert main([bag, "--output", str(tmp_path / "report"), "--out", str(ours)]) == 0
     assert replay.main([bag, "--offline", "--out", str(theirs)]) == 0
