@@ -10,7 +10,7 @@
 
 from .read.reader import BagReader
 from .read.recordings import Record
-from .selection import choose_train, overlooked, parse_remap, select, select_from
+from .selection import choose_train, left_out, overlooked, parse_remap, select, select_from
 from .types import deserialize, encode, serialize, typestore
 from .write.writer import BagWriter, Limits
 
@@ -22,6 +22,7 @@ __all__ = [
     "choose_train",
     "deserialize",
     "encode",
+    "left_out",
     "overlooked",
     "parse_remap",
     "select",

@@ -123,6 +123,12 @@ def select_from(
         raise ValueError(f"bag = {reader.path}: {error}") from error
 
 
+def left_out(reader: BagReader, selection: Mapping[str, str]) -> Iterator[str]:
+    """Say what of a recording is not read, and what could be: to be heard by whoever has it replayed."""
+    yield from reader.left_out
+    yield from overlooked(reader.topics, selection, reader.namespace)
+
+
 def overlooked(recorded: Mapping[str, str], selection: Mapping[str, str], namespace: str = "") -> Iterator[str]:
     """Say which topics under other names could be sensors that a selection lacks, each with its remapping."""
     own = {f"{space}/{topic.name}".lstrip("/") for topic in topics.TOPICS for space in ("", namespace)}

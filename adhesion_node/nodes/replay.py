@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from functools import partial
 
-from ..bag import BagReader, overlooked, select_from
+from ..bag import BagReader, left_out, select_from
 from ..command.checks import at_least, refuse
 from ..command.options import (
     DONE,
@@ -102,8 +102,7 @@ def _selection(reader: BagReader, options: argparse.Namespace) -> dict[str, str]
     for loss in reader.damage:
         print(f"replay: {loss}", file=sys.stderr)
     selection = select_from(reader, options.remap, options.topics, options.namespace)
-    hints = [*reader.left_out, *overlooked(reader.topics, selection, reader.namespace)]
-    for hint in hints if options.topics is None else ():
+    for hint in left_out(reader, selection) if options.topics is None else ():
         print(f"replay: {hint}", file=sys.stderr)
     return selection
 

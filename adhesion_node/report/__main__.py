@@ -20,7 +20,7 @@ from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
-from ..bag import BagReader, choose_train, overlooked, select_from
+from ..bag import BagReader, choose_train, left_out, select_from
 from ..command.checks import refuse
 from ..command.options import (
     DONE,
@@ -152,7 +152,7 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
                 write(row)
         else:
             selection = select_from(reader, options.remap, namespace=options.namespace)
-            for hint in (*reader.left_out, *overlooked(reader.topics, selection, reader.namespace)):
+            for hint in left_out(reader, selection):
                 print(f"report: {name}: {hint}", file=sys.stderr)
             run, lost = estimate_run(reader, selection, setup, write, targets)
             source = "estimated from the recorded sensors"

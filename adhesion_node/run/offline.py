@@ -76,13 +76,13 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     why = seen.why_not(brake)
     if why is not None:
         result["why"] = why
-    for remark in (*setup.unread, *_remarks(pipeline, why, brake)):
+    for remark in (*setup.unread, *remarks(pipeline, why, brake)):
         print(f"replay: {remark}", file=sys.stderr)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return DONE if seen.identified else FAILED
 
 
-def _remarks(pipeline: Pipeline, why: str | None, brake: str | None) -> Iterator[str]:
+def remarks(pipeline: Pipeline, why: str | None = None, brake: str | None = None) -> Iterator[str]:
     """What a person must hear: nothing is identified, much was dropped, its brake, that it runs back, or elsewhere."""
     for reason, count in pipeline.dropped.items():
         is_line = reason == Reason.NO_TRACK_LINE.name  # that is no fault now and then: it is all fixes

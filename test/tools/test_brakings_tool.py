@@ -19,14 +19,17 @@ from pathlib import Path
 import pandas as pd
 import pytest
 import test_offline
+from recorded import JSON, write_beside
 from tasks import computed_here
 from test_import_log import ride, text
 from test_offline import NO_TRUTH, samples, write_run
 
+from adhesion_node.nodes import replay
 from adhesion_node.run.results.rail_map import map_of
 from adhesion_node.tools import import_csv
 from adhesion_node.tools.brakings import __main__ as brakings
 from adhesion_node.tools.log.format import Format
+from adhesion_node.wire.topics import BRAKE_PRESSURE
 
 
 @pytest.fixture(scope="module")
@@ -110,6 +113,32 @@ def test_a_braking_counts_once_however_often_it_is_given(
 def told(capfd: pytest.CaptureFixture[str]) -> list[str]:
     """What is said on standard error, but for the bar of progress, which a slow machine shows."""
     return [line for line in capfd.readouterr().err.splitlines() if line.startswith("brakings: ")]
+
+
+@pytest.mark.usefixtures("here")
+def test_what_is_left_out_of_a_recording_is_said_as_replay_says_it(
+    bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """It was passed over."""
+    renamed, cut, beside = (tmp_path / name for name in ("renamed", "cut.mcap", "beside.mcap"))
+    write_run(renamed, samples(15.0, 30.0), names={**NO_TRUTH, BRAKE_PRESSURE: "/brakes/cylinder"})
+    (whole,) = (bags / "monday").glob("*.mcap")
+    cut.write_bytes(whole.read_bytes()[:-20_000])
+    write_beside(beside, JSON, steps=100)
+    replayed = []
+    for bag in (renamed, cut, beside):
+        replay.main([str(bag), "--offline"])
+        lines = [line for line in capfd.readouterr().err.splitlines() if line.startswith("replay: ")]
+        lines = [line.removeprefix("replay: ") for line in lines if "nothing is identified" not in line]
+        replayed += [f"brakings: {bag}: {line}" for line in lines]
+    options = ["--output", str(tmp_path / "brakings.csv"), "--cache", str(tmp_path / "cache")]
+    brakings.main([str(renamed), str(cut), str(beside), *options])
+    said = told(capfd)
+    assert said == replayed
+    for line, what in zip(
+        said, ("no brake_pressure is read", "breaks off at byte", "topic /log: encoding"), strict=True
+    ):
+        assert what in line
 
 
 @pytest.mark.usefixtures("here")

@@ -83,6 +83,8 @@ def _work(options: argparse.Namespace) -> int:
     tasks = once([recording_of(text, values, options) for text in options.bags])
     failed, rows, cells = dict[str, str](), [], []
     for task, found in zip(tasks, run_all(tasks, running(options)), strict=True):
+        for remark in found["told"]:
+            print(f"brakings: {task.path}: {remark}", file=sys.stderr)
         if str(found["failed"]):
             failed[task.path] = str(found["failed"])
             print(f"brakings: {task.path}: {failed[task.path]}", file=sys.stderr)

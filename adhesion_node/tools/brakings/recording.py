@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...bag import BagReader, select_from
+from ...bag import BagReader, left_out, select_from
 from ...command.running import Arrays
 from ...run import offline
 from ...run.pipeline import Pipeline
@@ -52,23 +52,29 @@ class Recording(NamedTuple):
         return max(self.as_of[0][0] / MB, 1e-3)
 
     def compute(self) -> Arrays:
-        """Replay it; what is wrong with it is a result, too."""
+        """Replay it; what is wrong with it, and what is to be heard of it, are results, too."""
+        told: list[str] = []
         try:
-            rows, cells, placed = self._replay()
+            rows, cells, placed = self._replay(told)
         except (OSError, ValueError) as error:
-            return {"failed": np.array(str(error))}
-        return {"rows": rows, "cells": cells, "placed": np.array(placed), "failed": np.array("")}
+            return {"failed": np.array(str(error)), "told": np.array(told, np.str_)}
+        found = {"rows": rows, "cells": cells, "placed": np.array(placed)}
+        return {**found, "failed": np.array(""), "told": np.array(told, np.str_)}
 
-    def _replay(self) -> tuple[NDArray[np.void], NDArray[np.void], bool]:
+    def _replay(self, told: list[str]) -> tuple[NDArray[np.void], NDArray[np.void], bool]:
         """Its brakings, the pieces of track of those, and whether these are known: by a speed alone they are not."""
         setup = setup_of(dict(self.settings))
         with BagReader(Path(self.path)) as reader:
-            recorded = offline.messages(reader, select_from(reader, self.remaps, namespace=self.namespace), setup.line)
+            told += reader.damage
+            selection = select_from(reader, self.remaps, namespace=self.namespace)
+            told += left_out(reader, selection)
+            recorded = offline.messages(reader, selection, setup.line)
             pipeline = Pipeline(setup.config, setup.seed)
             made = offline.predictions(pipeline, None, recorded, setup.line, array("d"))
             found = list(brakings(made, self.cell_m, setup.line.sign))
         if pipeline.last is None:
             raise ValueError(f"nothing to estimate from; dropped: {pipeline.dropped or 'nothing'}")
+        told += offline.remarks(pipeline)
         rows = np.concatenate([np.empty(0, BRAKING), *(one.row for one in found)])
         cells = [one.cells for one in found if pipeline.accepted]
         return rows, np.concatenate([np.empty(0, CELL), *cells]), pipeline.accepted > 0

@@ -17,7 +17,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...bag import BagReader, overlooked, select_from
+from ...bag import BagReader, left_out, select_from
 from ...command.checks import refuse
 from ...command.options import (
     DONE,
@@ -83,7 +83,7 @@ def _estimate(options: argparse.Namespace) -> int:
         for loss in reader.damage:
             print(f"train: {loss}", file=sys.stderr)
         selection = select_from(reader, options.remap, namespace=options.namespace)
-        for hint in (*reader.left_out, *overlooked(reader.topics, selection, reader.namespace)):
+        for hint in left_out(reader, selection):
             print(f"train: {hint}", file=sys.stderr)
         recorded = progress(offline.messages(reader, selection, setup.line), "messages")
         found = slowing.find(setup.config, slowing.read(recorded, setup.line))
