@@ -83,7 +83,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
 
 
 def remarks(pipeline: Pipeline, why: str | None = None, brake: str | None = None) -> Iterator[str]:
-    """What a person must hear: nothing is identified, much was dropped, its brake, that it runs back, or elsewhere."""
+    """What a person must hear: nothing is identified, much was dropped, its brake, its way, or a map to come."""
     for reason, count in pipeline.dropped.items():
         is_line = reason == Reason.NO_TRACK_LINE.name  # that is no fault now and then: it is all fixes
         if is_line or count > MANY * pipeline.measurements:
@@ -98,6 +98,11 @@ def remarks(pipeline: Pipeline, why: str | None = None, brake: str | None = None
         yield brake
     if pipeline.off_track is not None:
         yield pipeline.off_track
+    rail_map, last = pipeline.config.rail_map, pipeline.last
+    first_ns = min((piece.t_ns for piece in rail_map.pieces), default=None) if rail_map else None
+    if first_ns is not None and last is not None and first_ns > last.t_ns:
+        late = f"rail_map begins at t_ns = {first_ns}, this recording ends at {last.t_ns}"
+        yield f"{late}: no train is less careful by what later ones saw: name a map of earlier ones"
 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from test_offline import FAST, FAST_CONFIG, FAST_SETTINGS, Offline, bag, offline, samples, straight
+from test_offline import FAST, FAST_CONFIG, FAST_SETTINGS, START_NS, Offline, bag, offline, samples, straight
 
 from adhesion_node.tools.defaults import text
 from adhesion_node.wire.settings.setup import setup_of
@@ -87,6 +87,17 @@ def test_the_nearer_setting_wins(tmp_path: Path, bag: Path, offline: Offline) ->
     low = offline(bag, *options, "--set", "confidence=0.6", fast=False).result
     assert low["digest"] != same
     assert low["mu_lower_final"] > offline(bag, *options, fast=False).result["mu_lower_final"]
+
+
+@pytest.mark.parametrize("later", [False, True])
+def test_a_map_of_later_trains_is_told(later: bool, tmp_path: Path, bag: Path, offline: Offline) -> None:
+    """It was of no effect, and nothing said so."""
+    first_ns = START_NS + 86_400 * 10**9 if later else START_NS
+    columns = "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps"
+    (tmp_path / "rail.csv").write_text(f"{columns}\n0,100,{first_ns},1,,,0.1,0.1,30\n")
+    err = offline(bag, "--set", f"rail_map={tmp_path / 'rail.csv'}", fast=False).err
+    told = [line for line in err if line.startswith("replay: rail_map begins at")]
+    assert [f"t_ns = {first_ns}, " in line for line in told] == [True] * later
 
 
 @pytest.mark.parametrize("setting", ["train_file", "track_line", "rail_map"])

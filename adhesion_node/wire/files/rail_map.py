@@ -11,6 +11,7 @@
 import csv
 import math
 import re
+import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import date
 from decimal import Decimal
@@ -24,6 +25,8 @@ COLUMNS = ("place_m", "length_m", "t_ns", "seen", "mu", "mu_std", "used", "mu_lo
 Number = TypeVar("Number", int, float)
 
 DAY_NS, EPOCH = 86_400_000_000_000, date(1970, 1, 1).toordinal()
+
+YEAR_NS = 365 * DAY_NS + DAY_NS // 4
 
 ISO = re.compile("[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])")
 """A date as `brakings` writes it: a spreadsheet that rounds stamps leaves it."""
@@ -41,6 +44,16 @@ def read_rail_map(path: str) -> RailMap:
         raise ValueError(f"{source}: not readable ({error}): `brakings --map` writes one") from error
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
+
+
+def odd_stamps(path: str, pieces: Iterable[Piece]) -> Iterator[str]:
+    """Say of a map's newest stamp that it is in another unit or to come: it would be of no effect, without a word."""
+    newest = max((piece.t_ns for piece in pieces), default=YEAR_NS)
+    told = f"rail_map = {path}: t_ns = {newest} is of {1970 + newest // YEAR_NS}"
+    if newest < YEAR_NS:
+        yield f"{told}, too old for a train of today: is it in s or ms? Give ns; a clock that began at 0 tells no age"
+    elif newest > time.time_ns() + DAY_NS:
+        yield f"{told}, to come, and makes no train less careful until then: is that clock right, or this one?"
 
 
 def map_of_rows(rows: Iterable[Mapping[str, Any]]) -> RailMap:

@@ -19,7 +19,7 @@ from ...core.physics.track import Grade, Track, parse_track
 from ...core.physics.train import CRH3, Train
 from ...core.readers import unread
 from ...core.setting import Setting, make
-from ..files.rail_map import read_rail_map
+from ..files.rail_map import odd_stamps, read_rail_map
 from ..files.train import read_train
 from ..line import Line
 from ..topics import ADHESION_INPUTS, CREEP_INPUTS
@@ -55,7 +55,7 @@ class Setup(NamedTuple):
     train: str = ""
     """The train in words, for the top of what is reported."""
     unread: tuple[str, ...] = ()
-    """What is given though the method does not read it, in words."""
+    """What is given and the method does not read, or is of no effect, in words."""
 
 
 class CreepSetup(NamedTuple):
@@ -95,9 +95,11 @@ def setup_of(values: Mapping[str, Any]) -> Setup:
         profile = _with_grades(profile, line.grades(train.length_m))
     of_line = make(Line, values, track=line, **sensing.of_line(ADHESION_INPUTS, values))
     track_run = profile.turned() if of_line.sign < 0 else profile
-    config = make(Config, values, train=train, track=track_run, rail_map=_rail_map(values, of_line.sign))
+    rail_map = _rail_map(values, of_line.sign)
+    config = make(Config, values, train=train, track=track_run, rail_map=rail_map)
+    odd = odd_stamps(str(values[RAIL_MAP.name]), rail_map.pieces) if rail_map else ()
     words = _in_words(named or (DEFAULT_TRAIN if train == CRH3 else OWN_TRAIN), train)
-    return Setup(config, int(seed), of_line, float(timeout_s), words, tuple(unread(given, SETTINGS)))
+    return Setup(config, int(seed), of_line, float(timeout_s), words, (*unread(given, SETTINGS), *odd))
 
 
 def preset(settings: Sequence[Setting], given: Mapping[str, Any]) -> tuple[Setting, ...]:

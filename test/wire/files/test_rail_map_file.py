@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 
 import pandas as pd
@@ -96,6 +97,24 @@ def test_what_a_spreadsheet_saved_is_read(tmp_path: Path) -> None:
     saved = path.read_text(encoding="utf-8").replace("1700000000000000000", "1.70000000000000E+18")
     path.write_text(saved, encoding="utf-8")
     assert read_rail_map(str(path)).pieces == PIECES
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"),
+    [
+        (1e-6, "t_ns = 1700000000123 is of 1970, too old for a train of today: is it in s or ms? Give ns"),
+        (1e-9, "t_ns = 1700000000 is of 1970, too old"),
+        (2.0, "t_ns = 3400000000246913578 is of 2077, to come, and makes no train less careful until then"),
+        (1.0, None),
+    ],
+)
+def test_stamps_of_no_effect_are_said(factor: float, said: str | None, tmp_path: Path) -> None:
+    """The map was of no effect, and nothing said so."""
+    path = tmp_path / "rail.csv"
+    stamps = [int(Decimal(t_ns) * Decimal(str(factor))) for t_ns in rail()["t_ns"]]
+    rail().drop(columns="date").assign(t_ns=stamps).to_csv(path, index=False)
+    told = setup_of({"rail_map": str(path)}).unread
+    assert [line.startswith(f"rail_map = {path}: {said}") for line in told] == ([True] if said else [])
 
 
 def test_a_missing_file_is_said() -> None:
