@@ -44,6 +44,17 @@ NO_HEADER = "has no header line: begin with the names of the columns, their quot
 
 BROKEN = "quotes are not closed in this line: close them, or take the line break out of a name of the header"
 
+AS_TABLE = "no table: save it as CSV, a header and one row per time, as"
+
+NO_TABLE = (
+    (r'\s*(\{\s*"|\[\s*[\[{])', f"is JSON, {AS_TABLE} pandas.read_json(FILE).to_csv(OTHER) does of records"),
+    (
+        r"(?i)\s*<([?!]|gpx|kml|html)",
+        f"is XML, as GPX and KML are, or HTML, {AS_TABLE} gpsbabel -o unicsv does of a track",
+    ),
+    (r"\s*[$!][A-Z]{5},", f"is NMEA 0183, {AS_TABLE} gpsbabel -i nmea -o unicsv does"),
+)
+"""How a text begins that is none of rows below a header, and what to do with it."""
 
 _COMMENT = re.compile(r"\s*#(?![0-9])")
 
@@ -69,7 +80,7 @@ def understood(path: Path, form: Format) -> Format:
     lines = list(islice(file_lines(path, form.encoding), SAMPLE))
     if not any(map(str.strip, lines)):
         raise ValueError(f"{path}: {NO_HEADER}")
-    delimiter, header = _header(lines, form)
+    delimiter, header = _header(path, lines, form)
     rows = {n: cells for n, text in enumerate(lines[header + 1 :], 1) if (cells := _cells(text, delimiter))}
     heads = dict(takewhile(lambda row: is_head(row[1]), islice(rows.items(), max(len(rows) - 1, 0))))
     units = max(heads, key=lambda n: how_many_units(heads[n]), default=0)
@@ -152,8 +163,11 @@ def _cells(text: str, delimiter: str) -> list[str]:
         return []
 
 
-def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:
-    """Delimiter and header line: where all names stand that must be there, else as most lines have it."""
+def _header(path: Path, lines: Sequence[str], form: Format) -> tuple[str, int]:
+    """Delimiter and header line: where all names stand that must be there, else as most lines have it.
+
+    Raises ValueError for another kind of text.
+    """
     delimiters = DELIMITERS if form.delimiter is None else (form.delimiter,)
     if form.skip_rows is not None:
         below = lines[form.skip_rows : form.skip_rows + 1] or [""]
@@ -166,6 +180,9 @@ def _header(lines: Sequence[str], form: Format) -> tuple[str, int]:
             cells = split_up[delimiter][number]
             if any(all(meant(name, ours, cells) for ours, name in (*wanted, *place)) for place in places):
                 return delimiter, number
+    for begins, why in NO_TABLE:
+        if re.match(begins, "".join(lines)):
+            raise ValueError(f"{path}: {why}")
     widths = {delimiter: Counter(map(len, split_up[delimiter])) for delimiter in delimiters}
 
     def usual(delimiter: str) -> tuple[int, int]:

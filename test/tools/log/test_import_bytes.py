@@ -41,6 +41,30 @@ def test_what_is_no_text_is_told(importing: Import, begins: bytes, what: str) ->
     assert importing.errors == [f"import_csv: FILE: {what}"]
 
 
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+@pytest.mark.parametrize(
+    ("written", "what"),
+    [
+        ('[{"time": 1.0, "position": 2.0}]', "is JSON"),
+        ('{\n  "rows": [{"time": 1.0}]\n}', "is JSON"),
+        ('{"time": 1.0}\n{"time": 2.0}\n', "is JSON"),
+        ('\n<?xml version="1.0"?>\n<gpx><trkpt lat="50.0" lon="8.0"/></gpx>', "is XML, as GPX and KML are"),
+        ('<kml><when>2024-01-01</when>, "8.0, 50.0"</kml>', "is XML, as GPX and KML are"),
+        ("$GPGGA,123519,4807.038,N,01131.000,E,1,08,0.9,545.4,M,46.9,M,,*47\n" * 9, "is NMEA 0183"),
+    ],
+)
+def test_what_is_no_table_is_told(importing: Import, written: str, what: str, encoding: str) -> None:
+    """It was said to have no header line, or no column time."""
+    assert importing(written.encode(encoding)) == 2
+    assert importing.errors[0].startswith(f"import_csv: FILE: {what}")
+    assert ", no table: save it as CSV, a header and one row per time" in importing.errors[0]
+
+
+@pytest.mark.parametrize("above", ['{"unit": 7}\n', "<?recorder 7?>\n"])
+def test_a_table_may_have_another_text_above(importing: Import, above: str) -> None:
+    assert importing(above + text(ride())) == 0, importing.errors
+
+
 @pytest.mark.parametrize("pack", [gzip.compress, bz2.compress, lzma.compress])
 def test_what_is_packed_is_read(importing: Import, pack: Callable[[bytes], bytes]) -> None:
     rows = ride()
