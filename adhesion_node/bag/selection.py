@@ -115,6 +115,8 @@ def select_from(
 
     The train is chosen as by `choose_train`, unless topics are named and no namespace is.
     """
+    if not reader.topics:
+        raise ValueError(f"bag = {reader.path}: holds no message: name another recording")
     if namespace is not None or names is None:
         choose_train(reader, namespace, remapped=bool(remaps))
     try:

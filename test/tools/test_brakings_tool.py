@@ -142,6 +142,20 @@ def test_what_is_left_out_of_a_recording_is_said_as_replay_says_it(
 
 
 @pytest.mark.usefixtures("here")
+def test_why_nothing_comes_of_a_recording_is_said(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Nothing was dropped, and no topic would have been right."""
+    short, empty = tmp_path / "short", tmp_path / "empty"
+    write_run(short, samples()[:1], names=NO_TRUTH)
+    write_run(empty, [])
+    options = ["--output", str(tmp_path / "brakings.csv"), "--cache", str(tmp_path / "cache")]
+    assert brakings.main([str(short), str(empty), *options]) == 1
+    assert told(capfd) == [
+        f"brakings: {short}: nothing to estimate from; dropped: nothing, it is too short",
+        f"brakings: {empty}: bag = {empty}: holds no message: name another recording",
+    ]
+
+
+@pytest.mark.usefixtures("here")
 def test_stamps_without_a_date_are_said_of_a_map(
     bags: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -55,7 +55,7 @@ def estimate_run(
                 places = made.estimate.position_m + curve.distance_m
                 curves.add(np.array([made.estimate.t_ns]), places[np.newaxis], curve.speed_mps[np.newaxis])
     if pipeline.last is None:
-        dropped = listed(pipeline.dropped) or "nothing"
+        dropped = listed(pipeline.dropped) or "nothing, it is too short"
         raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")
     read_topics(reader, [(DIAGNOSTICS, inputs.creep.take)])
     namespaces = (theirs.strip("/").removesuffix(ours).strip("/") for theirs, ours in selection.items())

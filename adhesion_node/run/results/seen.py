@@ -145,7 +145,7 @@ class Seen:
     def _reasons(self, odd_brake: str | None) -> Iterator[str]:
         """What may be the reason, the one that explains most first."""
         if not self._estimates:
-            yield "no estimate came of it; see what was dropped, and why"
+            yield "no estimate came of it; see what was dropped, and why, or is it too short?"
         if self._runs_back:
             yield BACKWARDS
         if self.too_fast is not None:

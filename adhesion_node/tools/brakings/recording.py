@@ -73,7 +73,7 @@ class Recording(NamedTuple):
             made = offline.predictions(pipeline, None, recorded, setup.line, array("d"))
             found = list(brakings(made, self.cell_m, setup.line.sign))
         if pipeline.last is None:
-            raise ValueError(f"nothing to estimate from; dropped: {pipeline.dropped or 'nothing'}")
+            raise ValueError(f"nothing to estimate from; dropped: {pipeline.dropped or 'nothing, it is too short'}")
         told += offline.remarks(pipeline)
         rows = np.concatenate([np.empty(0, BRAKING), *(one.row for one in found)])
         cells = [one.cells for one in found if pipeline.accepted]
