@@ -90,7 +90,8 @@ def _read(path: Path) -> pd.DataFrame:
             texts = {"dtype": str, "keep_default_na": False, "na_values": [""]}
             return pd.read_csv(path, index_col=False, skipinitialspace=True, **texts)
     except pd.errors.ParserWarning as error:
-        raise ValueError("its rows have more cells than its first line names: name every column") from error
+        more = "its rows have more cells than its first line names"
+        raise ValueError(f"{more}: name every column, and save decimals with points; {WRITTEN_BY}") from error
     except ImportError as error:
         raise ValueError("needs pyarrow, pip install '.[parquet]', or give a .csv") from error
     except (OSError, ValueError) as error:

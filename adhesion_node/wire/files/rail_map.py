@@ -97,7 +97,7 @@ def _number(number: int, row: Mapping[str, Any], name: str, kind: Callable[[Any]
 def _piece(number: int, row: Mapping[str, Any]) -> Piece:
     missing = [name for name in COLUMNS if name not in row]
     if missing:
-        raise ValueError(f"lacks the columns {', '.join(missing)}: `brakings --map` writes them")
+        raise ValueError(f"lacks the columns {', '.join(missing)}: `brakings --map` writes them, cells apart by commas")
     numbers = {name: _number(number, row, name, float) for name in COLUMNS}
     stamp, seen = (_number(number, row, name, _whole) for name in ("t_ns", "seen"))
     days, told = stamp // DAY_NS, str(row.get("date"))[:10]

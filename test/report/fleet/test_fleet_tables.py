@@ -135,8 +135,11 @@ def test_cells_without_a_name_are_said(tmp_path: Path) -> None:
     table = tmp_path / "table.csv"
     head, *rows = brakings().to_csv(index=False).splitlines()
     table.write_text("\n".join([head, *(f"{row},a remark" for row in rows)]), encoding="utf-8")
-    with pytest.raises(ValueError, match=rf"table = {table}: its rows have more cells than its first line names"):
-        read_table(table)
+    said = "its rows have more cells than its first line names: name every column, and save decimals with points"
+    for text in (table.read_text(encoding="utf-8"), brakings().to_csv(index=False, sep=";", decimal=",")):
+        table.write_text(text, encoding="utf-8")
+        with pytest.raises(ValueError, match=rf"table = {table}: {said}; .*cells apart by commas"):
+            read_table(table)
 
 
 @pytest.mark.parametrize("day", ["28.11.2023", "2023-1-5"])

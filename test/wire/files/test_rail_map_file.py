@@ -59,6 +59,10 @@ def test_what_was_written_is_read(ending: str, tmp_path: Path) -> None:
     [
         ("place_m,date\n0,today\n", "lacks the columns length_m, t_ns, seen"),
         (
+            "place_m;length_m\n0,0;100,0\n",
+            "lacks the columns place_m, .*: `brakings --map` writes them, cells apart by commas",
+        ),
+        (
             "place_m,length_m,t_ns,seen,mu,mu_std,used,mu_lower,speed_mps\n0,100,soon,1,,,0.1,0.1,30\n",
             "row 1: t_ns = 'soon': give a number",
         ),
