@@ -305,6 +305,11 @@ class Config:
         return math.hypot(self.mass_std, self.brake_std, rotating)
 
     @property
+    def least_pressure_pa(self) -> float:
+        """Gauge pressure from which the brake counts as applied, Pa; some pascals are none."""
+        return max(self.brake_threshold_pa, 1.0)
+
+    @property
     def ripple(self) -> float:
         """`used_ripple` of this train, relative; of a shorter one than `SHORTEST_M` no more than of that."""
         return self.used_ripple * math.sqrt(SWINGING_M / max(self.train.length_m, SHORTEST_M))
@@ -336,4 +341,4 @@ class Config:
     def is_braked(self, pressure_pa: float | None) -> bool:
         """Whether a measured gauge pressure, without one the assumed one, is above the threshold."""
         pressure = self.assumed_pressure_pa if pressure_pa is None else pressure_pa
-        return pressure >= max(self.brake_threshold_pa, 1.0)
+        return pressure >= self.least_pressure_pa

@@ -135,7 +135,7 @@ class Memory(NamedTuple):
 
     def is_pressed(self, config: Config) -> bool:
         """Whether a brake is applied."""
-        return self.brake.demanded_pa >= max(config.brake_threshold_pa, 1.0)
+        return self.brake.demanded_pa >= config.least_pressure_pa
 
     def bank_at(self, config: Config, until_ns: int) -> Bank:
         """The bank moved on to a time, if that is later."""

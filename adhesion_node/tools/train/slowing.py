@@ -95,7 +95,7 @@ def _mean(ratios: list[tuple[float, float]], left_out: int) -> Ratio | None:
 def _coasting(config: Config, log: Log) -> Iterator[tuple[float, float]]:
     """Resistance over the believed one, of stretches without brake, with standard errors."""
     t, pressure = log.pressures.T
-    pressed = t[pressure >= max(config.brake_threshold_pa, 1.0)]
+    pressed = t[pressure >= config.least_pressure_pa]
     for start in np.arange(t[0], t[-1] - COAST_S, COAST_S):
         if ((pressed > start - RELEASED_S) & (pressed < start + COAST_S)).any():
             continue

@@ -98,7 +98,7 @@ class BrakeSeen(NamedTuple):
         every_ns = apart_ns(self.recent[-1].t_ns if self.recent else None, t_ns)
         kept_ns, end = at_least(RISING_NS, KEPT, every_ns), bisect_left(self.recent, (t_ns,))
         recent = (*self.recent[bisect_left(self.recent, (t_ns - kept_ns,)) : end], sample)
-        empty = pressure < max(config.brake_threshold_pa, 1.0)
+        empty = pressure < config.least_pressure_pa
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
             follows = self._following(config, sample, pressure)
