@@ -30,6 +30,7 @@ SURE_SIGMA = 3.0
 
 def follow(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
     """Judge the next measurement in time; follow the train with it where it is good."""
+    state, measurement = _gauged(config, state, measurement)
     seen = state.seen
     turning = state.turning.after(measurement, _rims_mps(config, measurement), _may_brake(config, measurement))
     measurement, other_unit = turning.believed(measurement)
@@ -63,6 +64,21 @@ def follow(config: Config, state: State, measurement: Measurement) -> tuple[Stat
     if state.method is None:
         return follow_banked(config, state, measurement)
     return follow_windowed(config, state, measurement)
+
+
+def _gauged(config: Config, state: State, measurement: Measurement) -> tuple[State, Measurement]:
+    """With pressures above what the gauge shows without a brake; what was believed with that for one is given up."""
+    if config.pressure_kind == "demanded":
+        return state, measurement
+    threshold_pa, before = config.least_pressure_pa, state.zero
+    zero = before.after(measurement, threshold_pa, state.seen)
+    if zero is not before:
+        state = state._replace(zero=zero)
+        off_pa = zero.off_pa(threshold_pa)
+        if off_pa > before.off_pa(threshold_pa):
+            kept = state.forgotten()._replace(pace=state.pace, standing=state.standing, turning=state.turning)
+            state = kept.told(Event(Outcome.RESET, f"brake_pressure x = {off_pa:.3g} Pa while no brake is applied"))
+    return state, zero.corrected(measurement, threshold_pa)
 
 
 def last_estimate(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:

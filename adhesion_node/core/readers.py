@@ -16,7 +16,7 @@ from .methods import METHODS
 from .setting import Setting
 
 _READ_BY = {
-    (BANK,): "ahead_std brake_build_up_s brake_drift curve_confidence estimate_s imu_std_mps2 lowest_mu pressure_kind "
+    (BANK,): "ahead_std brake_build_up_s brake_drift curve_confidence estimate_s imu_std_mps2 lowest_mu "
     "profile_std rail_map_days rail_map_trust resistance_std speed_scale_std used_ripple",
     tuple(METHODS): "braking_noise_mps coasting_noise_mps iterations lowest_net_mu restart_s "
     "restart_sigma settled_ratio start_mu tolerance window",

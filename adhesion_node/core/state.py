@@ -27,6 +27,7 @@ from .intake.plausibility import Pace, Repeated
 from .intake.samples import Measurement
 from .intake.standing import Standing
 from .intake.turning import Turning
+from .intake.zero import Zero
 from .methods.protocol import AnyMethod, MethodWindow
 from .quick import quick
 
@@ -69,6 +70,8 @@ class State(NamedTuple):
     """Samples that wait."""
     clock: Clock = Clock()
     """The receiver's."""
+    zero: Zero = Zero()
+    """Of the gauge that tells the brake pressure."""
     newest: Measurement | None = None
     """The newest measurement that was accepted."""
     belief: Gaussian | None = None
@@ -123,6 +126,6 @@ class State(NamedTuple):
         return self._replace(counts=counted(self.counts, *events), events=self.events + events)
 
     def forgotten(self) -> State:
-        """All but counts, clock, what still waits, and the number of windows, which keeps the random streams apart."""
+        """All but counts, clock, gauge, what waits, and the number of windows, which keeps the random streams apart."""
         knowledge = Knowledge(windows=self.knowledge.windows)
-        return State(*self[:7], knowledge=knowledge)
+        return State(*self[:8], knowledge=knowledge)

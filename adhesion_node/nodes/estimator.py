@@ -99,7 +99,9 @@ def _values(pipeline: Pipeline) -> dict[str, str]:
     told = {"confidence": f"{pipeline.config.confidence:g}", "digest": pipeline.digest}
     memory = pipeline.state.memory
     taught = {} if memory is None else {name: f"{value:.5g}" for name, value in learnt(memory).items()}
-    return {**_estimate_values(pipeline.last), **taught, **counts, **drops, **told}
+    off_pa = pipeline.state.zero.off_pa(pipeline.config.least_pressure_pa)
+    gauge = {"gauge_zero": f"{off_pa:.5g}"} if off_pa else {}
+    return {**_estimate_values(pipeline.last), **taught, **gauge, **counts, **drops, **told}
 
 
 def _estimate_values(last: Estimate | None) -> dict[str, str]:

@@ -56,6 +56,13 @@ def test_bad_messages_are_dropped_counted_and_change_nothing(line: Line) -> None
     assert line.estimator.digest == offline_digest(readings)
 
 
+def test_a_gauge_whose_zero_is_off_is_told(line: Line) -> None:
+    for _, reading in samples("tunnel_entry", 0.0, 12.0):
+        line.send_sample(reading._replace(pressure_pa=reading.pressure_pa + 15e3))
+    line.hear_all()
+    assert float(line.values()["gauge_zero"]) == pytest.approx(15e3)
+
+
 def bad_positions(t_ns: int) -> Iterator[Any]:
     for frame in ("map", ""):
         message = messages.position(t_ns, 10.0, 0.5)
