@@ -95,7 +95,8 @@ def _coasted(memory: Memory) -> Memory:
     memory = memory._replace(bank=memory.bank.normalised(math.log(FORGOTTEN)))
     if not memory.asks:
         return memory
-    return memory._replace(bank=mixed(memory.bank, memory.since_s), since_s=0.0)
+    course = memory.course.rolled(memory.bank.mean_of(SPEED)) if memory.course.recent else memory.course
+    return memory._replace(bank=mixed(memory.bank, memory.since_s), since_s=0.0, course=course)
 
 
 def _with_changes(config: Config, memory: Memory, bank: Bank) -> Memory:

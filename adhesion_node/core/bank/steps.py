@@ -20,7 +20,6 @@ from .following import followed
 from .layout import POSITION, SPEED
 from .memory import Memory
 from .motion import Foreseen, white_variance
-from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -42,6 +41,9 @@ newest of them may lie further behind than the first."""
 
 BACK = 0.3
 """A step takes the one before back if it is as large to within this share: what reflects a signal passes by."""
+
+AGAIN = 0.5
+"""Share of the way between two steps within which an axle that slides falls behind once more, and nothing steps so."""
 
 NEAR, FAR_NS = 4.0, 2 * S
 """Size of a step over `position_step_std_m` up to which so many positions are enough. Beyond, all of so long must lie
@@ -74,8 +76,10 @@ class Stepping(NamedTuple):
         calm = Stepping(last_off_m=off.metres, stepped_m=self.stepped_m, by_m=self.by_m)
         if not abs(off.metres) > FIRST_SIGMA * off.std_m:
             return calm
-        spaced = abs(measurement.position_m - self.stepped_m) >= config.position_step_spacing_m
-        back = abs(off.metres + self.by_m) < max(alike_m, BACK * abs(self.by_m))
+        way_m = abs(measurement.position_m - self.stepped_m)
+        spaced = way_m >= config.position_step_spacing_m
+        again = off.metres * self.by_m > 0.0 and way_m < AGAIN * config.position_step_spacing_m
+        back = not again and abs(off.metres + self.by_m) < max(alike_m, BACK * abs(self.by_m))
         abrupt = abs(self.last_off_m) < ABRUPT * abs(off.metres)
         plain = abs(off.metres) <= near_m or (off.std_m < near_m and off.nearest > FIRST_SIGMA)
         if (spaced or back) and abrupt and plain:  # else they tell where the train is
@@ -144,7 +148,8 @@ class Stepping(NamedTuple):
         covariance[:, POSITION, POSITION] += size_m**2
         if self.is_far(config):
             covariance[:, SPEED, SPEED] += ((self.off_m[-1] - self.off_m[0]) * S / self._lasts_ns) ** 2
-        memory = self.before._replace(bank=bank._replace(covariance=covariance), course=Course())
+        course = self.before.course.stepped(self.since[0].t_ns, size_m)
+        memory = self.before._replace(bank=bank._replace(covariance=covariance), course=course)
         for measurement in self.since:
             memory = followed(config, memory, measurement, rail)
         return memory, Stepping(stepped_m=self.since[-1].position_m, by_m=size_m)

@@ -122,7 +122,7 @@ def test_a_wheel_that_is_heard_seldom_is_caught(slip: float, more: int, every: i
 
 def test_a_position_that_may_have_stepped_adds_nothing_and_is_the_one_before_the_next() -> None:
     """Before: the next was held against the one before the pause, and a receiver's was taken for a sliding wheel's."""
-    course = plausible.UNBRAKED
+    course = plausible.Course()
     for index, (off, tells) in enumerate(((2.9, True), (0.9, False), (2.4, True), (4.2, True))):
         course = course.after(S + index * S // 10, 0.0, True, off, tells)
     assert course.running == pytest.approx(max(0.9 * 2.4 - plausible.FORESEEN, 0.0) + 2.4 * 4.2 - plausible.FORESEEN)

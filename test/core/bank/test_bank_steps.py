@@ -27,12 +27,12 @@ CALM = replace(CONFIG, position_step_std_m=2.0, position_step_spacing_m=300.0)
 """Positions of 0.5 m that are foreseen to 1 m: a step is of 2.5 m at least and of 8 m at most."""
 
 
-def seen(off_m: list[float | None], start: Stepping | None = None) -> Stepping:
+def seen(off_m: list[float | None], start: Stepping | None = None, std_m: float = 0.5) -> Stepping:
     """Positions from 1000 m on, each 4 m further, off by so much; None: a tick."""
     memory = met(CALM, Measurement(S, 1000.0, 0.25, 0.0, 40.0))
     stepping = start or Stepping()
     for k, off in enumerate(off_m):
-        variance = math.inf if off is None else 0.25
+        variance = math.inf if off is None else std_m**2
         measured = Measurement(S + k * S // 10, 1000.0 + 4.0 * k, variance, 0.0)
         stepping = stepping.after(CALM, memory, measured, Foreseen() if off is None else Foreseen(off, 1.0, abs(off)))
     return stepping
@@ -76,6 +76,15 @@ def test_a_step_may_be_taken_back_at_any_time(off_m: float, size_m: float) -> No
     assert seen([0.1, off_m, off_m, off_m], Stepping(stepped_m=990.0, by_m=5.0)).size_m(CALM, 1.0) == pytest.approx(
         size_m
     )
+
+
+@pytest.mark.parametrize(
+    ("last_m", "by_m", "size_m"), [(990.0, -3.0, 0.0), (860.0, -3.0, 0.0), (840.0, -3.0, -3.0), (990.0, 3.0, -3.0)]
+)
+def test_nothing_steps_the_same_way_again_soon(last_m: float, by_m: float, size_m: float) -> None:
+    """Before: positions that declare 2 m did, each time that an axle that slides fell behind."""
+    before = Stepping(stepped_m=last_m, by_m=by_m)
+    assert seen([0.1, -3.0, -3.0, -3.0], before, 2.0).size_m(CALM, 1.0) == size_m
 
 
 def test_a_step_behind_a_chance_error_is_one() -> None:

@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...physics.train import GRAVITY
+from ...physics.train import GRAVITY, Array
 from ...quick import quick
 from ..kernels import parabola
 from ..labels import noises
 from ..layout import SPEED, Bank
 from ..motion import white_variance
+from .wandering import Wandering
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -44,6 +45,9 @@ WHITE, WANDERING = 720.0, 34.0
 n T^4, or that of errors which wander, over the time that they last and T^3. At the part u of the time a position weighs
 360 (u^2 - u + 1/6)/T^2: the mean square of that is 720/T^4, the one of its integral, twice, 240/7."""
 
+STEPPED = 10.0 / math.sqrt(3.0)
+"""A step of the positions is a deceleration of at most so many times its size over T^2: the integral of that weight."""
+
 FAR, FORESEEN, RUNS_OFF = 5.0, 2.0, 15.5
 """Deviations by the hypothesis nearest count as no more than so many standard deviations. Of the product of one and the
 next so much is foreseen each time; what is more is summed up, and above the last runs off (Page 1954). Errors that come
@@ -62,7 +66,14 @@ class Course(NamedTuple):
 
     recent: tuple[tuple[int, float], ...] = ()
     braked_ns: int | None = None
-    """Since when the brake is applied."""
+    """Since when the brake is applied, ..."""
+    rolls_ns: int | None = None
+    """... or since when it is not."""
+    wandering: Wandering = Wandering()
+    stepped_ns: int = -SPAN_NS
+    """Stamp of the last step of the positions, ..."""
+    stepped_m: float = 0.0
+    """... and the sizes of all that follow each other within `SPAN_NS`."""
     heard_ns: int = 0
     """Stamp of the newest, believed or not, ..."""
     off: float = 0.0
@@ -76,11 +87,28 @@ class Course(NamedTuple):
         One that does not tell may have stepped: it adds nothing to what runs off.
         """
         first, end = bisect_left(self.recent, (t_ns - SPAN_NS,)), bisect_left(self.recent, (t_ns,))
-        before = self if braked else UNBRAKED
-        recent, braked_ns = (*self.recent[first:end], (t_ns, position_m)), before.braked_ns
-        if braked_ns is None and braked:
-            braked_ns = t_ns
-        return before._replace(recent=recent, braked_ns=braked_ns)._running(t_ns, off, tells)
+        recent, since_ns = (*self.recent[first:end], (t_ns, position_m)), self.braked_ns if braked else self.rolls_ns
+        since_ns = t_ns if since_ns is None else since_ns
+        if braked:
+            return self._replace(recent=recent, braked_ns=since_ns, rolls_ns=None)._running(t_ns, off, tells)
+        now = self._replace(recent=recent, braked_ns=None, rolls_ns=since_ns, off=0.0, running=0.0)
+        return now._running(t_ns, off, tells)
+
+    def stepped(self, t_ns: int, size_m: float) -> Course:
+        """Where the positions have stepped by so much, from such a one on: an axle that slides may look so."""
+        before_m = self.stepped_m if t_ns - self.stepped_ns < SPAN_NS else 0.0
+        braked_ns, rolls_ns = (None if since_ns is None else t_ns for since_ns in (self.braked_ns, self.rolls_ns))
+        stepped_m = before_m + abs(size_m)
+        return Course(self.recent, braked_ns, rolls_ns, self.wandering.unseen(), t_ns, stepped_m)
+
+    def rolled(self, speed_mps: float) -> Course:
+        """With a look at how the positions of a train wander that no brake slows down."""
+        time, places = self._from_newest()
+        first = _seen(time, LOOKS_S[0])
+        if first is None or self.rolls_ns is None or self.recent[first][0] < self.rolls_ns:
+            return self._replace(wandering=self.wandering.unseen())
+        slowing = -2.0 * parabola.curvature(time[first:], places[first:])
+        return self._replace(wandering=self.wandering.after(slowing, LOOKS_S[0] ** 3 / WANDERING, speed_mps))
 
     def outlying(self, t_ns: int, off: float, tells: bool = True) -> Course:
         """With a position that is not believed: such as come soon are of one burst."""
@@ -111,24 +139,34 @@ class Course(NamedTuple):
         c0, c1, c2 = config.train.resistance_si
         grade = GRADE_SIGMA * config.grade_error
         most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * (c0 + speed * (c1 + c2 * speed)) + grade)
-        newest_ns, newest_m = self.recent[-1]
-        time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
-        places = np.array([place_m - newest_m for _, place_m in self.recent])
+        time, places = self._from_newest()
         white, slow = _errors(bank, declared_m, rounded_m)
+        seen = self.wandering.of(slow)
         for span_s in LOOKS_S:
-            first = int(time.searchsorted(-span_s))
-            count = time.size - first
-            if count < LEAST or time[first] > -SPANNED * span_s:
+            first = _seen(time, span_s)
+            if first is None:
                 continue
             slowing = -2.0 * parabola.curvature(time[first:], places[first:])
-            error = SIGMA * _error(white, slow, span_s, count)
+            shifted = STEPPED * self.stepped_m / span_s**2 if self.stepped_ns >= self.recent[first][0] else 0.0
+            if slowing > most + shifted + SIGMA * _error(white, seen, span_s, time.size - first):
+                return True
+            error = shifted + SIGMA * _error(white, slow, span_s, time.size - first)
             long = self.recent[first][0] - self.braked_ns >= BRAKED_NS
-            if slowing > most + error or (long and slowing < -GAIN_MPS2 - GRAVITY * grade - error):
+            if long and slowing < -GAIN_MPS2 - GRAVITY * grade - error:
                 return True
         return False
 
+    def _from_newest(self) -> tuple[Array, Array]:
+        """Times, s, and positions, m, of the last seconds from the newest on."""
+        newest_ns, newest_m = self.recent[-1]
+        time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
+        return time, np.array([place_m - newest_m for _, place_m in self.recent])
 
-UNBRAKED = Course()
+
+def _seen(time: Array, span_s: float) -> int | None:
+    """Index of the first position of a look over so long, if there are enough."""
+    first = int(time.searchsorted(-span_s))
+    return first if time.size - first >= LEAST and time[first] <= -SPANNED * span_s else None
 
 
 def _errors(bank: Bank, declared_m: float, rounded_m: float = 0.0) -> tuple[float, float]:
