@@ -26,7 +26,7 @@ import numpy as np
 
 from ..physics.train import GRAVITY, Array
 from ..setting import once
-from .gear.wheels import HINTED
+from .gear.wheels import HINTED, UNLEARNT
 from .kernels import moving
 from .kernels.weighing import variances
 from .labels import kinds, noises
@@ -159,6 +159,7 @@ def model_of(config: Config) -> moving.Model:
     """What the kernels need to know of train, track and labels."""
     train = config.train
     breaks, levels = config.track.steps
+    most = np.where(np.arange(kinds.FREE_S.size) == kinds.OTHER, ANOTHER * train.full_brake, np.inf)
     return moving.Model(
         rotating=float(train.rotating_mass_fraction),
         resistance=np.array(train.resistance_si),
@@ -171,10 +172,10 @@ def model_of(config: Config) -> moving.Model:
         noises=np.column_stack((noises.WHITE, noises.SLOW, noises.LASTS)),
         fading=kinds.FADING,
         grade_m=kinds.grade_m_of(config),
-        free=kinds.FREE_S,
+        free=np.column_stack((kinds.FREE_S, most)),
         free_std=kinds.FREE_STD,
-        most=np.where(np.arange(kinds.FREE_S.size) == kinds.OTHER, ANOTHER * train.full_brake, np.inf),
         rates=np.array([config.motion.position_noise_rate, config.brake_drift**2, BIAS_DRIFT**2, RADIUS_DRIFT**2]),
+        unlearnt=np.square([max(config.brake_error, LEAST_BRAKE_ERROR), UNLEARNT]),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),
         strongest=1.0 + STRONGER * max(config.brake_error, LEAST_BRAKE_ERROR),

@@ -126,12 +126,19 @@ def _lasting(config: Config, bank: Bank, slower: Array, dt_s: float, declared_m:
     noise[:, SPEED] = np.square(kinds.RESTLESSNESS[kind]) * dt_s
     noise[:, MU] = np.where(lasts_s > 0.0, kinds.FREE_STD**2 * (1.0 - free**2), drift)
     noise[:, ROUGH] = np.square(roughness_of(config, kind)) * (1.0 - lasting[:, ROUGH] ** 2)
-    noise[:, BRAKE] = config.brake_drift**2 * dt_s
+    noise[:, BRAKE] = _drifted(bank, BRAKE, config.brake_drift**2 * dt_s, max(config.brake_error, 0.1))
     noise[:, GRADE] = open_variance(config, bank) * (1.0 - lasting[:, GRADE] ** 2)
     noise[:, OFFSET] = slow_variance(bank, declared_m) * (1.0 - lasting[:, OFFSET] ** 2)
     noise[:, BIAS] = motion.BIAS_DRIFT**2 * dt_s
-    noise[:, RADIUS] = motion.RADIUS_DRIFT**2 * dt_s
+    noise[:, RADIUS] = _drifted(bank, RADIUS, motion.RADIUS_DRIFT**2 * dt_s, 0.03)
     return lasting, noise
+
+
+def _drifted(bank: Bank, component: int, drift: float, std: float) -> Array:
+    """Variance that a drift adds: by itself it leads to no more than was open before anything was learnt."""
+    variance = bank.covariance[:, component, component]
+    drifted = std**2 + (variance - std**2) * np.exp(-drift / std**2)
+    return np.asarray(np.where(variance < std**2, drifted - variance, 0.0))
 
 
 def position_seen(bank: Bank, position_m: float, declared_m: float) -> Observation:

@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 
 from adhesion_node.core.bank.labels.kinds import KINDS, RESIDUAL_M, ROUGHNESS_M
 from adhesion_node.core.bank.labels.noises import NOISES
-from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, OFFSET, POSITION, ROUGH, SIZE, SPEED
+from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, OFFSET, POSITION, RADIUS, ROUGH, SIZE, SPEED
 from adhesion_node.core.bank.motion import Braking, moved, use
 from adhesion_node.core.config import Config
 from adhesion_node.core.physics.track import Grade, Track
@@ -162,6 +162,17 @@ def test_noise_adds_up_to_the_stated_figures() -> None:
         assert after[index, ROUGH, ROUGH] == pytest.approx(rough, rel=1e-3)
         mu = 2.0 * 0.06**2 / FREE_S[index] if index in FREE_S else (kind.drift * 0.05) ** 2
         assert after[index, MU, MU] == pytest.approx(mu, rel=1e-3)
+
+
+@pytest.mark.parametrize("steps", [1, 8])
+def test_a_night_takes_no_more_away_than_had_been_learnt(steps: int) -> None:
+    """Behind 8 hours the brake was known three times worse than by its papers: the first braking claimed nothing."""
+    config, bank = config_of(0.0), bank_of([KIND_OF["steady"]], noises=[1], spread=0.0)
+    bank.covariance[:, BRAKE, BRAKE], bank.covariance[:, RADIUS, RADIUS] = 0.02**2, 0.004**2
+    for _ in range(steps):
+        bank = moved(config, bank, 8 * 3600.0 / steps, Braking(0.0), 2.0)
+    assert bank.std_of(BRAKE) == pytest.approx(config.brake_error, rel=1e-3)
+    assert bank.std_of(RADIUS) == pytest.approx(0.03, rel=0.1)
 
 
 def test_a_brake_that_is_being_applied_is_known_worse() -> None:

@@ -67,13 +67,14 @@ class Model(NamedTuple):
     grade_m: float
     """Correlation length of the grade."""
     free: Array
-    """How long the net deceleration of each kind lasts that no brake holds, s, shape (K,); 0: brake or rail hold it."""
+    """How long the net deceleration of each kind lasts that no brake holds, s, and what it is at most over g, shape
+    (K, 2); 0 s: brake or rail hold it."""
     free_std: float
     """Its standard deviation over g."""
-    most: Array
-    """And what it is at most, shape (K,)."""
     rates: Array
     """Variances per second of position, brake, bias and radius."""
+    unlearnt: Array
+    """Variances of brake and radius before anything is learnt of them, to which a drift leads."""
     grade_error: float
     resistance_error: float
     strongest: float
@@ -116,8 +117,8 @@ def _used(
     model: Model, x: Array, kind: int, resisting: float, step: Step
 ) -> tuple[float, bool, float, float, float, float]:
     """u, whether the adhesion limits, and du/d(mu, rho, beta, v)."""
-    if model.free[kind] > 0.0:
-        most = model.most[kind]
+    if model.free[kind, 0] > 0.0:
+        most = model.free[kind, 1]
         return min(x[MU], most), False, 1.0 if x[MU] < most else 0.0, 0.0, 0.0, 0.0
     rotating = model.rotating
     needed = (x[BRAKE] * step.applied - rotating * resisting) / (1.0 + rotating)
@@ -133,13 +134,20 @@ def _used(
 
 
 @kernel
+def _drifted(variance: float, drift: float, most: float) -> float:
+    """Variance that a drift by so much adds, less the nearer it is to the most, to which it tends."""
+    return -max(most - variance, 0.0) * math.expm1(-drift / most)
+
+
+@kernel
 def _opened(model: Model, step: Step, brake: float, variance: float) -> float:
-    """Variance per second of the brake's force that is another one's, by how well it is known.
+    """Variance that a step adds to the brake's force: it drifts, or is another one's, by how well it is known.
 
     Where a gauge is alone another brake is a hypothesis of its own.
     """
+    drifted = _drifted(variance, step.dt_s * model.rates[1], model.unlearnt[0])
     stronger = brake > model.strongest and step.applied > 0.0 and not step.alone
-    return OPENS**2 if stronger and variance < OPEN**2 else 0.0
+    return drifted + step.dt_s * OPENS**2 if stronger and variance < OPEN**2 else drifted
 
 
 @kernel
@@ -168,7 +176,7 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
     means, covariances = np.empty_like(mean), np.empty_like(covariance)
     lasting, added = np.ones(SIZE), np.zeros(SIZE)
     fall, by_fall, by_way = np.zeros(SIZE), np.empty(SIZE), np.empty(SIZE)
-    added[POSITION], added[BIAS], added[RADIUS] = dt * model.rates[0], dt * model.rates[2], dt * model.rates[3]
+    added[POSITION], added[BIAS] = dt * model.rates[0], dt * model.rates[2]
     for h in range(kind.size):
         x, p, k = mean[h], covariance[h], kind[h]
         v, n = x[SPEED], model.noises[noise[h]]
@@ -176,8 +184,8 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         u, _, by_mu, by_rough, by_brake, by_speed = _used(model, x, k, resisting, step)
         slower = v - dt * GRAVITY * (u + resisting + x[GRADE])
         way_m = max(v, LEAST_MPS) * dt
-        if model.free[k] > 0.0:
-            lasting[MU] = math.exp(-dt / model.free[k])
+        if model.free[k, 0] > 0.0:
+            lasting[MU] = math.exp(-dt / model.free[k, 0])
             added[MU] = model.free_std**2 * (1.0 - lasting[MU] ** 2)
         else:
             bent = _law(model, law[h], slower) / _law(model, law[h], v)
@@ -189,9 +197,9 @@ def moved(model_numbers: ModelNumbers, bank: Columns, step_numbers: StepNumbers)
         filling = FILLING * GRAVITY * x[BRAKE] * step.filling if by_brake > 0.0 else 0.0
         added[SPEED] = (model.kinds[k, 3] ** 2 + rising**2 + filling**2) * dt
         added[ROUGH] = model.kinds[k, 2] ** 2 * (1.0 - lasting[ROUGH] ** 2)
-        added[BRAKE] = dt * (model.rates[1] + _opened(model, step, x[BRAKE], p[BRAKE, BRAKE]))
-        left = model.grade_error**2 + (model.resistance_error * basic) ** 2
-        added[GRADE] = left * (1.0 - lasting[GRADE] ** 2)
+        added[BRAKE] = _opened(model, step, x[BRAKE], p[BRAKE, BRAKE])
+        added[RADIUS] = _drifted(p[RADIUS, RADIUS], dt * model.rates[3], model.unlearnt[1])
+        added[GRADE] = (model.grade_error**2 + (model.resistance_error * basic) ** 2) * (1.0 - lasting[GRADE] ** 2)
         added[OFFSET] = max(n[2] * step.declared_m, n[3]) ** 2 * (1.0 - lasting[OFFSET] ** 2)
         for i in range(SIZE):
             means[h, i] = lasting[i] * x[i]
