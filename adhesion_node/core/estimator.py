@@ -86,8 +86,9 @@ def advance(config: Config, state: State, sample: Sample) -> tuple[State, tuple[
         return state.told(Event(Outcome.INVALID, repr(sample))), ()
     if isinstance(sample, PositionSample):
         return _read(config, state, state.clock.read(sample))
-    state = state._replace(clock=state.clock.beside(sample))
-    return _passed(config, state, gate.push(state.gate, state.inbox, sample))
+    state, doubted = _read(config, state, state.clock.beside(sample))
+    state, estimates = _passed(config, state, gate.push(state.gate, state.inbox, sample))
+    return state, doubted + estimates
 
 
 def settle(config: Config, state: State) -> tuple[State, tuple[Estimate, ...]]:

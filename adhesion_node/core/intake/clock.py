@@ -31,6 +31,9 @@ S = 1_000_000_000
 LEAST_NS, MOST_NS = 3 * S // 10, 3 * S
 """Stamps that step by less are jittered; beyond the other, once or in all, they are those of another time."""
 
+LONG_NS = 2 * MOST_NS
+"""What is set aside waits no longer for the next one: stamps that are behind by the most, and as much again."""
+
 RHYTHM, AGREEING = 8, 3
 """Samples that show period and speed, or that stamps are right again; and such as must agree that they have stepped."""
 
@@ -38,7 +41,7 @@ ALIVE = 30
 """Another sensor tells the time until so many positions have come since it was heard."""
 
 UNEVEN = 0.5
-"""Part of the period by which samples may come early or late."""
+"""Part of the period by which samples may come early or late: so balises do of a train that runs slower or faster."""
 
 NEAR, NEAR_M = 0.4, 2.0
 """By what part of what the train runs in the time of the step, or by so little, its way may differ from that of one
@@ -70,19 +73,21 @@ class Clock(NamedTuple):
     right: int = 0
     """Samples in a row whose stamps were right, those put back not."""
 
-    def beside(self, sample: Any) -> Clock:
-        """Note a sample of another sensor."""
-        return self._replace(others=MappingProxyType({**self.others, type(sample): (sample.t_ns, self.come)}))
+    def beside(self, sample: Any) -> Read:
+        """Note a sample of another sensor; what by its stamp was set aside long ago is so no more."""
+        clock = self._replace(others=MappingProxyType({**self.others, type(sample): (sample.t_ns, self.come)}))
+        long = clock.doubted and sample.t_ns > clock.doubted[-1].t_ns + LONG_NS
+        return clock.settled() if long else Read(clock, ())
 
     def read(self, sample: PositionSample) -> Read:
         """Take the next one."""
         right = self.right + 1 if self.ahead_ns and self._agrees(sample.t_ns, 0, self.ahead_ns) else 0
         clock = self._replace(doubted=(*self.doubted, sample), come=self.come + 1, right=right)
         step_ns = -self.ahead_ns if right == RHYTHM else clock._step_ns()
-        if step_ns and right < RHYTHM and len(clock.doubted) < AGREEING:
-            return Read(clock, ())
         if not (step_ns and self._agrees(sample.t_ns, self.ahead_ns + step_ns, self.ahead_ns)):
             return clock.settled()
+        if right < RHYTHM and len(clock.doubted) < AGREEING:
+            return Read(clock, ())
         read = clock._replace(ahead_ns=self.ahead_ns + step_ns, right=0).settled()
         said = f"stamp of the position went on by {step_ns / S:+.3g} s, now {read.clock.ahead_ns / S:+.3g} s"
         return read._replace(events=(Event(Outcome.SHIFTED, said),))
@@ -119,7 +124,7 @@ class Clock(NamedTuple):
         if not all(interval > 0 and abs(interval - period_ns) <= near_ns for interval in intervals):
             return 0
         step_ns = first.t_ns - self.ahead_ns - before.t_ns - period_ns
-        if not LEAST_NS <= abs(step_ns) <= MOST_NS or abs(self.ahead_ns + step_ns) > MOST_NS:
+        if not max(LEAST_NS, near_ns) <= abs(step_ns) <= MOST_NS or abs(self.ahead_ns + step_ns) > MOST_NS:
             return 0
         period_m = (before.position_m - self.recent[0].position_m) / (RHYTHM - 1)
         way_m = abs(period_m * step_ns / period_ns)

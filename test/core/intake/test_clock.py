@@ -53,7 +53,8 @@ def read(
     clock, through, told = Clock(), list[PositionSample](), 0
     for index, (sample, true) in enumerate(zip(samples, now or samples, strict=True)):
         if index % every == phase:
-            clock = clock.beside(PressureSample(true.t_ns - S // 50, 0.0)).beside(SpeedSample(true.t_ns, 1.0))
+            clock = clock.beside(PressureSample(true.t_ns - S // 50, 0.0)).clock
+            clock = clock.beside(SpeedSample(true.t_ns, 1.0)).clock
         clock, used, events = clock.read(sample)
         through += used
         told += len(events)
@@ -189,11 +190,56 @@ def test_where_the_step_was_missed_or_the_return_all_is_soon_right(by_s: float) 
         assert largest_off_s(found[230:], now[230:]) == 0.0
 
 
+def balises(speeds_mps: Sequence[float], apart_m: float = 250.0) -> list[PositionSample]:
+    """Places all as far apart, of a train that runs from each to the next at such a speed."""
+    times = S + np.cumsum([0.0, *(apart_m / speed for speed in speeds_mps)]) * S
+    return [PositionSample(round(t_ns), apart_m * k, 1.0) for k, t_ns in enumerate(times.tolist())]
+
+
+@pytest.mark.parametrize("late_s", [0.1, 1.0, 2.0])
+@pytest.mark.parametrize("then_mps", [23.0, 26.0, 28.0, 32.0, 34.0, 38.0])
+def test_a_train_that_runs_slower_or_faster_over_balises_waits_for_none(late_s: float, then_mps: float) -> None:
+    """The way of each period is the same, as where the clock of a receiver steps."""
+    clock = Clock()
+    for sample in balises([30.0] * 9 + [then_mps] * 9):
+        clock = clock.beside(PressureSample(sample.t_ns + round(late_s * S), 0.0)).clock
+        clock, used, _ = clock.read(sample)
+        assert used == (sample,)
+
+
+@pytest.mark.parametrize("wrong", [1, 2])
+@pytest.mark.parametrize("by_s", [-3.0, -1.0, 1.0, 3.0])
+def test_what_is_set_aside_before_an_outage_does_not_wait_for_its_end(by_s: float, wrong: int) -> None:
+    clock, true = Clock(), run(100)
+    samples = stepped(true, by_s, 100 - wrong, 100)
+    for sample, each in zip(samples, true, strict=True):
+        clock = clock.beside(PressureSample(each.t_ns, 0.0)).clock.read(sample).clock
+    assert clock.doubted == tuple(samples[-wrong:])
+    through = []
+    for k in range(100):
+        clock, used, _ = clock.beside(PressureSample(true[-1].t_ns + k * S // 10, 0.0))
+        through += [(sample, k) for sample in used]
+    assert [sample for sample, _ in through] == samples[-wrong:]
+    assert clock.doubted == ()
+
+
+@pytest.mark.parametrize("by_s", [-1.0, 1.0])
+def test_nor_does_it_set_the_time_back(by_s: float) -> None:
+    """Two positions whose clock has stepped, then none for 2 minutes."""
+    measurements = ride([(150.0, 0.0)])
+    pipeline = Pipeline(Config(), 1)
+    for k, (t_ns, position_m, variance_m2, *_) in enumerate(measurements):
+        pipeline.push(SpeedSample(t_ns, 80.0, 0.1))
+        if k < 100 or k > 1300:
+            pipeline.push(PositionSample(t_ns + (98 <= k < 100) * round(by_s * S), position_m, variance_m2))
+    assert pipeline.state.counts[Outcome.RESET] == 0
+
+
 def test_a_step_that_is_meant_is_none() -> None:
     samples, clock, told = stepped(run(), -1.0, 100, 400), Clock(), 0
     for index, (sample, true) in enumerate(zip(samples, run(), strict=True)):
         clock = clock.unsure() if index == 100 else clock
-        clock, _, events = clock.beside(PressureSample(true.t_ns, 0.0)).read(sample)
+        clock, _, events = clock.beside(PressureSample(true.t_ns, 0.0)).clock.read(sample)
         told += len(events)
     assert told == 0
 
