@@ -121,7 +121,10 @@ def _take_anchor(gate: Gate, inbox: Inbox, anchor: Any) -> Pushed:
     if t_ns == inbox.anchored_ns:
         return Pushed(inbox, events=(_doubled(anchor),))
     now_ns = _newest(inbox.now_ns, anchor)
-    anchors = inbox.anchors.delayed(now_ns - t_ns)
+    behind_ns = now_ns - t_ns
+    if newest_ns is not None:  # a single one among others has no tick wait as long: the next may show that all are late
+        behind_ns = min(behind_ns, max(gate.far_ns, 2 * inbox.anchors.lag_ns))
+    anchors = inbox.anchors.delayed(behind_ns)
     passed = released_ns is not None and t_ns <= released_ns
     if passed or (newest_ns is not None and t_ns < newest_ns - gate.max_lag_ns):
         return _late(gate, inbox._replace(anchors=anchors), anchor)

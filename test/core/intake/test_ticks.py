@@ -137,6 +137,21 @@ def test_positions_that_come_later_than_is_waited_are_not_lost_to_ticks(rate_hz:
     assert set(came.outcomes) <= {Outcome.LATE}
 
 
+@pytest.mark.parametrize("late_s", [2.5, 4.0, 6.0])
+def test_nor_are_those_that_all_come_much_later(late_s: float) -> None:
+    came = run([PRESSURE, SPEED, Sensor("position", 1, late_s)], 60.0)
+    assert came.positions >= 60.0 - late_s
+    assert set(came.outcomes) <= {Outcome.LATE}
+
+
+@pytest.mark.parametrize("late_s", [6.0, 30.0, 50.0])
+def test_a_single_position_that_comes_much_later_silences_nothing_for_as_long(late_s: float) -> None:
+    places = Sensor("position", 0.1, ahead=lambda t_s: -late_s * (t_s == 60.0))
+    came = run([PRESSURE, SPEED, places], 120.0)
+    assert came.outcomes == [Outcome.LATE]
+    assert came.longest_silence_s(120.0) <= 3.0
+
+
 @pytest.mark.parametrize("beside", [PRESSURE, SPEED, IMU, Sensor("wheels", 5), Sensor("demand", 4)])
 def test_through_an_outage_of_the_positions_ticks_come_in_time(beside: Sensor) -> None:
     came = run([Sensor("position", 5, 0.1, silent=(10.0, 40.0)), beside], 50.0)
