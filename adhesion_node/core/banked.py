@@ -36,9 +36,9 @@ SOON_NS = 75_000_000
 """A position that comes sooner behind the one before tells nothing new: what a receiver errs by lasts longer. Taken in,
 the hypothesis nearest is one of another white part, which takes the wandering for the train."""
 
-LOST_S = 5.0
-"""A wheel that slides loses no more than the way of so many seconds before it is told, and no receiver steps by more;
-further off is another place."""
+LOST_S, LOST_M = 5.0, 50.0
+"""A wheel that slides loses no more than the way of so many seconds before it is told, and no receiver steps by more,
+or than so far, as one that has held the place of a train that departs slowly; further off is another place."""
 
 
 def follow_banked(config: Config, state: State, measurement: Measurement) -> tuple[State, Estimate | None]:
@@ -70,7 +70,7 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     off = bank.off(config, memory, measurement)
     stepping = state.stepping.after(config, memory, measurement, off)
     size_m = stepping.size_m(config, off.std_m)
-    elsewhere = size_m != 0.0 and stepping.is_far(config) and abs(size_m) > LOST_S * state.followed_mps
+    elsewhere = size_m != 0.0 and stepping.is_far(config) and abs(size_m) > max(LOST_S * state.followed_mps, LOST_M)
     if size_m and not elsewhere:
         memory, stepping = stepping.taken(config, size_m, rail)
         return _accepted(config, state, measurement, memory, stepping)

@@ -127,6 +127,23 @@ def test_positions_farther_off_than_any_receiver_steps_are_another_place() -> No
     assert min(e.mu_std for e in estimates if 16 * S < e.t_ns <= 17 * S) > 0.02
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_receiver_that_has_held_the_place_of_a_slow_departure_costs_nothing_that_was_learnt(seed: int) -> None:
+    """It lets go at 1.5 m/s, 19 m further on: more than a balise corrects, and no other place."""
+    rng, speed, way, held, measurements, speeds = np.random.default_rng(seed), 20.0, 0.0, 0.0, [], {}
+    for k in range(1400):
+        pressure, pull = (0.0, 0.0) if k < 200 else (290e3, -0.7) if k < 700 else (0.0, 0.06)
+        held = held if k > 200 and speed < 1.5 else way + 0.5 * float(rng.standard_normal())
+        measurements.append(Measurement(k * S // 10, held, 0.25, pressure))
+        speeds[k * S // 10] = speed
+        way, speed = way + 0.1 * speed, max(speed + 0.1 * pull, 0.0)
+    state, estimates = drive(BANK, measurements)
+    assert state.counts[Outcome.RESET] == 0
+    behind = [e for e in estimates if e.t_ns > 98 * S]
+    assert len(behind) > 50
+    assert all(abs(e.speed_mps - speeds[e.t_ns]) < 3.0 * e.speed_std_mps for e in behind)
+
+
 def test_positions_that_are_not_believed_silence_nothing() -> None:
     """2 s of stamps that are a second late, too short to be believed: followed without them, less sure."""
     measurements = ride([(40.0, 0.0)], seed=1)
