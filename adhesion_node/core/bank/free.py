@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from .labels.kinds import FREE, FREE_STD, STEADY
-from .layout import MU, ROUGH, SIZE, Bank, joined
+from .layout import MU, ROUGH, SIZE, SPEED, Bank, joined
 
 CALMED_S, STIRRED_S = 10.0, 300.0
 """In such times traction that changes becomes steady, and steady one begins to change."""
@@ -28,6 +28,17 @@ CALMED_S, STIRRED_S = 10.0, 300.0
 def closed(bank: Bank) -> Bank:
     """A braking ends: what it taught of train and sensors stays, traction is unknown."""
     return either(by_noise(bank).with_fresh(MU, 0.0, FREE_STD).with_fresh(ROUGH, 0.0, 0.0))
+
+
+def held(bank: Bank) -> Bank:
+    """While a brake is pressed that has stopped the train: none drives it back, so what slowed it down has ended."""
+    back = (bank.mean[:, SPEED] < 0.0) & (bank.mean[:, MU] > 0.0)
+    if not back.any():
+        return bank
+    ended = bank.with_fresh(MU, 0.0, FREE_STD)
+    mean, covariance = bank.mean.copy(), bank.covariance.copy()
+    mean[back], covariance[back] = ended.mean[back], ended.covariance[back]
+    return bank._replace(mean=mean, covariance=covariance)
 
 
 def by_noise(bank: Bank) -> Bank:

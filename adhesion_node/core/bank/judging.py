@@ -19,7 +19,7 @@ import numpy as np
 from ..belief.rail import Rail
 from .blind import forwards, led_again, misled
 from .branching import branched, opened, pruned
-from .free import closed, mixed
+from .free import closed, held, mixed
 from .kernels import weighing
 from .labels.kinds import HELD, OTHER, PASSING, SLIDES
 from .layout import MU, ROUGH, SPEED, Bank
@@ -69,7 +69,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if before and not braked:
         return memory._replace(bank=closed(bank), seen=0)
     if not before:
-        return _coasted(memory)
+        return _coasted(memory._replace(bank=held(bank)) if pressed else memory)
     if memory.asks:
         if memory.course.is_impossible(config, bank, memory.declared_m, memory.coarse.std_m):
             return misled(config, memory)

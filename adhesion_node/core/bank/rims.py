@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..intake.outcome import Event, Outcome
-from ..intake.samples import Measurement
+from ..intake.samples import Measurement, WheelSample
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import MU, RADIUS, SPEED, Bank
@@ -49,8 +49,8 @@ MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
 
 BACK_MPS = 0.3
-"""Speed from which a train that runs back, to within its standard deviation, is left to its other sensors: wheels tell
-no direction. Where there are none it is soon known too badly for that."""
+"""Speed from which a train that runs back, to within its standard deviation, is left to its other sensors: wheels that
+turn tell no direction. Where there are none it is soon known too badly for that."""
 
 SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
@@ -64,7 +64,8 @@ UNSEEN = 1e12
 
 def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
-    if not measurement.wheels or memory.bank.mean_of(SPEED) + memory.bank.std_of(SPEED) < -BACK_MPS:
+    back = memory.bank.mean_of(SPEED) + memory.bank.std_of(SPEED) < -BACK_MPS
+    if not measurement.wheels or (back and not _all_stand(config, measurement.wheels[-1])):
         return memory
     pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     pressed = pressed or _is_slowed(config, memory)
@@ -86,7 +87,13 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     if middle > LEARNING_MPS:
         return _rolling(memory, middle, pressed)
     dark = memory.asks and not measurement.has_position and rims
-    return _slow(memory, max(rims) if pressed else middle) if dark else memory
+    return _slow(memory, max(rims) if pressed else middle, back) if dark else memory
+
+
+def _all_stand(config: Config, sample: WheelSample) -> bool:
+    """Whether no wheel that is heard turns: that says the same of a train that runs back."""
+    rims = [each * config.train.wheel_radius_m for each in sample.known_radps]
+    return bool(rims) and max(rims) < SLOW_MPS
 
 
 def _is_slowed(config: Config, memory: Memory) -> bool:
@@ -117,13 +124,14 @@ def _rolling(memory: Memory, rim_mps: float, pressed: bool) -> Memory:
     return memory._replace(bank=bank.normalised(), fixes=memory.fixes + 1)
 
 
-def _slow(memory: Memory, rim_mps: float) -> Memory:
-    """Take in how slow a rim is: as the train, or it is locked, or dead.
+def _slow(memory: Memory, rim_mps: float, back: bool) -> Memory:
+    """Take in how slow a rim is: as the train, or it is locked, or dead. Unless it runs back the train is no slower.
 
     Of radii that tells nothing (they are considered, not estimated: Schmidt 1966).
     """
     before = memory.bank
-    bank = as_fast(not_slower(before, rim_mps, SLOW_MPS), rim_mps, SLOW_MPS).normalised()
+    bank = before if back else not_slower(before, rim_mps, SLOW_MPS)
+    bank = as_fast(bank, rim_mps, SLOW_MPS).normalised()
     bank.mean[:, RADIUS], bank.covariance[:, RADIUS, RADIUS] = (
         before.mean[:, RADIUS],
         before.covariance[:, RADIUS, RADIUS],
