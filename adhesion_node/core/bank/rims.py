@@ -52,6 +52,9 @@ BACK_MPS = 0.3
 """Speed from which a train that runs back, to within its standard deviation, is left to its other sensors: wheels that
 turn tell no direction. Where there are none it is soon known too badly for that."""
 
+PULLED = 0.004
+"""Traction over the train's weight, beyond what holds its speed on the level, from which driven axles may spin."""
+
 SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
 
@@ -70,24 +73,30 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     pressed = pressed or _is_slowed(config, memory)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
+    pulled = not pressed and _is_pulled(config, memory.bank)
     rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         axles = axles.after(rims, sample.t_ns, memory.slowed_mps, runs)
         newest = sample.without(axles.lying(memory.slowed_mps))
-        wheels = wheels.after(config, newest, rim, std, pressed)
+        wheels = wheels.after(config, newest, rim, std, pressed, pulled)
     rims = wheels.rims(config, newest)
     known = rims if wheels.is_learnt else []
     wheels = wheels.agreeing(known, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
-    memory, middle = _unbraked(config, memory, rims, newest.t_ns), median(rims) if rims else math.nan
-    if middle > LEARNING_MPS:
-        return _rolling(memory, middle, pressed)
+    memory, rolls = _unbraked(config, memory, rims, newest.t_ns), wheels.rolling(rims, pulled)
+    if rolls > LEARNING_MPS:
+        return _rolling(memory, rolls, pressed)
     dark = memory.asks and not measurement.has_position and rims
-    return _slow(memory, max(rims) if pressed else middle, back) if dark else memory
+    return _slow(memory, max(rims) if pressed else rolls, back) if dark else memory
+
+
+def _is_pulled(config: Config, bank: Bank) -> bool:
+    """Whether traction does more than hold the speed on the level, so that driven axles may spin."""
+    return -bank.mean_of(MU) > PULLED + float(config.train.specific_resistance(bank.mean_of(SPEED)))
 
 
 def _all_stand(config: Config, sample: WheelSample) -> bool:
@@ -114,7 +123,7 @@ def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> M
 
 
 def _rolling(memory: Memory, rim_mps: float, pressed: bool) -> Memory:
-    """Take in how fast the middle rim is, as some may spin; where it may slide, the train is not slower than that.
+    """Take in how fast a rim is that rolls; where it may slide, the train is not slower than that.
 
     While nothing is learnt of them it may lie between such as turn and such as are dead.
     """

@@ -54,6 +54,9 @@ two by 0.48 of that, of twelve by 0.73. Under the brake fewer than all roll."""
 UNLEARNT = 0.03
 """Error of all radii together of which nothing was learnt: wear."""
 
+TURNS = 0.5
+"""Share of the middle rim's speed from which an axle turns with the others, and is not dead."""
+
 LEARNING_MPS = 5.0
 """Radii are learnt from this speed of the rims on, and creep is seen from this speed of the train on."""
 
@@ -121,11 +124,13 @@ class WheelsSeen(NamedTuple):
     agree_ns: int | None = None
     """Since when all of them are as fast as each other, and as the train."""
 
-    def after(self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool) -> WheelsSeen:
+    def after(
+        self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool, pulled: bool = False
+    ) -> WheelsSeen:
         """Take in the speeds of all axles while that of one which rolls is known so.
 
         An axle slides where it is slower than the train, or than the fastest axle: a train is not slower than that. It
-        rolls where neither can be.
+        rolls where neither can be. While a train is `pulled` driven axles may spin: no more is learnt of radii.
         """
         count, nothing = len(sample.speeds_radps), (None,) * len(sample.speeds_radps)
         wheels = self if len(self.radius) == count else WheelsSeen((1.0,) * count, slid_ns=nothing, rolled_ns=nothing)
@@ -134,7 +139,7 @@ class WheelsSeen(NamedTuple):
             return wheels
         wheels = wheels._replace(heard_ns=sample.t_ns, every_ns=apart_ns(wheels.heard_ns, sample.t_ns))
         if not braked:
-            return wheels._learning(rims)
+            return wheels if pulled and wheels.is_learnt else wheels._learning(rims)
         rims = [radius * rim for radius, rim in zip(wheels.radius, rims, strict=True)]
         fastest = max((rim for rim in rims if not math.isnan(rim)), default=0.0)
         unsure = UNSURE * std_mps / speed_mps
@@ -174,6 +179,14 @@ class WheelsSeen(NamedTuple):
             return []
         own = (radius * each for radius, each in zip(self.radius, sample.speeds_radps, strict=True))
         return [each * config.train.wheel_radius_m for each in own if not math.isnan(each)]
+
+    def rolling(self, rims: list[float], pulled: bool) -> float:
+        """Speed of a rim while no brake is applied: the middle one, as some may be dead; NaN: none is heard.
+
+        While a train is `pulled` driven axles may spin, half of all or more: the slowest that turns with the others.
+        """
+        middle = median(rims) if rims else math.nan
+        return min(rim for rim in rims if rim >= TURNS * middle) if pulled and rims else middle
 
     def fastest(self, rims: list[float]) -> float:
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""

@@ -1,0 +1,57 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Driven axles spin under traction on a wet rail: that is not what their radii are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from banks import FULL_PA, S
+
+from adhesion_node.core.belief.regime import Regime
+from adhesion_node.core.config import Config
+from adhesion_node.core.estimate import Estimate
+from adhesion_node.core.estimator import init, step
+from adhesion_node.core.intake.samples import Measurement, PressureSample, WheelSample
+
+ROLLS_S, SPINS_S, BRAKED_S = 20.0, 60.0, 10.0
+
+
+def departed(seed: int, gained_mps2: float, driven: int, *, dark: bool) -> list[Estimate]:
+    """What is told under the brake of a train that has gained speed, so many of its four axles spinning by 1 to 9 %.
+
+    Then all roll. Where it is `dark` the last position is that before the brake.
+    """
+    config = Config(method="bank")
+    rng, state, place, speed, told = np.random.default_rng(seed), init(config, 1), 0.0, 15.0, list[Estimate]()
+    spins = np.zeros(4)
+    for tick in range(round(10.0 * (ROLLS_S + SPINS_S + BRAKED_S))):
+        time, t_ns = 0.1 * tick, S + tick * S // 10
+        gains, braked = ROLLS_S < time < ROLLS_S + SPINS_S, time > ROLLS_S + SPINS_S
+        spins[:driven] = np.clip(spins[:driven] + 0.015 * rng.standard_normal(driven), 0.01, 0.09) * gains
+        rims = speed * (1.0 + spins) * (1.0 + 5e-4 * rng.standard_normal(4))
+        wheels = (WheelSample(t_ns, tuple((rims / config.train.wheel_radius_m).tolist())),)
+        heard = PressureSample(t_ns, 0.45 * FULL_PA * braked)
+        seen, variance_m2 = place + 0.3 * float(rng.standard_normal()), np.inf if braked and dark else 1.0
+        measured = Measurement(t_ns, seen, variance_m2, heard.pressure_pa, wheels=wheels, pressures=(heard,))
+        state, estimate = step(config, state, measured)
+        if estimate is not None and time > ROLLS_S + SPINS_S + 2.0:
+            told.append(estimate)
+        used = config.train.specific_brake(heard.pressure_pa) + float(config.train.specific_resistance(speed))
+        place, speed = place + 0.1 * speed, speed + 0.1 * (gained_mps2 * gains - 9.8 * used * braked)
+    return told
+
+
+@pytest.mark.parametrize(("gained_mps2", "driven"), [(0.25, 2), (0.08, 2), (0.25, 3)])
+@pytest.mark.parametrize("dark", [False, True])
+def test_axles_that_spun_do_not_slide_when_they_roll_again(gained_mps2: float, driven: int, *, dark: bool) -> None:
+    """Radii were learnt too small by what they spun: the rail was told to limit throughout the next braking."""
+    told = [each.regime for seed in range(4) for each in departed(seed, gained_mps2, driven, dark=dark)]
+    assert len(told) > 50
+    assert np.mean([each is Regime.ADHESION_LIMITED for each in told]) < 0.02
