@@ -102,7 +102,7 @@ def _is_pulled(config: Config, bank: Bank) -> bool:
 def _all_stand(config: Config, sample: WheelSample) -> bool:
     """Whether no wheel that is heard turns: that says the same of a train that runs back."""
     rims = [each * config.train.wheel_radius_m for each in sample.known_radps]
-    return bool(rims) and max(rims) < SLOW_MPS
+    return bool(rims) and max(map(abs, rims)) < SLOW_MPS
 
 
 def _is_slowed(config: Config, memory: Memory) -> bool:

@@ -18,6 +18,7 @@ from adhesion_node.core.belief.regime import Regime
 from adhesion_node.core.config import Config
 from adhesion_node.core.estimate import Estimate
 from adhesion_node.core.estimator import init, step
+from adhesion_node.core.intake.outcome import Outcome
 from adhesion_node.core.intake.samples import Measurement, PressureSample, WheelSample
 
 ROLLS_S, SPINS_S, BRAKED_S = 20.0, 60.0, 10.0
@@ -55,3 +56,18 @@ def test_axles_that_spun_do_not_slide_when_they_roll_again(gained_mps2: float, d
     told = [each.regime for seed in range(4) for each in departed(seed, gained_mps2, driven, dark=dark)]
     assert len(told) > 50
     assert np.mean([each is Regime.ADHESION_LIMITED for each in told]) < 0.02
+
+
+def test_wheels_that_count_backwards_tell_nothing_of_a_train_that_is_pulled() -> None:
+    """None of them turned with the others, and the train was met anew at each sample."""
+    config, speed, place = Config(method="bank"), 15.0, 0.0
+    rng, state = np.random.default_rng(1), init(config, 1)
+    for tick in range(400):
+        t_ns = S + tick * S // 10
+        wheels = (WheelSample(t_ns, (-speed / config.train.wheel_radius_m,) * 4),)
+        seen = place + 0.3 * float(rng.standard_normal())
+        measured = Measurement(t_ns, seen, 1.0, 0.0, wheels=wheels, pressures=(PressureSample(t_ns, 0.0),))
+        state, _ = step(config, state, measured)
+        place, speed = place + 0.1 * speed, speed + 0.06 * (tick > 250)
+    assert state.counts[Outcome.RESET] == 0
+    assert abs(state.followed_mps - speed) < 1.0

@@ -15,7 +15,10 @@ import pytest
 from banks import FULL_PA, S
 
 from adhesion_node import Config, Pipeline
-from adhesion_node.core import PositionSample, PressureSample, Sample, WheelSample
+from adhesion_node.core import Measurement, PositionSample, PressureSample, Sample, WheelSample
+from adhesion_node.core.bank.following import met
+from adhesion_node.core.bank.layout import SPEED
+from adhesion_node.core.bank.rims import with_wheels
 from adhesion_node.core.physics.train import Array
 
 LOST_S, STANDS_S, AWAY_S = 1.0, 4.0, 18.0
@@ -58,3 +61,12 @@ def test_a_train_that_stops_as_satellites_are_lost_does_not_run_back(*, gauge: b
     assert np.max(np.abs(off[0] / off[1])) < 4.0
     if wheels:
         assert np.max(np.abs(off[0])) < 3.0
+
+
+@pytest.mark.parametrize("rim_mps", [-10.0, 10.0])
+def test_wheels_that_turn_are_left_out_where_a_train_runs_back_however_they_count(rim_mps: float) -> None:
+    config = Config(method="bank")
+    memory = met(config, Measurement(S, 0.0, 1.0))
+    memory = memory._replace(bank=memory.bank.with_fresh(SPEED, -10.0, 0.5))
+    wheels = (WheelSample(S, (rim_mps / config.train.wheel_radius_m,) * 4),)
+    assert with_wheels(config, memory, Measurement(S, 0.0, 1.0, wheels=wheels)) is memory

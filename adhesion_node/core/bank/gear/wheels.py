@@ -184,9 +184,10 @@ class WheelsSeen(NamedTuple):
         """Speed of a rim while no brake is applied: the middle one, as some may be dead; NaN: none is heard.
 
         While a train is `pulled` driven axles may spin, half of all or more: the slowest that turns with the others.
+        Wheels of a train that is turned round may count backwards: those tell nothing.
         """
         middle = median(rims) if rims else math.nan
-        return min(rim for rim in rims if rim >= TURNS * middle) if pulled and rims else middle
+        return min(rim for rim in rims if rim >= TURNS * middle) if pulled and middle > 0.0 else middle
 
     def fastest(self, rims: list[float]) -> float:
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
