@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -32,16 +33,21 @@ def ridden(
     speed_mps: float = 20.0,
     seed: int = 1,
     every: int = 1,
+    stuck_s: float = math.inf,
 ) -> list[tuple[State, Estimate]]:
-    """What is told of a train that gains `net` m/s^2 beside its resistance, with a gauge that shows `off_pa` more."""
-    rng, state, place, told = np.random.default_rng(seed), init(config, 1), 0.0, list[tuple[State, Estimate]]()
+    """What is told of a train that gains `net` m/s^2 beside its resistance, with a gauge that shows `off_pa` more.
+
+    From `stuck_s` on its positions stay as they are.
+    """
+    rng, state, told = np.random.default_rng(seed), init(config, 1), list[tuple[State, Estimate]]()
+    place, seen = 0.0, 0.0
     for tick in range(round(HZ * seconds)):
         time, t_ns = tick / HZ, S + tick * S // HZ
         shown_pa = max(pressure(time) + off_pa + 1e3 * float(rng.standard_normal()), 0.0)
         state, estimate = step(config, state, PressureSample(t_ns, shown_pa))
         estimates = [estimate]
         if tick % every == 0:
-            seen = place + 0.3 * float(rng.standard_normal())
+            seen = place + 0.3 * float(rng.standard_normal()) if time < stuck_s else seen
             state, estimate = step(config, state, PositionSample(t_ns, seen, 0.25))
             estimates.append(estimate)
         told += [(state, estimate) for estimate in estimates if estimate is not None]
@@ -117,6 +123,13 @@ def test_the_train_is_met_anew_once() -> None:
 def test_what_is_shown_while_another_brake_slows_the_train_is_no_zero(decel_mps2: float) -> None:
     """Cylinders may press a little beside an electric brake."""
     assert off_pa(ridden(Config(), 30.0, lambda _: 15e3, lambda _: -decel_mps2, speed_mps=30.0)) == 0.0
+
+
+@pytest.mark.parametrize("method", ["bank", "rail_condition", "particle_em"])
+def test_nor_is_it_one_while_nothing_tells_how_fast_the_train_is(method: str) -> None:
+    """Its positions are stuck: the speed of before seemed to be held."""
+    told = ridden(Config(method=method), 40.0, lambda _: 20e3, lambda _: -0.5, speed_mps=30.0, stuck_s=6.0)
+    assert off_pa(told) == 0.0
 
 
 def test_a_brake_on_a_descent_is_no_zero_once_it_was_released() -> None:

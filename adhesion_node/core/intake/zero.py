@@ -106,4 +106,4 @@ def _runs(level: Level, known: Motion) -> bool:
     """Whether the train has run over the time of a level, and surely not slowed down as under a brake."""
     before = level.known
     lost_mps = abs(before.speed_mps) - abs(known.speed_mps) + before.speed_std_mps + known.speed_std_mps
-    return abs(known.speed_mps) > RUNS_MPS and lost_mps < SLOWED_MPS2 * level.held_ns / S
+    return abs(known.speed_mps) > RUNS_MPS and lost_mps < SLOWED_MPS2 * (known.t_ns - before.t_ns) / S
