@@ -113,6 +113,17 @@ def test_no_result_takes_the_place_of_a_file_that_the_parameters_name(
     assert Path("named").read_text() == "read"
 
 
+def test_another_value_may_be_the_name_of_a_result(
+    tmp_path: Path, bag: Path, offline: Offline, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was said to be read."""
+    monkeypatch.chdir(tmp_path)
+    Path("bank").write_text("of an earlier call")
+    Path("params.yaml").write_text("estimator:\n  ros__parameters:\n    method: bank\n")
+    _, _, _, err = offline(bag, "--params", "params.yaml", "--json", "bank", fast=False)
+    assert not any("would be lost" in line for line in err)
+
+
 def test_other_nodes_in_the_parameter_file_are_left_alone(tmp_path: Path, bag: Path, offline: Offline) -> None:
     file = tmp_path / "params.yaml"
     file.write_text(PARAMS.format(name="estimator") + "simulator:\n  ros__parameters:\n    scenario: cruise\n")

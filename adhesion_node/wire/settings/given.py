@@ -18,7 +18,10 @@ from ...command.options import written_by
 from ...command.written import require_apart
 from ...core.setting import Setting
 from ..files import parameters
-from .nodes import SETTINGS, TRAIN_FILE
+from .nodes import RAIL_MAP, SETTINGS, TRACK_LINE, TRAIN_FILE
+
+FILES = (TRAIN_FILE, TRACK_LINE, RAIL_MAP)
+"""Settings whose values name files."""
 
 
 def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -> dict[str, Any]:
@@ -29,7 +32,7 @@ def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -
     if not options.params:
         refuse(options, ["node"], "says whose of --params: add that, or leave this out")
     values = parameters.read(options.params, options.node or node) if options.params else {}
-    require_apart(written_by(options), map(str, values.values()))  # a train, a track, a rail by the name of its file
+    require_apart(written_by(options), [str(values[each.name]) for each in FILES if each.name in values])
     if options.train:
         values |= {TRAIN_FILE.name: options.train}
     return values | dict(parse_setting(text, settings) for text in options.set)
