@@ -24,6 +24,10 @@ from .layout import MU, ROUGH, SIZE, SPEED, Bank, joined
 CALMED_S, STIRRED_S = 10.0, 300.0
 """In such times traction that changes becomes steady, and steady one begins to change."""
 
+BACK_MPS = 0.3
+"""Speed from which a train runs back, to within its standard deviation: it is left to its other sensors, as wheels that
+turn tell no direction. Where there are none it is soon known too badly for that."""
+
 
 def closed(bank: Bank) -> Bank:
     """A braking ends: what it taught of train and sensors stays, traction is unknown."""
@@ -31,14 +35,22 @@ def closed(bank: Bank) -> Bank:
 
 
 def held(bank: Bank) -> Bank:
-    """While a brake is pressed that has stopped the train: none drives it back, so what slowed it down has ended."""
+    """While a brake is pressed that has stopped the train: none drives it back, so what slowed it down has ended.
+
+    Unless it surely runs back: then a grade or traction does it.
+    """
     back = (bank.mean[:, SPEED] < 0.0) & (bank.mean[:, MU] > 0.0)
-    if not back.any():
+    if not back.any() or runs_back(bank):
         return bank
     ended = bank.with_fresh(MU, 0.0, FREE_STD)
     mean, covariance = bank.mean.copy(), bank.covariance.copy()
     mean[back], covariance[back] = ended.mean[back], ended.covariance[back]
     return bank._replace(mean=mean, covariance=covariance)
+
+
+def runs_back(bank: Bank) -> bool:
+    """Whether the train surely runs back."""
+    return bank.mean_of(SPEED) + bank.std_of(SPEED) < -BACK_MPS
 
 
 def by_noise(bank: Bank) -> Bank:

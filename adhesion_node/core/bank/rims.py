@@ -18,6 +18,7 @@ import numpy as np
 
 from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement, WheelSample
+from .free import runs_back
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import MU, RADIUS, SPEED, Bank
@@ -48,10 +49,6 @@ FEW = 6
 MANY = 3.0
 """Standard deviations of its speed by which a train surely runs."""
 
-BACK_MPS = 0.3
-"""Speed from which a train that runs back, to within its standard deviation, is left to its other sensors: wheels that
-turn tell no direction. Where there are none it is soon known too badly for that."""
-
 PULLED = 0.004
 """Traction over the train's weight, beyond what holds its speed on the level, from which driven axles may spin."""
 
@@ -67,7 +64,7 @@ UNSEEN = 1e12
 
 def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Memory:
     """Take in what the wheels told since the measurement before: which axles slide, and how fast the train is."""
-    back = memory.bank.mean_of(SPEED) + memory.bank.std_of(SPEED) < -BACK_MPS
+    back = runs_back(memory.bank)
     if not measurement.wheels or (back and not _all_stand(config, measurement.wheels[-1])):
         return memory
     pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)

@@ -70,3 +70,23 @@ def test_wheels_that_turn_are_left_out_where_a_train_runs_back_however_they_coun
     memory = memory._replace(bank=memory.bank.with_fresh(SPEED, -10.0, 0.5))
     wheels = (WheelSample(S, (rim_mps / config.train.wheel_radius_m,) * 4),)
     assert with_wheels(config, memory, Measurement(S, 0.0, 1.0, wheels=wheels)) is memory
+
+
+@pytest.mark.parametrize("wheels", [False, True])
+def test_a_train_that_is_seen_to_run_back_under_too_weak_a_brake_does(wheels: bool) -> None:
+    """Of this its wheels, which tell no direction, were believed behind the last position: it ran at +2 m/s."""
+    rng, pipeline, rows = np.random.default_rng(1), Pipeline(Config(method="bank"), 1), list[tuple[float, float]]()
+    place, speed = 0.0, 0.0
+    for tick in range(350):
+        time, t_ns = 0.1 * tick, S + tick * S // 10
+        samples: list[Sample] = [PressureSample(t_ns, 60e3)]
+        if wheels:
+            samples.append(WheelSample(t_ns, (abs(speed) / 0.46,) * 4))
+        if time < 25.0:
+            samples.append(PositionSample(t_ns, place + 0.3 * float(rng.standard_normal()), 0.09))
+        told = [each.estimate for sample in samples for each in pipeline.push(sample)]
+        rows += [(each.speed_mps - speed, each.speed_std_mps) for each in told if time > 15.0]
+        place, speed = place + 0.1 * speed, speed - 0.015 * (time > 12.0)
+    off, std = np.array(rows).T
+    assert np.max(np.abs(off)) < 1.5
+    assert np.max(np.abs(off / std)) < 4.0
