@@ -183,11 +183,14 @@ class WheelsSeen(NamedTuple):
     def rolling(self, rims: list[float], pulled: bool) -> float:
         """Speed of a rim while no brake is applied: the middle one, as some may be dead; NaN: none is heard.
 
-        While a train is `pulled` driven axles may spin, half of all or more: the slowest that turns with the others.
-        Wheels of a train that is turned round may count backwards: those tell nothing.
+        While a train is `pulled` driven axles may spin, half of all or more: the slowest that turns with the others,
+        but none that is slower than all of them, as it may drag, or lose pulses. Such as count backwards tell nothing.
         """
         middle = median(rims) if rims else math.nan
-        return min(rim for rim in rims if rim >= TURNS * middle) if pulled and middle > 0.0 else middle
+        if not (pulled and middle > 0.0):
+            return middle
+        slowest, *others = sorted(rim for rim in rims if rim >= TURNS * middle)
+        return others[0] if len(others) > 1 and slowest < (1.0 - UNEQUAL) * others[0] else slowest
 
     def fastest(self, rims: list[float]) -> float:
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
