@@ -126,7 +126,7 @@ def _compute_all(missing: Sequence[Task], where: Running) -> None:
     workers = min(where.workers, len(missing))
     engine = engines.cluster(where.scheduler) if where.scheduler else engines.processes(workers)
     # a signal is noted, not raised anywhere: within a lock of the executor it would be lost, or hold the lock
-    with stop_on_signals() as stop, engine as executor:
+    with stop_on_signals(leaving=False) as stop, engine as executor:
         futures = {executor.submit(_compute, task, file_name(task)): task for task in missing}
         started, finished, total = time.monotonic(), 0.0, sum(task.weight for task in missing)
         due = started + PROGRESS_S

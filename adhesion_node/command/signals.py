@@ -65,11 +65,11 @@ def interrupted_by_sigterm() -> Iterator[None]:
 
 
 @contextmanager
-def stop_on_signals() -> Iterator[StopRequest]:
+def stop_on_signals(*, leaving: bool = True) -> Iterator[StopRequest]:
     """Turn SIGINT and SIGTERM into a request to stop; call it in the main thread. Inside another one it is that one's.
 
-    After a signal both stay ignored for good: the program is on its way out, and a second signal must not cut
-    its exit short. Without one the earlier handlers return.
+    After a signal both stay ignored for good where the program is then `leaving`: a second signal must not cut its exit
+    short. Else, and without one, the earlier handlers return.
     """
     if _watching:
         yield _watching[0]
@@ -90,5 +90,5 @@ def stop_on_signals() -> Iterator[StopRequest]:
         # Blocked meanwhile: a signal between two of these lines would be reported as lost in a race.
         signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
         for number, handler in earlier.items():
-            signal.signal(number, signal.SIG_IGN if stop.requested else handler)
+            signal.signal(number, signal.SIG_IGN if stop.requested and leaving else handler)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)

@@ -18,6 +18,8 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
+from adhesion_node.command.signals import stop_on_signals
+
 INTERRUPTED = """
 import signal, sys
 from adhesion_node import main
@@ -62,6 +64,15 @@ def test_a_signal_leaves_no_unfinished_file(number: int, code: int, tmp_path: Pa
     ended = subprocess.run(call, capture_output=True, text=True, timeout=60.0, cwd=ROOT, check=False)
     assert (ended.returncode, ended.stdout, ended.stderr) == (code, "", "tool: interrupted\n")
     assert list(tmp_path.iterdir()) == []
+
+
+def test_behind_a_study_that_was_interrupted_signals_are_what_they_were() -> None:
+    """Of a program that goes on, as a notebook does, they would be ignored for good."""
+    before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+    with stop_on_signals(leaving=False) as stop:
+        signal.raise_signal(signal.SIGINT)
+    assert stop.requested
+    assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
 
 
 @pytest.mark.parametrize(
