@@ -8,7 +8,7 @@
 
 """Writes the generated parts of the documentation: tables of parameters, topics and faults, and of what was measured.
 
-    python doc/generate.py                    # every part, between its marks in doc/*.md
+    python doc/generate.py                    # every part, between its marks in README.md and doc/*.md
     python doc/generate.py --check            # name the pages that would change; exit code 1 where one would
     python doc/generate.py --measure robust   # run that study again first
 
@@ -29,6 +29,7 @@ import evidence_tables
 import interface_tables
 
 PAGES = Path(__file__).resolve().parent
+README = PAGES.parent / "README.md"
 PART = re.compile(r"(?<=<!-- generated: )(?P<name>.+?) -->\n.*?(?=<!-- end -->)", re.DOTALL)
 
 
@@ -40,7 +41,7 @@ def written(text: str, parts: Mapping[str, str]) -> str:
 def changed() -> Iterator[tuple[Path, str]]:
     """Yield the pages that are not as they should be, with what they should be."""
     parts = {**interface_tables.parts(), **bank_tables.parts(), **evidence_tables.parts()}
-    for page in sorted(PAGES.glob("*.md")):
+    for page in (README, *sorted(PAGES.glob("*.md"))):
         text = page.read_text(encoding="utf-8")
         wanted = written(text, parts)
         if wanted != text:

@@ -91,14 +91,19 @@ def test_what_is_generated_is_what_is_committed() -> None:
     assert checked.returncode == 0, f"{checked.stdout}{checked.stderr}run python doc/generate.py"
 
 
-def test_a_page_with_another_number_is_found(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("name", "written"),
+    [("README.md", "| bank, the default | 0."), ("doc/parameters.md", "| `train.mass_kg` | 5")],
+)
+def test_a_page_with_another_number_is_found(tmp_path: Path, name: str, written: str) -> None:
     shutil.copytree(DOC, tmp_path / "doc")
-    page = tmp_path / "doc" / "parameters.md"
-    changed = text_of(page).replace("| `train.mass_kg` | 536000 |", "| `train.mass_kg` | 400000 |")
+    shutil.copy(ROOT / "README.md", tmp_path)
+    page = tmp_path / name
+    changed = text_of(page).replace(written, f"{written}9")
     assert changed != text_of(page)
     page.write_text(changed, encoding="utf-8")
     checked = check(tmp_path / "doc")
-    assert (checked.returncode, checked.stdout.split(":")[0]) == (1, "parameters.md")
+    assert (checked.returncode, checked.stdout.split(":")[0]) == (1, page.name)
 
 
 def test_the_tests_that_pages_name_are_there() -> None:
