@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -52,31 +53,53 @@ def _used(folder: Path, before: str = "") -> None:
     assert float(shown.stdout) == pytest.approx(-1.3862943611)
 
 
-def test_what_is_compiled_is_kept_in_the_cache_that_is_named(tmp_path: Path) -> None:
-    _used(tmp_path)
-    assert {path.name.partition("-")[0] for path in tmp_path.rglob("*.nbi")} >= {"weighing.normalised"}
+@pytest.fixture(scope="module")
+def once(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What one use keeps: to compile takes longer than to copy."""
+    folder = tmp_path_factory.mktemp("kept")
+    _used(folder)
+    return folder
 
 
-@pytest.mark.parametrize(("ending", "kept"), [("nbi", b""), ("nbi", bytes(500)), ("nbc", b""), ("nbc", bytes(500))])
-def test_files_that_a_power_cut_has_left_are_written_anew(tmp_path: Path, ending: str, kept: bytes) -> None:
+@pytest.fixture
+def kept(once: Path, tmp_path: Path) -> Path:
+    """A copy of it that a test may spoil."""
+    return shutil.copytree(once, tmp_path / "kept")
+
+
+def _files(folder: Path) -> dict[Path, tuple[int, bytes]]:
+    return {file: (file.stat().st_mtime_ns, file.read_bytes()) for file in folder.rglob("*.nb?")}
+
+
+def test_what_is_compiled_is_kept_in_the_cache_that_is_named(kept: Path) -> None:
+    assert {path.name.partition("-")[0] for path in kept.rglob("*.nbi")} >= {"weighing.normalised"}
+
+
+def test_what_is_kept_is_used_and_left_as_it_is(kept: Path) -> None:
+    """A copy, too: else a test that spoils one would see it written anew whatever it has spoilt."""
+    before = _files(kept)
+    _used(kept)
+    assert _files(kept) == before
+
+
+@pytest.mark.parametrize(("ending", "left"), [("nbi", b""), ("nbi", bytes(500)), ("nbc", b""), ("nbc", bytes(500))])
+def test_files_that_a_power_cut_has_left_are_written_anew(kept: Path, ending: str, left: bytes) -> None:
     """They ended every later start."""
-    _used(tmp_path)
-    cut = list(tmp_path.rglob(f"*.{ending}"))
+    cut = list(kept.rglob(f"*.{ending}"))
     for file in cut:
-        file.write_bytes(kept)
-    _used(tmp_path)
+        file.write_bytes(left)
+    _used(kept)
     assert cut
-    assert not [file for file in cut if file.read_bytes() == kept]
+    assert not [file for file in cut if file.read_bytes() == left]
 
 
-def test_code_of_which_a_part_is_lost_is_compiled_anew(tmp_path: Path) -> None:
+def test_code_of_which_a_part_is_lost_is_compiled_anew(kept: Path) -> None:
     """A block of zeros in its midst: it was run."""
-    _used(tmp_path)
-    for file in tmp_path.rglob("*.nbc"):
+    for file in kept.rglob("*.nbc"):
         content = bytearray(file.read_bytes())
         content[len(content) // 3 : len(content) // 3 + 2000] = bytes(2000)
         file.write_bytes(content)
-    _used(tmp_path)
+    _used(kept)
 
 
 def test_a_kernel_works_where_the_disk_is_full(tmp_path: Path) -> None:
