@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -59,20 +60,21 @@ def test_wheels_in_another_unit_are_left_out_and_told(ratio: float, method: str)
 
 
 @pytest.mark.parametrize(
-    "state",
+    "run",
     [
-        coasted(1.0),
-        coasted(0.8),
-        coasted(1.3),
-        coasted(0.5, pressure_pa=100e3),
-        coasted(0.5, pressure_pa=None),
-        coasted(0.5, mps=10.0),
-        coasted(0.5, seconds=5.0),
-        coasted(1.0, placed=lambda index: index % 10 == 0),
+        partial(coasted, 1.0),
+        partial(coasted, 0.8),
+        partial(coasted, 1.3),
+        partial(coasted, 0.5, pressure_pa=100e3),
+        partial(coasted, 0.5, pressure_pa=None),
+        partial(coasted, 0.5, mps=10.0),
+        partial(coasted, 0.5, seconds=5.0),
+        partial(coasted, 1.0, placed=lambda index: index % 10 == 0),
     ],
     ids=["right", "small", "large", "braked", "untold", "slow", "short", "1 Hz"],
 )
-def test_wheels_that_may_slide_or_are_hardly_known_are_used(state: State) -> None:
+def test_wheels_that_may_slide_or_are_hardly_known_are_used(run: Callable[[], State]) -> None:
+    state = run()  # by the test: what stands among its parameters every worker runs
     assert state.counts[Outcome.WHEEL_UNIT] == state.counts[Outcome.RESET] == 0
 
 
