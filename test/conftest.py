@@ -32,6 +32,9 @@ import pytest
 
 from adhesion_node.command.without_ros import REMEDY, is_of_ros
 
+# Before numpy is loaded, which looks once: the matrices are small, and a second thread costs far more than it brings.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 try:
     import hypothesis
     import rclpy
@@ -81,7 +84,6 @@ def pytest_configure(config: pytest.Config) -> None:
     worker = os.environ.get("PYTEST_XDIST_WORKER", "gw0").removeprefix("gw")
     os.environ["ROS_DOMAIN_ID"] = str(_claim_domain(29 * int(worker)))  # the blocks of workers lie far apart
     os.environ["ROS_AUTOMATIC_DISCOVERY_RANGE"] = "LOCALHOST"
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # the matrices are small, and the cores are taken by the workers
     os.environ["ROS_HOME"] = home
     set_hypothesis_home_dir(os.path.join(home, "hypothesis"))
     os.environ["ROS_LOG_DIR"] = os.path.join(home, "log")
