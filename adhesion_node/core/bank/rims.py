@@ -70,7 +70,9 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
     pressed = pressed or _is_slowed(config, memory)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
-    pulled = not pressed and _is_pulled(config, memory.bank)
+    pulled = _is_pulled(config, memory.bank)
+    wheels = wheels._replace(pulled_ns=memory.t_ns) if pulled else wheels
+    pulled = pulled and not pressed
     rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
@@ -86,7 +88,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
         return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
     memory, rolls = _unbraked(config, memory, rims, newest.t_ns), wheels.rolling(rims, pulled)
     if rolls > LEARNING_MPS:
-        return _rolling(memory, rolls, pressed)
+        return _spinning(memory, rolls, len(rims)) if pulled and MANY * std < rim else _rolling(memory, rolls, pressed)
     dark = memory.asks and not measurement.has_position and rims
     return _slow(memory, max(rims) if pressed else rolls, back) if dark else memory
 
@@ -112,7 +114,8 @@ def _is_slowed(config: Config, memory: Memory) -> bool:
 def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
     """No braking is open: the fastest rim will not be believed before all might have slid, radii are what they were."""
     learnt, trusted_ns = memory.wheels.is_learnt, memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
-    wheels = memory.wheels.beside(median(rims), t_ns) if rims and learnt else memory.wheels
+    sure = rims and learnt and not memory.wheels.may_spin(t_ns)  # a spin that ends is no slide that begins
+    wheels = memory.wheels.beside(median(rims), t_ns) if sure else memory.wheels
     return memory._replace(
         bank=as_rolled(memory.bank, memory.wheels.wander.rolled),
         wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander()),
@@ -130,19 +133,31 @@ def _rolling(memory: Memory, rim_mps: float, pressed: bool) -> Memory:
     return memory._replace(bank=bank.normalised(), fixes=memory.fixes + 1)
 
 
+def _spinning(memory: Memory, rim_mps: float, count: int) -> Memory:
+    """Take in how fast the slowest of so many rims is while the train is pulled: as the train, or it spins, too.
+
+    Of radii that tells nothing.
+    """
+    if not memory.wheels.is_learnt:
+        return memory
+    bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, _slides(0.0, count)).normalised()
+    return memory._replace(bank=_of_radii_nothing(memory.bank, bank), fixes=memory.fixes + 1)
+
+
 def _slow(memory: Memory, rim_mps: float, back: bool) -> Memory:
     """Take in how slow a rim is: as the train, or it is locked, or dead. Unless it runs back the train is no slower.
 
-    Of radii that tells nothing (they are considered, not estimated: Schmidt 1966).
+    Of radii that tells nothing.
     """
-    before = memory.bank
-    bank = before if back else not_slower(before, rim_mps, SLOW_MPS)
-    bank = as_fast(bank, rim_mps, SLOW_MPS).normalised()
-    bank.mean[:, RADIUS], bank.covariance[:, RADIUS, RADIUS] = (
-        before.mean[:, RADIUS],
-        before.covariance[:, RADIUS, RADIUS],
-    )
-    return memory._replace(bank=bank)
+    bank = memory.bank if back else not_slower(memory.bank, rim_mps, SLOW_MPS)
+    return memory._replace(bank=_of_radii_nothing(memory.bank, as_fast(bank, rim_mps, SLOW_MPS).normalised()))
+
+
+def _of_radii_nothing(before: Bank, bank: Bank) -> Bank:
+    """The bank with radii as they were known before: they are considered, not estimated (Schmidt 1966)."""
+    variance = before.covariance[:, RADIUS, RADIUS]
+    bank.mean[:, RADIUS], bank.covariance[:, RADIUS, RADIUS] = before.mean[:, RADIUS], variance
+    return bank
 
 
 def _telling(memory: Memory) -> Memory:

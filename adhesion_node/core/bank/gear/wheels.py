@@ -75,6 +75,9 @@ FALL_NS, FALL_SIGMA, FELL_NS, UNTOLD_NS = 2 * S // 5, 2.5, S, 120 * S
 train, by so many standard deviations of its noise, all axles slide. They count so for the next time; where no pressure
 tells of a brake, for the last one."""
 
+SPUN_NS = 3 * S
+"""For so long behind traction axles that have spun may spin still."""
+
 AGREE_NS, FEWEST = 2 * S, 3
 """Rims, so many or more, that are as fast as each other and as the train for so long roll: those that slide are not."""
 
@@ -123,6 +126,8 @@ class WheelsSeen(NamedTuple):
     """... and how fast at most in this braking, to within `DEEPER`."""
     agree_ns: int | None = None
     """Since when all of them are as fast as each other, and as the train."""
+    pulled_ns: int | None = None
+    """When the train was last pulled."""
 
     def after(
         self, config: Config, sample: WheelSample, speed_mps: float, std_mps: float, braked: bool, pulled: bool = False
@@ -224,6 +229,10 @@ class WheelsSeen(NamedTuple):
             return self._replace(agree_ns=None)
         agreeing = self._replace(agree_ns=t_ns if self.agree_ns is None else self.agree_ns)
         return agreeing._replace(fell_ns=None) if agreeing.agree(t_ns) else agreeing
+
+    def may_spin(self, now_ns: int) -> bool:
+        """Whether driven axles may spin, as the train was pulled of late."""
+        return self.pulled_ns is not None and now_ns - self.pulled_ns < SPUN_NS
 
     def agree(self, now_ns: int) -> bool:
         """Whether all of them roll, as they have agreed for long enough."""
