@@ -18,13 +18,16 @@ import numpy as np
 
 from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement, WheelSample
+from ..physics.train import GRAVITY
 from .free import runs_back
+from .gear.together import Together
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
 from .layout import MU, RADIUS, SPEED, Bank
 from .memory import Memory, S
 from .motion import SLOWED, slowing
 from .seeing import CLIPPED, corrected, fall_seen, speed_seen
+from .stopping import asked, standing
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -118,7 +121,9 @@ def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> M
     wheels = memory.wheels.beside(median(rims), t_ns) if sure else memory.wheels
     return memory._replace(
         bank=as_rolled(memory.bank, memory.wheels.wander.rolled),
-        wheels=wheels._replace(trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander()),
+        wheels=wheels._replace(
+            trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander(), together=Together()
+        ),
     )
 
 
@@ -170,8 +175,13 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
     """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
     bank = memory.bank
     rim_mps = memory.wheels.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
+    together = memory.wheels.together.after(rims, t_ns, asked(config, memory))
+    memory = memory._replace(wheels=memory.wheels._replace(together=together))
+    if together.stand(GRAVITY * config.train.full_brake):
+        return standing(memory)
     if rim_mps <= config.slowest_mps:
         return memory
+    bank = rolling(bank, rim_mps).normalised() if together.roll else bank
     bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
     if wheels.fall_mps2 > memory.wheels.fall_mps2:
         bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)

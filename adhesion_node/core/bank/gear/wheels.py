@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...intake.plausibility import STRONGEST_MPS2
 from ...intake.samples import WheelSample
 from .seldom import apart_ns, at_least
+from .together import Together
 from .wander import Wander
 
 if TYPE_CHECKING:
@@ -124,6 +125,8 @@ class WheelsSeen(NamedTuple):
     """... when it last fell faster than a train can, ..."""
     fall_mps2: float = 0.0
     """... and how fast at most in this braking, to within `DEEPER`."""
+    together: Together = Together()
+    """How they slow down under the brake."""
     agree_ns: int | None = None
     """Since when all of them are as fast as each other, and as the train."""
     pulled_ns: int | None = None
