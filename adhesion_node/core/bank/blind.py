@@ -31,6 +31,9 @@ REACH = 2.5
 STANDS_MPS = 0.1
 """A brake drives no train backwards: one that is foreseen to be slower stands."""
 
+LEAST_STD = 1e-3
+"""What a brake does is known no better, over g."""
+
 
 def misled(config: Config, memory: Memory) -> Memory:
     """The positions were those of a sliding wheel: go back to before, and on without them, whatever the brake does."""
@@ -51,11 +54,15 @@ def led_again(memory: Memory) -> Memory:
 
 
 def forwards(bank: Bank) -> Bank:
-    """With no speed below a standstill: where that is foreseen the train stands, and may still be as fast as before."""
+    """With no speed below a standstill, and no brake that drives the train on, as wheels that roll again make it seem.
+
+    Where either is foreseen the train stands, or nothing slows it; what it may be beyond stays as it was.
+    """
     mean, covariance = bank.mean.copy(), bank.covariance.copy()
-    std, below = np.sqrt(covariance[:, SPEED, SPEED]), np.maximum(STANDS_MPS - mean[:, SPEED], 0.0)
-    narrower = np.maximum(1.0 - below / (REACH * np.maximum(std, STANDS_MPS)), 0.0)
-    mean[:, SPEED] += below
-    covariance[:, SPEED, :] *= narrower[:, None]
-    covariance[:, :, SPEED] *= narrower[:, None]
+    for part, floor, least_std in ((SPEED, STANDS_MPS, STANDS_MPS), (MU, 0.0, LEAST_STD)):
+        std, below = np.sqrt(covariance[:, part, part]), np.maximum(floor - mean[:, part], 0.0)
+        narrower = np.maximum(1.0 - below / (REACH * np.maximum(std, least_std)), 0.0)
+        mean[:, part] += below
+        covariance[:, part, :] *= narrower[:, None]
+        covariance[:, :, part] *= narrower[:, None]
     return bank._replace(mean=mean, covariance=covariance)

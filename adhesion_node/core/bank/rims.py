@@ -89,6 +89,8 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
+    if memory.misled and len(rims) >= FEW:  # the positions are none of these axles', which all roll
+        pressed = pressed and not wheels.all_roll(newest.t_ns)
     memory, rolls = _unbraked(config, memory, rims, newest.t_ns), wheels.rolling(rims, pulled)
     if rolls > LEARNING_MPS:
         return _spinning(memory, rolls, len(rims)) if pulled and MANY * std < rim else _rolling(memory, rolls, pressed)
@@ -145,7 +147,7 @@ def _spinning(memory: Memory, rim_mps: float, count: int) -> Memory:
     """
     if not memory.wheels.is_learnt:
         return memory
-    bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, _slides(0.0, count)).normalised()
+    bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, _slides(0.0, count, False)).normalised()
     return memory._replace(bank=_of_radii_nothing(memory.bank, bank), fixes=memory.fixes + 1)
 
 
@@ -189,14 +191,19 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
         wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
-        bank = as_fast(bank, rim_mps, errors.quick * rim_mps, _slides(memory.braking.told, len(rims)))
+        slides = _slides(memory.braking.told, len(rims), wheels.all_roll(t_ns))
+        bank = as_fast(bank, rim_mps, errors.quick * rim_mps, slides)
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
 
-def _slides(told: float, count: int) -> float:
-    """Density of what the fastest of so many rims shows where it slides, by what is told of all that are heard."""
-    return HIDDEN if told < 0.0 and count >= FEW else SLIDES * max(FEW / count, 1.0)
+def _slides(told: float, count: int, all_roll: bool) -> float:
+    """Density of what the fastest of so many rims shows where it slides, by what is told of all that are heard.
+
+    Where the speed is known too badly to tell of any, such as slide would differ.
+    """
+    roll = told < 0.0 or (told == 0.0 and all_roll)
+    return HIDDEN if roll and count >= FEW else SLIDES * max(FEW / count, 1.0)
 
 
 def rim_speed(bank: Bank) -> tuple[float, float]:

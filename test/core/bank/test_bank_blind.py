@@ -18,7 +18,7 @@ from oracles import specific_resistance
 from adhesion_node.core import Measurement, Outcome, init, predict, step
 from adhesion_node.core.bank.blind import REACH, STANDS_MPS, forwards
 from adhesion_node.core.bank.labels.kinds import STEADY
-from adhesion_node.core.bank.layout import SPEED
+from adhesion_node.core.bank.layout import MU, SPEED
 
 BRAKE_S, H = 10.0, 0.1
 
@@ -60,3 +60,13 @@ def test_no_train_is_told_to_run_backwards_and_it_may_still_be_as_fast() -> None
     fastest = [each.mean[:, SPEED] + REACH * np.sqrt(each.covariance[:, SPEED, SPEED]) for each in (bank, after)]
     np.testing.assert_allclose(fastest[1], fastest[0])
     assert (np.linalg.eigvalsh(after.covariance) > -1e-9).all()
+
+
+def test_no_brake_drives_the_train_on() -> None:
+    """Wheels that rolled again after a deep slide seemed to: a train that braked was told as ever faster, to 70 m/s."""
+    bank = bank_of([STEADY, STEADY])
+    bank.mean[:, MU] = 0.05, -0.1
+    after = forwards(bank)
+    np.testing.assert_array_equal(after.mean[:, MU], [0.05, 0.0])
+    np.testing.assert_array_equal(after.covariance[0], bank.covariance[0])
+    assert np.all(np.linalg.eigvalsh(after.covariance) > -1e-12)

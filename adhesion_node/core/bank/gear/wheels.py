@@ -202,7 +202,11 @@ class WheelsSeen(NamedTuple):
 
     def fastest(self, rims: list[float]) -> float:
         """Speed of the fastest of some rims, less by what the fastest of some is by chance."""
-        return max(rims) * (1.0 - BY_CHANCE * math.sqrt(2.0 * math.log(len(rims)) * self.noise))
+        return max(rims) * (1.0 - self._by_chance(len(rims)))
+
+    def _by_chance(self, count: int) -> float:
+        """By how much the fastest of so many is faster than their mean by chance, relative; the slowest is as slow."""
+        return BY_CHANCE * math.sqrt(2.0 * math.log(count) * self.noise)
 
     def beside(self, fastest_mps: float, now_ns: int) -> WheelsSeen:
         """Note how fast the fastest rim is under the brake; it may be trusted once it has risen, until it falls."""
@@ -228,7 +232,8 @@ class WheelsSeen(NamedTuple):
 
     def agreeing(self, rims: list[float], least_mps: float, t_ns: int) -> WheelsSeen:
         """Note whether all rims are as fast as each other, and as one that rolls is at least: then no fall counts."""
-        if len(rims) < FEWEST or min(rims) < max((1.0 - UNEQUAL) * max(rims), least_mps):
+        apart = UNEQUAL + 2.0 * self._by_chance(max(len(rims), 1))
+        if len(rims) < FEWEST or min(rims) < max((1.0 - apart) * max(rims), least_mps):
             return self._replace(agree_ns=None)
         agreeing = self._replace(agree_ns=t_ns if self.agree_ns is None else self.agree_ns)
         return agreeing._replace(fell_ns=None) if agreeing.agree(t_ns) else agreeing
@@ -240,6 +245,10 @@ class WheelsSeen(NamedTuple):
     def agree(self, now_ns: int) -> bool:
         """Whether all of them roll, as they have agreed for long enough."""
         return self.agree_ns is not None and now_ns - self.agree_ns >= AGREE_NS
+
+    def all_roll(self, now_ns: int) -> bool:
+        """Whether they agree and none has slid for long: protection may hold such as have at one creep."""
+        return self.agree(now_ns) and not any(self._seen(now_ns, UNTOLD_NS)[0])
 
     def share(self, now_ns: int, late_ns: int = SLID_NS) -> float | None:
         """Share of the axles that have slid of late, of those of which it is known; None where it is of too few."""
