@@ -91,7 +91,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
         return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
     if memory.misled and len(rims) >= FEW:  # the positions are none of these axles', which all roll
         pressed = pressed and not wheels.all_roll(newest.t_ns)
-    memory, rolls = _unbraked(config, memory, rims, newest.t_ns), wheels.rolling(rims, pulled)
+    memory, rolls = _unbraked(config, memory, rims, newest.t_ns, rim - MANY * std), wheels.rolling(rims, pulled)
     if rolls > LEARNING_MPS:
         return _spinning(memory, rolls, len(rims)) if pulled and MANY * std < rim else _rolling(memory, rolls, pressed)
     dark = memory.asks and not measurement.has_position and rims
@@ -116,10 +116,13 @@ def _is_slowed(config: Config, memory: Memory) -> bool:
     return slowed or (used > -SLOWED and memory.brake.lingers(config, memory.t_ns))
 
 
-def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
-    """No braking is open: the fastest rim will not be believed before all might have slid, radii are what they were."""
+def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, least_mps: float) -> Memory:
+    """No braking is open: the fastest rim will not be believed before all might have slid, radii are what they were.
+
+    A spin that ends leaves rims as fast as the train, by what is known of it `least_mps`; a slide that begins does not.
+    """
     learnt, trusted_ns = memory.wheels.is_learnt, memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
-    sure = rims and learnt and not memory.wheels.may_spin(t_ns)  # a spin that ends is no slide that begins
+    sure = rims and learnt and (median(rims) < least_mps or not memory.wheels.may_spin(t_ns))
     wheels = memory.wheels.beside(median(rims), t_ns) if sure else memory.wheels
     return memory._replace(
         bank=as_rolled(memory.bank, memory.wheels.wander.rolled),

@@ -39,13 +39,15 @@ def journey(
     gauge: tuple[float, float, float | None],
     seed: int = 1,
     config: Config = CONFIG,
+    gained_mps2: float = 0.0,
 ) -> tuple[Memory, float]:
-    """20 s at 40 m/s, then the full brake on a rail of 0.03, on which all axles fall to 0.7 of the train's speed.
+    """20 s up to 40 m/s at such an acceleration, then the full brake on a rail of 0.03.
 
+    All axles fall to 0.7 of the train's speed there.
     `gauge` is from when to when, behind the brake's begin, the pressure is shown as the third. The memory, and how fast
     the train is.
     """
-    rng, speed, place = np.random.default_rng(seed), 40.0, 0.0
+    rng, speed, place = np.random.default_rng(seed), 40.0 - gained_mps2 * CRUISE_S, 0.0
     memory: Memory | None = None
     begin_s, end_s, shown = gauge
     for tick in range(round(10.0 * (CRUISE_S + seconds))):
@@ -61,7 +63,7 @@ def journey(
         else:
             measured = measured._replace(speed_mps=float(rims[0]))
         memory = met(config, measured) if memory is None else followed(config, memory, measured, lambda: RAIL)
-        slowing = SLOWING * min(max(braked_s, 0.0), 1.0)
+        slowing = SLOWING * min(max(braked_s, 0.0), 1.0) - (gained_mps2 if braked_s < 0.0 else 0.0)
         place, speed = place + 0.1 * speed, speed - 0.1 * slowing
     assert memory is not None
     return memory, speed
@@ -83,9 +85,13 @@ def test_wheels_that_slide_are_not_the_speed_where_no_pressure_is_known(
     assert mean[SPEED] == pytest.approx(speed, abs=1.0)
 
 
+@pytest.mark.parametrize("gained_mps2", [0.0, 0.5])
 @pytest.mark.parametrize("seconds", [3.0, 9.0, 14.0])
-def test_wheels_that_all_fall_slide_though_an_isolated_cylinder_says_that_no_brake_is_applied(seconds: float) -> None:
-    memory, speed = journey(seconds, "wheels", (-math.inf, math.inf, 0.0))
+def test_wheels_that_all_fall_slide_though_an_isolated_cylinder_says_that_no_brake_is_applied(
+    seconds: float, gained_mps2: float
+) -> None:
+    """Out of traction, too: a slide that begins is no spin that ends."""
+    memory, speed = journey(seconds, "wheels", (-math.inf, math.inf, 0.0), gained_mps2=gained_mps2)
     assert not memory.braked
     assert memory.bank.mean_of(SPEED) == pytest.approx(speed, abs=1.0)
 

@@ -49,7 +49,9 @@ def departed(seed: int, gained_mps2: float, driven: int, *, dark: bool) -> list[
     return told
 
 
-@pytest.mark.parametrize(("gained_mps2", "driven", "share"), [(0.25, 2, 0.02), (0.08, 2, 0.2), (0.25, 4, 0.2)])
+@pytest.mark.parametrize(
+    ("gained_mps2", "driven", "share"), [(0.25, 2, 0.02), (0.08, 2, 0.2), (0.25, 3, 0.02), (0.25, 4, 0.02)]
+)
 @pytest.mark.parametrize("dark", [False, True])
 def test_axles_that_spun_do_not_slide_when_they_roll_again(
     gained_mps2: float, driven: int, share: float, *, dark: bool
