@@ -22,7 +22,7 @@ from ..physics.train import GRAVITY
 from .free import runs_back
 from .gear.together import Together
 from .gear.wander import Errors, Wander
-from .gear.wheels import LEARNING_MPS, UNISON_S, UNTOLD_NS
+from .gear.wheels import LEARNING_MPS, ROLLING, UNISON_S, UNSURE, UNTOLD_NS
 from .layout import MU, RADIUS, SPEED, Bank
 from .memory import Memory, S
 from .motion import SLOWED, slowing
@@ -57,6 +57,10 @@ PULLED = 0.004
 
 SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
+
+DARK_NS = 3 * S
+"""So long behind the last position, or measured speed, wheels alone may tell that they roll, or stand, under the brake:
+those that seem to while it says otherwise slide."""
 
 TRUSTED_NS = 450_000_000
 """How often the fastest rim is taken for the train's speed, as its errors last."""
@@ -182,11 +186,12 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
     rim_mps = memory.wheels.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
     together = memory.wheels.together.after(rims, t_ns, asked(config, memory))
     memory = memory._replace(wheels=memory.wheels._replace(together=together))
-    if together.stand(GRAVITY * config.train.full_brake):
+    dark = _is_dark(config, memory)
+    if dark and together.stand(GRAVITY * config.train.full_brake):
         return standing(memory)
     if rim_mps <= config.slowest_mps:
         return memory
-    bank = rolling(bank, rim_mps).normalised() if together.roll else bank
+    bank = rolling(bank, rim_mps).normalised() if dark and together.roll else bank
     bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
     if wheels.fall_mps2 > memory.wheels.fall_mps2:
         bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)
@@ -194,10 +199,18 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
         wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
-        slides = _slides(memory.braking.told, len(rims), wheels.all_roll(t_ns))
+        mean, std = memory.bank.mean_of(SPEED), memory.bank.std_of(SPEED)
+        unsure = UNSURE * std > ROLLING * config.sliding_creep * mean
+        slides = _slides(memory.braking.told, len(rims), unsure and wheels.all_roll(t_ns))
         bank = as_fast(bank, rim_mps, errors.quick * rim_mps, slides)
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
+
+
+def _is_dark(config: Config, memory: Memory) -> bool:
+    """Whether neither a position nor a speed that is no axle's has been heard of late."""
+    speeds = memory.speeds.quick.before if config.speed_source != "axle" else ()
+    return memory.t_ns - max([memory.placed_ns, *(t_ns for t_ns, _ in speeds)]) > DARK_NS
 
 
 def _slides(told: float, count: int, all_roll: bool) -> float:

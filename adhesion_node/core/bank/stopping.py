@@ -31,7 +31,7 @@ def asked(config: Config, memory: Memory) -> float:
     Where they are let go of that is less than what is demanded; 0: none is measured, so that nobody knows.
     """
     bank, brake = memory.bank, memory.brake
-    if config.pressure_kind == "demanded":
+    if config.pressure_kind == "demanded" or not brake.gauged:
         return 0.0
     braking = memory.braking._replace(applied=config.train.specific_brake(min(brake.applied_pa, brake.pressure_pa)))
     return GRAVITY * float(bank.weight @ (rolling_use(config, bank, braking) + resistance(config, bank)))

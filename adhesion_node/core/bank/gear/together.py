@@ -31,6 +31,9 @@ LEAST, MOST = 0.7, 1.1
 """Parts of what the cylinders ask for, by what is known of the brake, between which rims lose speed that roll: a brake
 fades, or presses a heavier train; rims that are slowed down by more begin to slide."""
 
+SILENT_NS = 2 * S
+"""Rims that were silent for longer may have locked meanwhile: they are followed anew."""
+
 FROM_MPS, TO_MPS, AGAIN = 5.0, 0.5, 2.0
 """The fastest rim of a train that stops is slowed down from here to there no faster than by the full brake. What is
 faster than that again by such a factor has not stopped, or runs on."""
@@ -42,6 +45,11 @@ class Seen(NamedTuple):
     t_ns: int
     speed_mps: float
     asked_mps: float
+
+    def slows_to(self, later: Seen) -> bool:
+        """Whether it has slowed down until later as a train does of which the cylinders ask so much."""
+        lost, asked = self.speed_mps - later.speed_mps, later.asked_mps - self.asked_mps
+        return LEAST * asked < lost < MOST * asked
 
 
 class Together(NamedTuple):
@@ -56,15 +64,22 @@ class Together(NamedTuple):
     """... and since when it has not been faster than `TO_MPS`."""
 
     def after(self, rims: Sequence[float], t_ns: int, asked_mps2: float) -> Together:
-        """Take in the speeds of the rims; what presses would slow the train down so if all rolled."""
+        """Take in the speeds of the rims; what presses would slow the train down so if all rolled.
+
+        They are followed anew where too few are heard, or were silent for long.
+        """
+        if len(rims) < FEWEST:
+            return Together()
+        if self.newest is not None and t_ns - self.newest.t_ns > SILENT_NS:
+            return Together().after(rims, t_ns, asked_mps2)
         fastest, before = max(rims), self.newest
         asked = 0.0 if before is None else before.asked_mps + asked_mps2 * (t_ns - before.t_ns) / S
-        now, few = Seen(t_ns, fastest, asked), len(rims) < FEWEST
+        now = Seen(t_ns, fastest, asked)
         above = self.above if self.below is None or fastest < AGAIN * TO_MPS else None
-        above = now if fastest > FROM_MPS and not few else above
+        above = now if fastest > FROM_MPS else above
         below = (self.below or now) if fastest <= TO_MPS else None
         alike, count = self.alike, sum(rim >= (1.0 - ALIKE) * fastest for rim in rims)
-        if few or count < FEWEST or 2 * count <= len(rims):
+        if count < FEWEST or 2 * count <= len(rims):
             alike = ()
         elif not alike or t_ns - alike[-1].t_ns >= EVERY_NS:
             alike = (*(each for each in alike if t_ns - each.t_ns < WITHIN_NS), now)
@@ -74,16 +89,19 @@ class Together(NamedTuple):
 
     @property
     def roll(self) -> bool:
-        """Whether most of them have now slowed down as the cylinders ask for."""
+        """Whether most of them have now slowed down as the cylinders ask for, in both halves of the time.
+
+        In the mean of it rims may have that slid at once, and slow down less since.
+        """
         if not self.alike or self.alike[-1] != self.newest:
             return False
         first, last = self.alike[0], self.alike[-1]
-        lost, asked = first.speed_mps - last.speed_mps, last.asked_mps - first.asked_mps
-        return lost > LOST * first.speed_mps and LEAST * asked < lost < MOST * asked
+        middle = self.alike[len(self.alike) // 2]
+        return last.speed_mps < (1.0 - LOST) * first.speed_mps and first.slows_to(middle) and middle.slows_to(last)
 
     def stand(self, full_mps2: float) -> bool:
         """Whether the train stands: all rims do, and have come down as it does, no faster than by the full brake."""
         if self.above is None or self.below is None:
             return False
         asked, lasted_s = self.below.asked_mps - self.above.asked_mps, (self.below.t_ns - self.above.t_ns) / S
-        return min(asked / LEAST, full_mps2 * lasted_s) > FROM_MPS - TO_MPS
+        return min(asked / LEAST, full_mps2 * lasted_s) > self.above.speed_mps - TO_MPS
