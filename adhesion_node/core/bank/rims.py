@@ -20,7 +20,7 @@ from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement, WheelSample
 from ..physics.train import GRAVITY
 from .free import runs_back
-from .gear.together import Together
+from .gear.halting import Halting
 from .gear.wander import Errors, Wander
 from .gear.wheels import LEARNING_MPS, ROLLING, UNISON_S, UNSURE, UNTOLD_NS
 from .layout import MU, RADIUS, SPEED, Bank
@@ -59,8 +59,8 @@ SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
 
 DARK_NS = 3 * S
-"""So long behind the last position, or measured speed, wheels alone may tell that they roll, or stand, under the brake:
-those that seem to while it says otherwise slide."""
+"""So long behind the last position, or measured speed, wheels alone may tell that the train stands: those that seem to
+stop it while it says otherwise lock."""
 
 TRUSTED_NS = 450_000_000
 """How often the fastest rim is taken for the train's speed, as its errors last."""
@@ -93,8 +93,6 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
-    if memory.misled and len(rims) >= FEW:  # the positions are none of these axles', which all roll
-        pressed = pressed and not wheels.all_roll(newest.t_ns)
     memory, rolls = _unbraked(config, memory, rims, newest.t_ns, rim - MANY * std), wheels.rolling(rims, pulled)
     if rolls > LEARNING_MPS:
         return _spinning(memory, rolls, len(rims)) if pulled and MANY * std < rim else _rolling(memory, rolls, pressed)
@@ -131,7 +129,7 @@ def _unbraked(config: Config, memory: Memory, rims: list[float], t_ns: int, leas
     return memory._replace(
         bank=as_rolled(memory.bank, memory.wheels.wander.rolled),
         wheels=wheels._replace(
-            trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander(), together=Together()
+            trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander(), halting=Halting()
         ),
     )
 
@@ -184,14 +182,12 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
     """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
     bank = memory.bank
     rim_mps = memory.wheels.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
-    together = memory.wheels.together.after(rims, t_ns, asked(config, memory))
-    memory = memory._replace(wheels=memory.wheels._replace(together=together))
-    dark = _is_dark(config, memory)
-    if dark and together.stand(GRAVITY * config.train.full_brake):
+    halting = memory.wheels.halting.after(rims, t_ns, asked(config, memory))
+    memory = memory._replace(wheels=memory.wheels._replace(halting=halting))
+    if halting.stands(GRAVITY * config.train.full_brake) and _is_dark(config, memory):
         return standing(memory)
     if rim_mps <= config.slowest_mps:
         return memory
-    bank = rolling(bank, rim_mps).normalised() if dark and together.roll else bank
     bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
     if wheels.fall_mps2 > memory.wheels.fall_mps2:
         bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)

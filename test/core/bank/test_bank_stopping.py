@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""A train whose speed is badly known under the brake: when its wheels surely roll, or stand, and when they do not."""
+"""A train whose speed is badly known under the brake: when its wheels show that it stands, and when they do not."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import pytest
 from banks import FULL_PA, S
 
 from adhesion_node.core.bank.following import followed, met
-from adhesion_node.core.bank.gear.together import Together
+from adhesion_node.core.bank.gear.halting import Halting
 from adhesion_node.core.bank.layout import SPEED
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
@@ -81,14 +81,6 @@ def test_a_train_that_stops_behind_leaves_is_told_to_stand(behind: str) -> None:
         assert np.max(np.abs(error[stands])) < 0.5
 
 
-def test_rims_that_slow_down_as_the_cylinders_ask_for_roll() -> None:
-    """They were left at up to 12 m/s too fast, until the train stood."""
-    time_s, speed, error, std = braked(1, "dry", "mean", 30.0).T
-    late = (time_s > LEAVES_S + 8.0) & (speed > 3.0)
-    assert np.max(np.abs(error[late])) < 1.0
-    assert np.max(std[late]) < 0.5
-
-
 @pytest.mark.parametrize("behind", ["lock", "follow"])
 @pytest.mark.parametrize("gauge", ["mean", "demanded", "none"])
 def test_wheels_that_all_lock_do_not_stop_the_train(behind: str, gauge: str) -> None:
@@ -99,20 +91,12 @@ def test_wheels_that_all_lock_do_not_stop_the_train(behind: str, gauge: str) -> 
         assert np.max(np.abs(error)) < 2.0
 
 
-def seen(speeds: Sequence[tuple[float, ...]], asked_mps2: float = 1.0) -> Together:
+def seen(speeds: Sequence[tuple[float, ...]], asked_mps2: float = 1.0) -> Halting:
     """Rims at 10 Hz."""
-    together = Together()
+    halting = Halting()
     for tick, rims in enumerate(speeds):
-        together = together.after(rims, S + tick * S // 10, asked_mps2)
-    return together
-
-
-@pytest.mark.parametrize(("slowing", "rolls"), [(0.5, False), (0.75, True), (1.0, True), (1.2, False)])
-def test_what_slows_down_as_the_cylinders_ask_for_rolls(slowing: float, rolls: bool) -> None:
-    course = [10.0 - 0.1 * slowing * tick for tick in range(69)]
-    assert seen([(rim, rim, rim, 0.8 * rim) for rim in course]).roll is rolls
-    assert not seen([(rim, rim, 0.8 * rim, 0.8 * rim) for rim in course]).roll
-    assert not seen([(rim, rim, 0.8 * rim) for rim in course]).roll
+        halting = halting.after(rims, S + tick * S // 10, asked_mps2)
+    return halting
 
 
 @pytest.mark.parametrize(("slowing", "asked_mps2", "stands"), [(0.9, 1.0, True), (1.5, 1.0, False), (0.9, 0.3, False)])
@@ -120,31 +104,25 @@ def test_a_fastest_rim_that_comes_down_as_a_train_does_shows_a_standstill(
     slowing: float, asked_mps2: float, stands: bool
 ) -> None:
     course = [max(8.0 - 0.1 * slowing * tick, 0.0) for tick in range(120)]
-    assert not seen([(rim, rim, rim) for rim in course[:75]], asked_mps2).stand(1.0) or slowing > 1.0
-    assert seen([(rim, rim, rim) for rim in course], asked_mps2).stand(1.0) is stands
-    assert not seen([(rim, rim) for rim in course], asked_mps2).stand(1.0)
+    assert not seen([(rim, rim, rim) for rim in course[:50]], asked_mps2).stands(1.0)
+    assert seen([(rim, rim, rim) for rim in course], asked_mps2).stands(1.0) is stands
+    assert not seen([(rim, rim) for rim in course], asked_mps2).stands(1.0)
     again = [*course, 2.0, 0.0]
-    assert not seen([(rim, rim, rim) for rim in again], asked_mps2).stand(1.0)
+    assert not seen([(rim, rim, rim) for rim in again], asked_mps2).stands(1.0)
 
 
 def test_rims_that_were_silent_or_few_do_not_show_a_standstill() -> None:
     """They may have locked meanwhile: a train that ran at 21 m/s was told to stand."""
     rolled = [(20.0,) * 4] * 10
     silent = seen(rolled).after((0.0,) * 4, S + 70 * S // 10, 1.0)
-    assert not silent.after((0.0,) * 4, S + 71 * S // 10, 1.0).stand(1.0)
-    assert not seen([*rolled, *[(4.0,)] * 60, *[(0.0,)] * 20]).stand(1.0)
-    assert not seen([*rolled, *[(4.0,)] * 60, *[(0.0,) * 4] * 20]).stand(1.0)
-
-
-def test_rims_that_have_slid_at_once_and_slow_down_less_since_do_not_roll() -> None:
-    """In the mean they had at some time slowed down as the cylinders ask for: 9 m/s too slow, to within 0.2."""
-    course = [max(10.0 - 0.6 * tick, 7.0 - 0.025 * (tick - 5)) for tick in range(120)]
-    assert not any(seen([(rim,) * 4 for rim in course[:end]]).roll for end in range(1, 121))
+    assert not silent.after((0.0,) * 4, S + 71 * S // 10, 1.0).stands(1.0)
+    assert not seen([*rolled, *[(4.0,)] * 60, *[(0.0,)] * 20]).stands(1.0)
+    assert not seen([*rolled, *[(4.0,)] * 60, *[(0.0,) * 4] * 20]).stands(1.0)
 
 
 @pytest.mark.parametrize(("creep", "least_mps"), [(0.05, -0.8), (0.2, -0.3)])
 def test_wheels_that_all_creep_alike_are_not_the_speed_where_positions_tell_it(creep: float, least_mps: float) -> None:
-    """Their cylinders press as the rail allows, so that they slow down as asked for: 1.1 and 1.7 m/s too slow."""
+    """Their cylinders press as the rail allows, so that they slow down as rims do that roll."""
     rng, speed, place, off = np.random.default_rng(1), 25.0, 0.0, list[float]()
     memory = None
     for tick in range(500):

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...intake.plausibility import STRONGEST_MPS2
 from ...intake.samples import WheelSample
+from .halting import Halting
 from .seldom import apart_ns, at_least
-from .together import Together
 from .wander import Wander
 
 if TYPE_CHECKING:
@@ -125,8 +125,8 @@ class WheelsSeen(NamedTuple):
     """... when it last fell faster than a train can, ..."""
     fall_mps2: float = 0.0
     """... and how fast at most in this braking, to within `DEEPER`."""
-    together: Together = Together()
-    """How they slow down under the brake."""
+    halting: Halting = Halting()
+    """How they come down under the brake."""
     agree_ns: int | None = None
     """Since when all of them are as fast as each other, and as the train."""
     pulled_ns: int | None = None
