@@ -18,7 +18,6 @@ import numpy as np
 
 from ..intake.outcome import Event, Outcome
 from ..intake.samples import Measurement, WheelSample
-from ..physics.train import GRAVITY
 from .free import runs_back
 from .gear.halting import Halting
 from .gear.wander import Errors, Wander
@@ -27,7 +26,7 @@ from .layout import MU, RADIUS, SPEED, Bank
 from .memory import Memory, S
 from .motion import SLOWED, slowing
 from .seeing import CLIPPED, corrected, fall_seen, speed_seen
-from .stopping import asked, standing
+from .stopping import halting, standing, stands
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -58,10 +57,6 @@ PULLED = 0.004
 SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
 
-DARK_NS = 3 * S
-"""So long behind the last position, or measured speed, wheels alone may tell that the train stands: those that seem to
-stop it while it says otherwise lock."""
-
 TRUSTED_NS = 450_000_000
 """How often the fastest rim is taken for the train's speed, as its errors last."""
 
@@ -78,24 +73,23 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     pressed = pressed or _is_slowed(config, memory)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
     pulled = _is_pulled(config, memory.bank)
-    wheels = wheels._replace(pulled_ns=memory.t_ns) if pulled else wheels
-    pulled = pulled and not pressed
+    wheels, drives = wheels._replace(pulled_ns=memory.t_ns) if pulled else wheels, pulled and not pressed
     rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         axles = axles.after(rims, sample.t_ns, memory.slowed_mps, runs)
         newest = sample.without(axles.lying(memory.slowed_mps))
-        wheels = wheels.after(config, newest, rim, std, pressed, pulled)
+        wheels = wheels.after(config, newest, rim, std, pressed, drives)
     rims = wheels.rims(config, newest)
     known = rims if wheels.is_learnt else []
     wheels = wheels.agreeing(known, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return _beside_fastest(config, memory, known, newest.t_ns) if known else memory
-    memory, rolls = _unbraked(config, memory, rims, newest.t_ns, rim - MANY * std), wheels.rolling(rims, pulled)
+    memory, rolls = _unbraked(config, memory, rims, newest.t_ns, rim - MANY * std), wheels.rolling(rims, drives)
     if rolls > LEARNING_MPS:
-        return _spinning(memory, rolls, len(rims)) if pulled and MANY * std < rim else _rolling(memory, rolls, pressed)
+        return _spinning(memory, rolls, len(rims)) if drives and MANY * std < rim else _rolling(memory, rolls, pressed)
     dark = memory.asks and not measurement.has_position and rims
     return _slow(memory, max(rims) if pressed else rolls, back) if dark else memory
 
@@ -152,7 +146,7 @@ def _spinning(memory: Memory, rim_mps: float, count: int) -> Memory:
     """
     if not memory.wheels.is_learnt:
         return memory
-    bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, _slides(0.0, count, False)).normalised()
+    bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, _slides(count)).normalised()
     return memory._replace(bank=_of_radii_nothing(memory.bank, bank), fixes=memory.fixes + 1)
 
 
@@ -182,9 +176,8 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
     """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
     bank = memory.bank
     rim_mps = memory.wheels.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
-    halting = memory.wheels.halting.after(rims, t_ns, asked(config, memory))
-    memory = memory._replace(wheels=memory.wheels._replace(halting=halting))
-    if halting.stands(GRAVITY * config.train.full_brake) and _is_dark(config, memory):
+    memory = halting(config, memory, rims, t_ns)
+    if stands(config, memory):
         return standing(memory)
     if rim_mps <= config.slowest_mps:
         return memory
@@ -195,27 +188,22 @@ def _beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int
         wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
-        mean, std = memory.bank.mean_of(SPEED), memory.bank.std_of(SPEED)
-        unsure = UNSURE * std > ROLLING * config.sliding_creep * mean
-        slides = _slides(memory.braking.told, len(rims), unsure and wheels.all_roll(t_ns))
+        roll = memory.braking.told < 0.0 or (_tells_of_none(config, memory) and wheels.all_roll(t_ns))
+        slides = HIDDEN if roll and len(rims) >= FEW else _slides(len(rims))
         bank = as_fast(bank, rim_mps, errors.quick * rim_mps, slides)
         wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
     return memory._replace(wheels=wheels, bank=bank.normalised())
 
 
-def _is_dark(config: Config, memory: Memory) -> bool:
-    """Whether neither a position nor a speed that is no axle's has been heard of late."""
-    speeds = memory.speeds.quick.before if config.speed_source != "axle" else ()
-    return memory.t_ns - max([memory.placed_ns, *(t_ns for t_ns, _ in speeds)]) > DARK_NS
+def _tells_of_none(config: Config, memory: Memory) -> bool:
+    """Whether the speed is known too badly to tell of any axle whether it slides: such as do would differ."""
+    mean, std = memory.bank.mean_of(SPEED), memory.bank.std_of(SPEED)
+    return memory.braking.told == 0.0 and UNSURE * std > ROLLING * config.sliding_creep * mean
 
 
-def _slides(told: float, count: int, all_roll: bool) -> float:
-    """Density of what the fastest of so many rims shows where it slides, by what is told of all that are heard.
-
-    Where the speed is known too badly to tell of any, such as slide would differ.
-    """
-    roll = told < 0.0 or (told == 0.0 and all_roll)
-    return HIDDEN if roll and count >= FEW else SLIDES * max(FEW / count, 1.0)
+def _slides(count: int) -> float:
+    """Density of what the fastest of so many rims shows where it slides."""
+    return SLIDES * max(FEW / count, 1.0)
 
 
 def rim_speed(bank: Bank) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from ..physics.train import GRAVITY
 from .layout import RADIUS
-from .memory import Memory
+from .memory import Memory, S
 from .motion import resistance, rolling_use
 from .seeing import corrected, speed_seen
 
@@ -24,8 +24,25 @@ if TYPE_CHECKING:
 LOCKED_MPS = 1.0
 """Error of a standstill that wheels show under the brake: below some 2 m/s slide protection lets them lock."""
 
+DARK_NS = 3 * S
+"""So long behind the last position, or measured speed, wheels alone may tell that the train stands: those that seem to
+stop it while it says otherwise lock."""
 
-def asked(config: Config, memory: Memory) -> float:
+
+def halting(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
+    """Note how fast the rims were at a time under the brake."""
+    after = memory.wheels.halting.after(rims, t_ns, _asked(config, memory))
+    return memory._replace(wheels=memory.wheels._replace(halting=after))
+
+
+def stands(config: Config, memory: Memory) -> bool:
+    """Whether wheels show that the train stands, and neither a position nor a speed that is no axle's is heard."""
+    speeds = memory.speeds.quick.before if config.speed_source != "axle" else ()
+    dark_ns = memory.t_ns - max([memory.placed_ns, *(t_ns for t_ns, _ in speeds)])
+    return dark_ns > DARK_NS and memory.wheels.halting.stands(GRAVITY * config.train.full_brake)
+
+
+def _asked(config: Config, memory: Memory) -> float:
     """By how much the pressure of the cylinders slows the train down if all axles roll, m/s^2.
 
     Where they are let go of that is less than what is demanded; 0: none is measured, so that nobody knows.
