@@ -39,7 +39,7 @@ from .motion import (
     white_variance,
     white_variances,
 )
-from .rims import with_wheels
+from .rims.taken import with_wheels
 from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
 from .sensors.pointing import ASKEW_MPS2
 from .sensors.scatter import BRAKED_FAR, PLACE_FAR, SLOW_FAR

@@ -22,7 +22,7 @@ from adhesion_node.core.bank.following import followed, met
 from adhesion_node.core.bank.gear.axles import ROLLS
 from adhesion_node.core.bank.layout import RADIUS, SPEED
 from adhesion_node.core.bank.memory import Memory
-from adhesion_node.core.bank.rims import (
+from adhesion_node.core.bank.rims.rim import (
     CREEP,
     FASTEST_SHARE,
     SLIDES,

@@ -18,7 +18,7 @@ from adhesion_node import Config, Pipeline
 from adhesion_node.core import Measurement, PositionSample, PressureSample, Sample, WheelSample
 from adhesion_node.core.bank.following import met
 from adhesion_node.core.bank.layout import SPEED
-from adhesion_node.core.bank.rims import with_wheels
+from adhesion_node.core.bank.rims.taken import with_wheels
 from adhesion_node.core.physics.train import Array
 
 LOST_S, STANDS_S, AWAY_S = 1.0, 4.0, 18.0

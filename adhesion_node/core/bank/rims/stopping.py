@@ -12,14 +12,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from ..physics.train import GRAVITY
-from .layout import RADIUS
-from .memory import Memory, S
-from .motion import resistance, rolling_use
-from .seeing import corrected, speed_seen
+from ...physics.train import GRAVITY
+from ..layout import RADIUS
+from ..memory import Memory, S
+from ..motion import resistance, rolling_use
+from ..seeing import corrected, speed_seen
 
 if TYPE_CHECKING:
-    from ..config import Config
+    from ...config import Config
 
 LOCKED_MPS = 1.0
 """Error of a standstill that wheels show under the brake: below some 2 m/s slide protection lets them lock."""
