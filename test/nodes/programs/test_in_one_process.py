@@ -25,7 +25,7 @@ from rclpy.node import Node
 from adhesion_node.nodes.ros import qos
 from adhesion_node.wire.topics import BRAKE_PRESSURE, MU, POSITION
 
-PAGE = Path(__file__).parents[2] / "doc" / "ros_bringup.md"
+PAGE = Path(__file__).parents[3] / "doc" / "ros_bringup.md"
 
 
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 0), (signal.SIGTERM, -signal.SIGTERM)])
