@@ -39,6 +39,11 @@ STUDIES = {
         "the estimator on trains, rails and sensors that share no model with it, held against goals",
         "--runs 20 --only leaves,wet --figures figures",
     ),
+    "worlds": (
+        "worlds.study",
+        "the estimator on trains, rails, brakings and sensors that are drawn at random",
+        "--runs 20 --json worlds.json",
+    ),
     "remembered": (
         "real.remembered",
         "the safe curve at the first second of braking, with what earlier trains saw of the rail and without",

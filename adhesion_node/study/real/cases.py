@@ -20,10 +20,11 @@ import numpy as np
 from sim_node.real import known
 from sim_node.real.drive import Drive, sense
 from sim_node.real.plant.journey import Journey
-from sim_node.real.plant.scenarios import SCENARIOS
+from sim_node.real.plant.scenarios import SCENARIOS, Scenario
 from sim_node.real.plant.simulate import simulate
+from sim_node.real.plant.train import Nominal
 from sim_node.real.sensors import centre_line
-from sim_node.real.sensors.fitted import FITTED
+from sim_node.real.sensors.fitted import FITTED, Fitted
 from sim_node.real.sensors.sensor import Ride
 
 from ...core import Config
@@ -70,9 +71,7 @@ class Case(NamedTuple):
         """What the estimator is told: the train by its papers, the known grades, what its sensors are, not how good."""
         if self.scenario == point_mass.NAME:
             return replace(Config(track=Track((Grade(-known.LONG_M, known.LONG_M, 0.0),))), **dict[str, Any](self.told))
-        scenario = SCENARIOS[self.scenario]
-        told: dict[str, Any] = {**known.brake(scenario), **FITTED[self.fitted].told, **dict(self.told)}
-        return Config(known.train(scenario), known.track(scenario), **told)
+        return config_of(SCENARIOS[self.scenario], FITTED[self.fitted], self.told)
 
     @property
     def line(self) -> Line:
@@ -84,8 +83,7 @@ class Case(NamedTuple):
         """Time from the full demand until the brake has built up everywhere, and the mean of used is all behind it."""
         if self.scenario == point_mass.NAME:
             return USED_S / 2
-        nominal = SCENARIOS[self.scenario].nominal
-        return SLOWEST_BUILD_UP * nominal.build_up_s + nominal.length_m / nominal.propagation_mps + USED_S / 2
+        return built_after_s(SCENARIOS[self.scenario].nominal)
 
     def drives(self, seeds: Iterable[int]) -> tuple[Drive, ...]:
         """Drive every seed."""
@@ -93,6 +91,17 @@ class Case(NamedTuple):
             return point_mass.drives(seeds)
         nominal, journeys = SCENARIOS[self.scenario].nominal, _journeys(self.scenario, tuple(seeds))
         return tuple(Drive(journey, sense(Ride(journey, nominal), FITTED[self.fitted])) for journey in journeys)
+
+
+def config_of(scenario: Scenario, fitted: Fitted, told: Iterable[tuple[str, Value]] = ()) -> Config:
+    """What an estimator is told: the train by its papers, the known grades, what its sensors are; and `told`."""
+    settings: dict[str, Any] = {**known.brake(scenario), **fitted.told, **dict(told)}
+    return Config(known.train(scenario), known.track(scenario), **settings)
+
+
+def built_after_s(nominal: Nominal) -> float:
+    """Time from the full demand until the brake has built up everywhere, and the mean of used is all behind it."""
+    return SLOWEST_BUILD_UP * nominal.build_up_s + nominal.length_m / nominal.propagation_mps + USED_S / 2
 
 
 @cache

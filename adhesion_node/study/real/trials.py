@@ -11,7 +11,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -82,8 +82,7 @@ class RealTrials(NamedTuple):
         config, line = self.case.config, self.case.line
         drives = self.case.drives(range(self.first_seed, self.first_seed + self.seeds))
         parts = [arrays(drive, config, self.case.built_after_s, line) for drive in drives]
-        together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        return {**together, "seconds": np.array([time.perf_counter() - started])}
+        return {**joined(parts), "seconds": np.array([time.perf_counter() - started])}
 
 
 class Found(NamedTuple):
@@ -113,10 +112,12 @@ def found(cases: Iterable[Case], first_seed: int, seeds: int, where: Running) ->
     parts: dict[Case, list[Arrays]] = {}
     for task, arrays_of in zip(tasks, run_all(tasks, where), strict=True):
         parts.setdefault(task.case, []).append(arrays_of)
-    return {
-        case: Found(*(np.concatenate([part[name] for part in some]) for name in Found._fields))
-        for case, some in parts.items()
-    }
+    return {case: Found(**joined(some)) for case, some in parts.items()}
+
+
+def joined(parts: Sequence[Arrays]) -> Arrays:
+    """What stands by its name in each of some parts, one after the other."""
+    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
 def arrays(drive: Drive, config: Config, built_after_s: float, line: Line = NOMINAL) -> Arrays:

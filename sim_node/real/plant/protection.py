@@ -89,12 +89,12 @@ def start(rim_mps: Array) -> Control:
     return Control(reference, np.zeros_like(reference), rim_mps, still, still > 0.0, still > 0.0, still + 1e3)
 
 
-def command(control: Control, rim_mps: Array) -> tuple[Control, Valves]:
-    """Return what the valves are told after this period's look at the wheels."""
+def command(control: Control, rim_mps: Array, creep: float = 1.0) -> tuple[Control, Valves]:
+    """Return what the valves are told after this period's look at the wheels; `creep` is a factor on all thresholds."""
     before, fall, last, smooth, dumping, regaining, since, period = control
     reference, fall = _referred(before, fall, rim_mps.max(axis=1, keepdims=True), PERIOD_S)
     smooth, dump, regaining, since, controlled, slides = _watched(
-        reference, rim_mps, last, smooth, dumping, regaining, since, PERIOD_S
+        reference, rim_mps, last, smooth, dumping, regaining, since, PERIOD_S, creep
     )
     groups = np.arange(rim_mps.shape[1])
     turn, within = divmod(period * PERIOD_S, TURN_S)
@@ -114,7 +114,7 @@ def _referred(before: float, fall: float, fastest: float, period_s: float, refer
     fell[0] = fall + ((before - reference[0]) / period_s - fall) * (period_s / FALL_MEMORY_S)
 
 
-@formula("dddd??dd->d??d??")
+@formula("dddd??ddd->d??d??")
 def _watched(
     reference: float,
     rim: float,
@@ -124,6 +124,7 @@ def _watched(
     regaining: bool,
     since: float,
     period_s: float,
+    creep: float,
     smoothed: Array,
     dump: Flags,
     regains: Flags,
@@ -135,11 +136,11 @@ def _watched(
     smoothed[0] = 0.5 * smooth + 0.5 * (rim - last) / period_s
     sliding = reference - rim
     expected = sliding - LEAD_S * smoothed[0]
-    low, high = LOW[0] + LOW[1] * reference, HIGH[0] + HIGH[1] * reference
+    low, high = creep * (LOW[0] + LOW[1] * reference), creep * (HIGH[0] + HIGH[1] * reference)
     active = reference > CUT_OFF_MPS
     held = dumping and smoothed[0] < REGAINED_MPS2
     dump[0] = active and sliding > 0.5 * low and (expected > high or held)
-    regains[0] = dump[0] or (regaining and active and sliding > ROLLING[0] + ROLLING[1] * reference)
+    regains[0] = dump[0] or (regaining and active and sliding > creep * (ROLLING[0] + ROLLING[1] * reference))
     slides[0] = active and expected > low
     after[0] = 0.0 if slides[0] else since + period_s
     controlled[0] = active and after[0] < CONTROL_S

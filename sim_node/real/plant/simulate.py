@@ -73,7 +73,7 @@ def _run(scenario: Scenario, trains: train.Train, ways: list[way.Way], substeps:
             raise ValueError(f"scenario {scenario.name}: no stop within {scenario.way_m:g} m and {LONGEST_S:g} s")
         rail, hill = ground.contact(now.position_m), weight * ground.grade(now.position_m)
         if nominal.slide_protection:
-            control, valves = protection.command(control, now.rim_mps)
+            control, valves = protection.command(control, now.rim_mps, nominal.protection_creep)
             told = [valves, *told[:-1]]
         asked = demanded_pa(scenario, time - delays)
         impulse = still

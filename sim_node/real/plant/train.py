@@ -42,6 +42,8 @@ class Nominal:
     propagation_mps: float = np.inf
     """Speed at which the brake command runs along the train."""
     slide_protection: bool = True
+    protection_creep: float = 1.0
+    """Creep up to which its slide protection lets axles slide, over that of the usual one."""
 
     @property
     def brake_n(self) -> float:
