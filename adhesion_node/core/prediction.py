@@ -15,10 +15,11 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ndtri
 
+from .bank.findings.ahead import Ahead
 from .config import Config
 from .estimate import Estimate
 from .physics.adhesion import AdhesionLaw
-from .physics.braking import BrakingCurve, slowdown
+from .physics.braking import BrakingCurve, Slowdown, slowdown
 from .physics.train import Train
 
 LEAST_EFFICIENCY = 1e-3
@@ -69,7 +70,12 @@ def _expected(estimate: Estimate) -> float | AdhesionLaw:
     return replace(shape, scale=shape.scale * max(estimate.mu, 1e-6) / now)
 
 
-def _curve(config: Config, estimate: Estimate, train: Train, mu: float | AdhesionLaw) -> BrakingCurve | None:
+def _slowed(slowing: Slowdown, mu: float | AdhesionLaw | Ahead) -> BrakingCurve:
+    """The curve by an adhesion, which may depend on what else slows the train down."""
+    return slowing.curve(mu.against(slowing.resistance) if isinstance(mu, Ahead) else mu)
+
+
+def _curve(config: Config, estimate: Estimate, train: Train, mu: float | AdhesionLaw | Ahead) -> BrakingCurve | None:
     """The curve from wherever the train may be, or comes in `REACH_S` of travel.
 
     A fall that begins beyond its end does not count, one on the way counts from here on.
@@ -79,7 +85,7 @@ def _curve(config: Config, estimate: Estimate, train: Train, mu: float | Adhesio
     end_m = front_m
     while (grade := config.track.least_resistance(rear_m, end_m)) < least:
         try:
-            curve = slowdown(train, speed_mps, 0.0, grade).curve(mu)
+            curve = _slowed(slowdown(train, speed_mps, 0.0, grade), mu)
         except ValueError:  # more downgrade than brake: no curve is the honest answer, and consumers brake on silence
             return None
         least, end_m = grade, front_m + float(curve.distance_m[-1])

@@ -18,6 +18,7 @@ from scipy.integrate import quad
 from windowed import windowed
 
 from adhesion_node.core import Config, Estimate, Regime
+from adhesion_node.core.bank.findings.ahead import NOTHING, Ahead
 from adhesion_node.core.physics.adhesion import WET
 from adhesion_node.core.physics.track import Grade, Track, Tunnel
 from adhesion_node.core.physics.train import Train
@@ -183,3 +184,22 @@ def test_the_nominal_curve_follows_the_identified_law() -> None:
     assert prediction.nominal.distance_m[-1] == pytest.approx(distance, rel=1e-3)
     assert prediction.nominal.distance_m[-1] < 60.0**2 / (2.0 * mu * G)
     assert prediction.safe.distance_m[-1] == pytest.approx(60.0**2 / (2.0 * 0.05 * G))
+
+
+@pytest.mark.parametrize("slope", [-0.01, 0.0, 0.02])
+def test_who_may_be_eight_times_as_fast_has_the_way_of_that_train_on_any_grade(slope: float) -> None:
+    """Uphill it was the way of the slow one: what the grade gives was counted whole."""
+    given = estimate(speed_mps=2.0)._replace(ahead=Ahead((0.0,), (NOTHING,), 0.03, 1.0 / 64.0))
+    safe = predict(config(Grade(-1e5, 1e5, 2e5 * slope)), given).safe
+    assert safe is not None
+    assert safe.distance_m[-1] == pytest.approx(16.0**2 / (2.0 * G * (0.03 + slope)), rel=1e-3)
+    assert (safe.speed_mps[0], safe.speed_mps[-1]) == (2.0, 0.0)
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.02])
+def test_no_less_is_counted_on_than_the_floor_of_the_fastest_train(slope: float) -> None:
+    given = estimate(speed_mps=20.0)._replace(ahead=Ahead((0.0,), (0.01,), 0.05, 0.5))
+    safe = predict(config(Grade(-1e5, 1e5, 2e5 * slope)), given).safe
+    assert safe is not None
+    slowing = max(0.01 + slope, 0.5 * (0.05 + slope))
+    assert safe.distance_m[-1] == pytest.approx(20.0**2 / (2.0 * G * slowing), rel=1e-3)

@@ -14,6 +14,7 @@ import numpy as np
 from oracles import specific_resistance
 from scipy.signal import lfilter
 
+from adhesion_node.core.bank.findings.ahead import Ahead
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.bank.labels.kinds import KINDS
 from adhesion_node.core.bank.layout import (
@@ -36,7 +37,7 @@ from adhesion_node.core.bank.motion import Braking
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import Measurement, PressureSample
-from adhesion_node.core.physics.train import Array
+from adhesion_node.core.physics.train import CRH3, Array
 
 CONFIG = Config(
     method="bank",
@@ -54,6 +55,7 @@ FULL = 500_183 / (536e3 * 9.8)
 """B/(M g) of the full brake (model.md)."""
 
 SMOOTH = [kind.name for kind in KINDS].index("smooth")
+SPEEDS = np.linspace(0.0, 60.0, 13)
 NOTHING = Rail(0.05, 0.04, 0.02)
 """What is known of any rail."""
 
@@ -91,6 +93,11 @@ def ahead_bank(mu: float, speed: float, kinds: list[int] | None = None) -> Bank:
     for component, value in ((MU, mu), (SPEED, speed), (ROUGH, 0.0), (GRADE, 0.0)):
         bank = bank.with_fresh(component, value, 0.05 * abs(value))
     return bank
+
+
+def counted(ahead: Ahead, speeds: Array = SPEEDS) -> Array:
+    """Adhesion that is counted on ahead of the train of these tests on the level, at some speeds."""
+    return ahead.against(CRH3.specific_resistance(speeds))(speeds)
 
 
 def memory_of(bank: Bank, braking: Braking, seen: int) -> Memory:

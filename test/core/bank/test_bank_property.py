@@ -14,7 +14,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from banks import S
+from banks import SPEEDS, S
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -96,7 +96,8 @@ def probe(index: int, measurements: list[Measurement]) -> None:
         findings = found(config, memory, RAIL, RAIL)
         assert 0.0 <= findings.rail.lower <= findings.rail.mu < math.inf
         assert 0.0 < findings.rail.std < math.inf
-        slowing = config.train.specific_resistance(np.array(findings.ahead.speed_mps)) + findings.ahead.mu
+        resistance = config.train.specific_resistance(SPEEDS)
+        slowing = resistance + findings.ahead.against(resistance)(SPEEDS)
         assert ((slowing >= -1e-15) & np.isfinite(slowing)).all()
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ...belief.rail import Rail
+from ...physics.adhesion import AdhesionLaw
 from ...physics.train import Array
 from ...setting import once
 from ..blind import STANDS_MPS
@@ -65,7 +66,10 @@ UNTOLD = 4.0
 tell of it: as if it had been as likely as rolling, so that nothing but what is measured since speaks for the brake."""
 
 LOST, LOST_MPS = 1.5, 5.0
-"""A speed is lost where the train may be so many times as fast as told, and by so much; told is the third at least."""
+"""A speed is lost where the train may be so many times as fast as told, and by so much."""
+
+NOTHING = -1.0
+"""No adhesion is so low: the floor alone counts."""
 
 BORNE_OUT_S, BORNE_OUT, BORDER = 2.0, 0.1, 0.2
 """A change of the rail counts for the way ahead after so long, once it is so probable, or once all that are so young
@@ -78,14 +82,19 @@ class Ahead(NamedTuple):
     speed_mps: tuple[float, ...]
     """Rising from 0 to the present speed."""
     mu: tuple[float, ...]
+    floor: float = 0.0
+    """No less than this, ..."""
+    share: float = 1.0
+    """... of what slows the train down by which such a part counts: it may be faster than told, and needs more way."""
 
-    def __call__(self, speed_mps: Array) -> Array:
-        """Adhesion at speeds, element by element."""
-        return np.asarray(np.interp(speed_mps, self.speed_mps, self.mu))
+    def against(self, resistance: Array | float) -> AdhesionLaw:
+        """Adhesion at speeds, element by element, where resistance and grade, over the weight, slow the train, too."""
+        least = self.share * (self.floor + resistance) - resistance
+        return lambda speed_mps: np.maximum(np.interp(speed_mps, self.speed_mps, self.mu), least)
 
     def at_least(self, other: Ahead) -> Ahead:
-        """No less than another one of the same speeds."""
-        return self._replace(mu=tuple(map(max, self.mu, other.mu)))
+        """No less than the floor of another one."""
+        return self._replace(floor=other.floor, share=other.share)
 
 
 def constant(mu: float) -> Ahead:
@@ -137,13 +146,11 @@ def for_the_fastest(config: Config, bank: Bank, mu: float) -> tuple[Ahead, bool]
 
     And whether the speed is lost: what is counted on ahead holds for errors that are small beside it.
     """
-    speeds = _speeds_ahead(bank)
     std, missed = np.sqrt(bank.covariance[:, SPEED, SPEED]), KNOWN_SHARE * (1.0 - config.curve_confidence)
     fastest = float(quantiles(bank.weight, bank.mean[:, SPEED], std, (1.0 - missed,)).item())
     told = max(abs(float(bank.weight @ bank.mean[:, SPEED])), STANDS_MPS)
-    share, resisting = (told / max(fastest, told)) ** 2, config.train.specific_resistance(speeds)
     is_lost = fastest > LOST * told and fastest - told > LOST_MPS
-    return Ahead(tuple(speeds.tolist()), tuple(((mu + resisting) * share - resisting).tolist())), is_lost
+    return Ahead((0.0,), (NOTHING,), mu, (told / max(fastest, told)) ** 2), is_lost
 
 
 def surely(config: Config, bank: Bank) -> float:

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from banks import FULL, NOTHING, SMOOTH, S, ahead_bank, bank_of, memory_of
+from banks import FULL, NOTHING, SMOOTH, SPEEDS, S, ahead_bank, bank_of, counted, memory_of
 from pressures import sampled
 from pressures import seen as seen_by
 from scipy.stats import norm
@@ -43,8 +43,8 @@ def test_under_a_part_of_the_brake_that_the_rail_bears_what_was_known_of_it_hold
     bank = bank._replace(covariance=1e-8 * bank.covariance)
     known = Rail(0.09, 0.01, 0.08)
     findings = found(CONFIG, memory_of(bank, Braking(share * FULL), 3)._replace(known=known), known, NOTHING)
-    assert (min(findings.ahead.mu) >= 0.499 * FULL) == stays
-    assert max(findings.ahead.mu) <= 0.501 * FULL
+    assert (min(counted(findings.ahead)) >= 0.499 * FULL) == stays
+    assert max(counted(findings.ahead)) <= 0.501 * FULL
     assert findings.rail.lower <= findings.rail.mu < 0.05
     assert (findings.known.lower == 0.08) == stays
     assert (findings.known.mu, findings.known.std) == (0.09, max(findings.rail.std, 0.01))
@@ -58,7 +58,7 @@ def test_a_rail_that_has_limited_gives_no_more_than_it_showed_until_the_brake_is
     bank = bank_of([HELD], spread=0.0)
     memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(0.016), 3)._replace(known=NOTHING)
     findings = found(CONFIG, memory.having_told(regime, Rail(0.015, 0.001, 0.012)), NOTHING, NOTHING)
-    assert (min(findings.ahead.mu) > 0.015) == holds
+    assert (min(counted(findings.ahead)) > 0.015) == holds
     assert (findings.rail.lower == findings.rail.mu) == holds
 
 
@@ -72,7 +72,8 @@ def test_while_much_is_open_no_more_is_counted_on_than_was_known() -> None:
         fastest = 50.0 + norm.ppf(1.0 - 0.6 * 0.01) * math.sqrt(bank.covariance[0, SPEED, SPEED])
         resisting = float(CRH3.specific_resistance(np.array(50.0)))
         slowing = (50.0 / fastest) ** 2 * (least + resisting)
-        assert findings.ahead.mu[-1] == pytest.approx(slowing - resisting), "the fastest one stops where it is told"
+        fast = counted(findings.ahead, np.array([50.0]))
+        assert fast == pytest.approx(slowing - resisting), "the fastest one stops where it is told"
         assert findings.rail.lower == pytest.approx(min(least, findings.rail.mu))
 
 
@@ -92,13 +93,13 @@ def test_a_gauge_that_shows_no_brake_while_the_train_is_slowed(used: float, alon
     if told:
         assert findings.rail.mu == pytest.approx(used)
         assert 0.8 * used < findings.rail.lower <= used
-        least = min(findings.ahead.mu)
+        least = min(counted(findings.ahead))
         assert NOTHING.lower < least < 0.8 * used or least == pytest.approx(NOTHING.lower, rel=1e-4), (
             "what rolls bears it"
         )
     else:
         assert findings.rail == NOTHING
-        assert max(findings.ahead.mu) <= NOTHING.lower
+        assert max(counted(findings.ahead)) <= NOTHING.lower
 
 
 @pytest.mark.parametrize("seen", [0, 3])
@@ -251,7 +252,7 @@ def test_bounds_stand_in_their_order_whatever_the_bank(seed: int) -> None:
         assert 0.0 <= rail.lower <= rail.mu < math.inf
         assert 0.0 < rail.std < math.inf
         assert all(0.0 <= each < math.inf for each in ahead.speed_mps)
-        slowing = np.array(ahead.mu) + CRH3.specific_resistance(np.array(ahead.speed_mps))
+        slowing = counted(ahead) + CRH3.specific_resistance(SPEEDS)
         assert ((slowing >= -1e-15) & np.isfinite(slowing)).all(), "a train that may be faster slows less, but does"
         assert np.all(np.isfinite(bank.moments(2)[0]))
 
