@@ -46,6 +46,9 @@ GOODBYE_S = 0.5
 _BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidationException)
 """What a node's start raises for bad input; the RuntimeErrors are those of rcl."""
 
+_UNKNOWN = "UnknownROSArgsError"
+"""The one of rclpy, not among its public names, that lists arguments and says nothing of them."""
+
 
 def run(
     program: str,
@@ -135,7 +138,8 @@ def _start_and_spin(program: str, make_node: Callable[[], Node], ros: list[str],
         rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
     except _BAD_START as error:
-        return complain(program, error, BAD_INPUT)
+        unknown = f"ROS arguments {error}: ROS has none such; a parameter is given as -p NAME:=VALUE"
+        return complain(program, ValueError(unknown) if type(error).__name__ == _UNKNOWN else error, BAD_INPUT)
     for warning in unheeded(ros, node.get_fully_qualified_name()):
         node.get_logger().warning(warning)
     executor = SingleThreadedExecutor()

@@ -80,9 +80,13 @@ def unheeded(ros_arguments: Sequence[str], node: str) -> list[str]:
 
     ROS ranks by where a section's name is first mentioned, of all files and of `-p`, which is the section `/**`: `-p`
     after a file gives way to it where an earlier `-p`, or the file itself, has mentioned `/**` before. The arguments
-    are those that ROS has read already, so they are well formed and the files there.
+    are those that ROS has read already, so they are well formed and the files there. In a file it finds no parameters
+    where all is commented out, or where it is no parameter file at all: of that one message says so.
     """
-    given = list(_given(ros_arguments))
+    try:
+        given = list(_given(ros_arguments))
+    except ValueError as error:
+        return [str(error)]
     named = f"name one '{node.rpartition('/')[2]}' or '/**'"
     useless = [
         f"{source}: has sections for {', '.join(one.name for one in found) or 'nobody'}, none for {node}: {named}"

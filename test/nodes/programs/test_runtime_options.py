@@ -37,6 +37,7 @@ def test_an_integer_for_a_float_is_accepted(start: Start) -> None:
         (("--params-file", "/nowhere.yaml"), "/nowhere.yaml"),
         (("-p", "gain"), "gain"),
         (("-r", "__node:=a b"), "a b"),
+        (("--gain", "1"), "ROS arguments ['--gain', '1']: ROS has none such; a parameter is given as -p NAME:=VALUE"),
     ],
 )
 def test_bad_ros_arguments_are_one_line_and_code_2(start: Start, args: tuple[str, ...], message: str) -> None:
@@ -58,6 +59,17 @@ def test_a_parameter_file_for_another_node_is_told(start: Start, tmp_path: Path,
     assert program.returncode == 0
     assert (f"has sections for {section.strip('/')}, none for /probe: name one 'probe' or '/**'" in errors) == told
     assert ("gain = 0.25" in errors) != told
+
+
+@pytest.mark.parametrize("text", ["", "# /**:\n#   ros__parameters:\n#     gain: 0.25\n", "time,position\n0,1\n"])
+def test_a_parameter_file_without_parameters_is_told(start: Start, tmp_path: Path, text: str) -> None:
+    """ROS takes it without a word; a node that was ready ended in a traceback."""
+    file = tmp_path / "parameters.yaml"
+    file.write_text(text)
+    program = start("--ros-args", "--params-file", str(file), TASK="finish")
+    _, errors = program.communicate(timeout=PATIENCE_S)
+    assert program.returncode == 0
+    assert f"params = {file}: not a readable ROS parameter file: it is to hold, one in the other, NODE" in errors
 
 
 def test_nested_namespaces_are_sections_too(tmp_path: Path) -> None:
