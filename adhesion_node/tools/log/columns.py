@@ -52,8 +52,7 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
             used[ours] = _the_one(ours, ours, rest if meant(ours, ours, rest) else header, source)
     axles = axles or tuple(name for name in rest if AXLE.fullmatch(parted(name, "wheel_speed")[0]))
     for name in (*used.values(), *axles):
-        if header.count(name) > 1:
-            raise ValueError(f"{source}: column {name!r} is there {header.count(name)} times: rename one")
+        require_once(name, header, source)
     if len({"lat", "lon"} & set(used)) == 1:
         ((ours, other),) = ((ours, other) for ours, other in (("lat", "lon"), ("lon", "lat")) if ours in used)
         if ours in form.named:
@@ -71,6 +70,12 @@ def _columns_of(header: Sequence[str], source: str, form: Format) -> Columns:
         raise ValueError(f"{source}: a brake pipe and a brake demand: leave one out, the pipe becomes the demand")
     unread = tuple(name for name in header if name and name not in (*used.values(), *axles))
     return Columns(used, axles, unread)
+
+
+def require_once(name: str, header: Sequence[str], source: str) -> None:
+    """Raise ValueError where a column that is used has a namesake."""
+    if header.count(name) > 1:
+        raise ValueError(f"{source}: column {name!r} is there {header.count(name)} times: rename one")
 
 
 def units_told(columns: Columns, header: Sequence[str], form: Format) -> dict[str, str]:

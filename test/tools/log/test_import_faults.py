@@ -139,6 +139,15 @@ def test_all_faults_together_are_told_five_of_a_kind_then_counted(importing: Imp
         ),
         ("time,position\n1,2\n", ["--pressure", "p"], "FILE: column 'p' is missing: it has ['time', 'position']; name"),
         ("time,position,time\n1,2,1\n", [], "FILE: column 'time' is there 2 times: rename one"),
+        ("time,bus,bus,position\n1,a,b,2\n", ["--where", "bus=a"], "FILE: column 'bus' is there 2 times: rename one"),
+        *(
+            (
+                f"time,signal,value,{name},unit\n1,v,2,v,m/s\n",
+                ["--speed", "v"],
+                f"FILE: column '{name}' is there 2 times",
+            )
+            for name in ("signal", "value", "unit")
+        ),
         ("time,position\n", [], "FILE: no good row in 0: nothing was written"),
         ("time,position\n1,2\n", ["--delimiter", ";;"], "delimiter = ';;': give one character"),
         *(

@@ -46,6 +46,13 @@ def test_another_header_is_refused(importing: Import, other: pd.DataFrame) -> No
     assert said.startswith(f"import_csv: FILE:302: another header, {list(other)} after {list(ride())}: cut the log")
 
 
+def test_columns_without_a_name_may_be_several(importing: Import) -> None:
+    """Beside a place letters of a latitude are looked for; of two such columns nobody knew which was meant."""
+    rows = ride()[["time", "speed", "brake_pressure", "position"]]
+    assert importing(text(rows).replace("\n", ",,\n")) == 0, importing.errors
+    assert [sample.position_m for sample in importing.positions()] == rows["position"].tolist()
+
+
 @pytest.mark.parametrize("mark", ["#N/A", "--", "---", "<null>", "\\N", "n.a.", "(null)"])
 def test_what_is_written_for_no_value_is_an_empty_cell(importing: Import, mark: str) -> None:
     rows = ride().astype(str)

@@ -160,6 +160,16 @@ def test_a_pipe_is_released_as_the_train_runs_however_long_it_is_parked(importin
     assert (demanded[100], demanded[500]) == pytest.approx((0.0, 410e3))
 
 
+def test_a_pipe_without_a_value_demands_nothing_that_is_known(
+    importing: Import, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert importing("time,position,pipe\n0,0,-\n1,30,\n2,60,-\n", "--pipe", "pipe") == 1
+    assert import_csv.main([str(importing.log), "--dry-run", "--pipe", "pipe"]) == 1
+    told = capsys.readouterr().out
+    assert "brake pipe: no value while the train runs, so what is demanded is unknown: --pipe-released, or" in told
+    assert "nan pa" not in told
+
+
 @pytest.mark.parametrize("released", ["500000", "0", "-5", "nan", "inf"])
 def test_a_pipe_is_released_at_a_pressure_that_pipes_have(importing: Import, released: str) -> None:
     log = "time,position,pipe\n0,0,5.0\n1,30,5.0\n2,60,3.5\n"

@@ -18,7 +18,15 @@ import pytest
 from test_import_csv import Import, importing
 from test_import_log import ride, text
 
+from adhesion_node.tools.log.cell.marks import marks
+
 __all__ = ["importing"]
+
+
+def test_a_number_that_no_product_holds_is_none_of_them() -> None:
+    """numpy warned of the overflow on the user's terminal."""
+    with np.errstate(over="raise"):
+        assert marks(np.array([1e308, -9999.0])).tolist() == [False, True]
 
 
 @pytest.mark.parametrize(

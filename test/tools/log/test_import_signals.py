@@ -90,6 +90,12 @@ def test_several_trains_are_told_with_the_option(importing: Import) -> None:
     assert any("differ by 'train': are they of several trains? --where train=11" in line for line in importing.errors)
 
 
+def test_namesakes_that_are_not_read_may_tell_rows_of_one_time_apart(importing: Import) -> None:
+    log = text(trains().assign(state=lambda rows: rows.train)).replace("train", "state", 1)
+    assert importing(log) == 1
+    assert importing.summary["refused"] == {"time_not_rising": len(ride())}
+
+
 @pytest.mark.parametrize(
     ("where", "said"),
     [

@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 
 import pandas as pd
 
-from ..columns import Columns
+from ..columns import Columns, require_once
 from ..text import Block
 
 SHOWN = 5
@@ -25,7 +25,7 @@ SHARED = 0.2
 def chosen(rows: Iterator[Block], names: Sequence[str], where: Sequence[str], source: str) -> Iterator[Block]:
     """Yield the rows that have one of the values asked for in each column that is asked for, COLUMN=VALUE.
 
-    Raises ValueError where there is no such column, or no such row.
+    Raises ValueError where there is no such column, or two, or no such row.
     """
     asked: dict[str, set[str]] = {}
     for each in where:
@@ -33,6 +33,7 @@ def chosen(rows: Iterator[Block], names: Sequence[str], where: Sequence[str], so
         found = [theirs for theirs in names if theirs.casefold() == name.strip().casefold()]
         if not is_ or not found:
             raise ValueError(f"where = {each!r}: write COLUMN=VALUE, with a column of {source}: {list(names)}")
+        require_once(found[0], names, source)
         asked.setdefault(found[0], set()).add(value.strip())
     seen: dict[str, dict[str, None]] = {name: {} for name in asked}
     count = 0
@@ -65,7 +66,7 @@ def several(cells: pd.DataFrame, columns: Columns) -> Iterator[str]:
     time = columns.names["time"]
     if cells.duplicated(time).mean() <= SHARED:
         return
-    for name in columns.unread:
+    for name in (each for each in columns.unread if columns.unread.count(each) == 1):  # --where means one of a name
         values = cells[name].astype(str)
         kinds = values.unique()
         if 1 < len(kinds) <= len(cells) ** 0.5 and not pd.concat([cells[time], values], axis=1).duplicated().any():

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import pandas as pd
 
-from ..columns import Columns
+from ..columns import Columns, require_once
 from ..format import Format
 from ..text import BLOCK, Block
 
@@ -32,7 +32,7 @@ class Signals(NamedTuple):
 def signals_of(rows: Iterator[Block], names: Sequence[str], form: Format, source: str) -> Signals | None:
     """Return the signals of a log that has one to a row, each with its unit where a column `unit` tells it, else None.
 
-    Raises ValueError where a column is missing that was asked for.
+    Raises ValueError where a column is missing that was asked for, or there twice.
     """
     plain = {name.casefold(): name for name in reversed(names)}
     name, value = (
@@ -50,6 +50,8 @@ def signals_of(rows: Iterator[Block], names: Sequence[str], form: Format, source
             )
         return None
     unit = plain.get("unit")
+    for each in filter(None, (name, value, unit)):
+        require_once(each, names, source)
     units: dict[str, str] = {}
     for block in rows:
         cells = block.cells.drop_duplicates(name)

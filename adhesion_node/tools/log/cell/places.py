@@ -72,8 +72,8 @@ def number_of(cell: str, column: str, unit: str) -> float | None:
 
 def with_letters(rows: pd.DataFrame, name: str, column: str) -> "pd.Series[Any]":
     """Return the cells of a latitude or longitude with the N, S, E or W that the column to its right holds alone."""
-    right = list(rows)[list(rows).index(name) + 1 :][:1]
-    letters = rows[right[0]].astype(str) if right else pd.Series("", index=rows.index)
+    right = list(rows).index(name) + 1  # by its place: columns without a name may be several
+    letters = rows.iloc[:, right].astype(str) if right < rows.shape[1] else pd.Series("", index=rows.index)
     allowed = {"lat": ("N", "S", ""), "lon": ("E", "W", "")}.get(column, ())
     if not letters.isin(allowed).all() or (letters == "").all():
         return rows[name]

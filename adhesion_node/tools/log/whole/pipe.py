@@ -35,6 +35,11 @@ def demanded(rows: pd.DataFrame, form: Format) -> tuple[pd.DataFrame, Format, st
         least, most = (pa / scale for pa in RELEASED_PA)
         range_ = f"give what the pipe has while the brake is released, {least:g} to {most:g} {unit}"
         raise ValueError(f"pipe-released = {form.pipe_released:g} {unit}: {range_}; mostly it is {5e5 / scale:g}")
+    if pd.isna(released):
+        note = (
+            "brake pipe: no value while the train runs, so what is demanded is unknown: --pipe-released, or --pipe COL"
+        )
+        return rows.drop(columns="brake_pipe").assign(brake_demand=float("nan")), form, note
     share = ((released - pipe) / FULL_DROP_PA).clip(0.0, 1.0)
     rows = rows.drop(columns="brake_pipe").assign(brake_demand=form.ambient_pressure_pa + share * form.full_pressure_pa)
     note = (
