@@ -27,6 +27,12 @@ SHAPE = (
 )
 
 
+NO_HEIGHT = "is it in another unit, or does it stand for none? Give all points one in m, or none"
+
+HEIGHTS_M = -500.0, 9000.0
+"""Of the Earth's surface, and some more: beyond lies what stands for no height, -9999 or -3.4e38 of a raster."""
+
+
 class Point(NamedTuple):
     """A point of the line: degrees, and m where its height is known."""
 
@@ -119,4 +125,8 @@ def _checked(where: str, *values: Any) -> Point:
             else "are they in m? Give degrees, WGS84 (EPSG:4326)"
         )
         raise ValueError(f"{where}: latitude {lat:g} is not within +-90 or longitude {lon:g} not within +-180: {why}")
+    if height_m is not None and not HEIGHTS_M[0] <= height_m <= HEIGHTS_M[1]:
+        raise ValueError(
+            f"{where}: height {height_m:g} is not within {HEIGHTS_M[0]:g} to {HEIGHTS_M[1]:g} m: {NO_HEIGHT}"
+        )
     return Point(lat, lon, height_m)

@@ -93,6 +93,11 @@ BAD = {
     "columns": ("a.csv", "latitude;longitude\n1;2\n", r"has the columns \['latitude;longitude'\]: .*columns lat, lon"),
     "empty": ("a.csv", "", r"has the columns \[\]"),
     "cell": ("a.csv", "lat,lon\n47,8\n47.1\n", r"line 3: .*: not numbers"),
+    "a raster's mark for no height": (
+        "a.csv",
+        "lat,lon,height\n47,8,-3.4028235e+38\n47.1,8,400\n",
+        r"line 2: height -3.40282e\+38 is not within -500 to 9000 m: is it in another unit, or does it stand for none",
+    ),
     "nan": ("a.csv", "lat,lon\n47,8\n47.1,nan\n", r"line 3: .*: not finite"),
 }
 
