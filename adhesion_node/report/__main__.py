@@ -16,7 +16,7 @@ wrote, with its map or without: a row for each braking, the rail over place and 
 import argparse
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -163,11 +163,22 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
         return Subject(name, source, run, setup.config, setup.train)
 
 
-def _rows(options: argparse.Namespace) -> AbstractContextManager[Write]:
-    """What takes the estimates as rows; they may go into the folder of the report, which is made last."""
+@contextmanager
+def _rows(options: argparse.Namespace) -> Iterator[Write]:
+    """What takes the estimates as rows; a folder that is made for them goes where an error ends it."""
+    missing: list[Path] = []
     if options.out:
-        Path(options.out).resolve().parent.mkdir(parents=True, exist_ok=True)
-    return rows_to(options.out)
+        folder = Path(options.out).resolve().parent
+        missing = [each for each in (folder, *folder.parents) if not each.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+    try:
+        with rows_to(options.out) as write:
+            yield write
+    except BaseException:
+        for each in missing:
+            with suppress(OSError):  # another has put something in it meanwhile
+                each.rmdir()
+        raise
 
 
 def _named(paths: Sequence[str]) -> Iterator[tuple[Path, str]]:

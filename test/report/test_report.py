@@ -160,8 +160,10 @@ def test_messages_that_do_not_decode_are_left_out_and_told(
 
 def test_results_are_estimated_anew_on_demand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = record(tmp_path / "mine")  # without positions: as recorded it can be shown
-    assert main([str(bag), "--output", str(tmp_path / "report"), "--estimate"]) == 2
+    report = tmp_path / "new" / "report"
+    assert main([str(bag), "--output", str(report), "--estimate", "--out", str(report / "rows.csv")]) == 2
     assert "topic position: not in the recording" in capsys.readouterr().err
+    assert not report.parent.exists(), "an empty folder was left"
 
 
 def test_the_page_fetches_nothing(shown: tuple[Path, dict[str, Any], Parser]) -> None:
