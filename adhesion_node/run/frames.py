@@ -66,7 +66,8 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     The result has `time` as the frame has it, and the columns of `replay --offline --out`; its `attrs` hold
     `measurements`, `accepted`, `dropped` by reason, the `digest`, and `why` nothing is identified, or None. Raises
     ValueError naming what is wrong with the frame, the configuration or the seed, and what to do. Warns where many of
-    the measurements were not used, where the positions fall along the run, or where a 0 seems to stand for no value.
+    the measurements were not used, where the positions fall along the run, where a 0 seems to stand for no value, or
+    where a pressure is absolute.
     """
     config = Config() if config is None else config
     if not isinstance(config, Config):

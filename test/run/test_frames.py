@@ -208,6 +208,16 @@ def test_a_zero_that_stands_for_no_value_is_warned_of(name: str) -> None:
         estimate(frame.assign(**{name: frame[name].mask(gaps, 0.0)}))
 
 
+@pytest.mark.parametrize("name", ["brake_pressure", "brake_demand"])
+def test_an_absolute_pressure_is_warned_of(name: str) -> None:
+    """The brake was taken to be applied for ever: a coasting train was told as ADHESION_LIMITED at a mu near 0."""
+    frame = with_everything()
+    frame[name] += 101_325.0
+    frame.loc[3, name] = np.nan
+    with pytest.warns(UserWarning, match=f"{name} never falls below 101325 Pa: is it absolute. Take the pressure of"):
+        estimate(frame)
+
+
 def test_positions_too_coarse_for_their_deviation_are_warned_of() -> None:
     frame = measured()
     coarse = frame.assign(position=75.0 * (frame["position"] / 75.0).round())

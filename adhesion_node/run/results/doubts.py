@@ -24,13 +24,20 @@ AXLE = re.compile(r"wheel_speed_[1-9]\d*")
 TOO_COARSE = 2.0
 """Times the standard deviation: less is made good by what the estimator sees of the steps."""
 
+ABSOLUTE_PA = 80e3, 108e3
+"""A least pressure within is the air's: no brake stays applied by as much all along."""
+
 
 def doubts(t_ns: NDArray[np.int64], columns: Mapping[str, Array], std_m: float) -> Iterator[str]:
-    """Say where a 0 seems to stand for no value, and that positions are coarser than `std_m` lets them be."""
+    """Say where a 0 stands for no value, a pressure is absolute, or positions are coarser than `std_m` lets them be."""
     for name, values in columns.items():
         least = LEAST_PA if name in ("brake_pressure", "brake_demand") else LEAST_RADPS
         if (least == LEAST_PA or AXLE.fullmatch(name)) and (rows := gone(t_ns / 1e9, values, least)):
             yield f"frame column {name!r} is 0 in {rows} rows between others of the same value: no value? Make them NaN"
+    for name in ("brake_pressure", "brake_demand"):
+        least_pa = np.fmin.reduce(columns.get(name, [math.nan]))
+        if ABSOLUTE_PA[0] < least_pa < ABSOLUTE_PA[1]:
+            yield f"{name} never falls below {least_pa:.6g} Pa: is it absolute? Take the pressure of the air off"
     if "position" in columns and "variance" not in columns:
         step_m = step_of(columns["position"], TOO_COARSE * math.sqrt(12.0) * std_m)
         if step_m:

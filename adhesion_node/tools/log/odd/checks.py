@@ -18,6 +18,7 @@ from itertools import chain
 import numpy as np
 
 from ....core.physics.train import KMH, Array
+from ....run.results.doubts import ABSOLUTE_PA
 from ....run.results.seen import FASTEST_MPS
 from ....wire.line import ATMOSPHERE_PA
 from ..cell.numbers import has_dates
@@ -108,7 +109,7 @@ def _pressures(log: Log) -> Iterator[str]:
         yield from _other_unit(name, most, log.form)
         if name == "brake_demand" and _is_share(log, most):
             yield "brake_demand goes up to 1: is it a share of a full brake? Name its column brake_demand [full]"
-        if 80e3 < least < 108e3:
+        if ABSOLUTE_PA[0] < least < ABSOLUTE_PA[1]:
             yield f"{name} never falls below {least / 1e5:.3g} bar: is it absolute? --pressure-kind absolute"
 
     if "brake_pipe" in log.columns.names and log.form.pipe_released is not None:
