@@ -54,14 +54,16 @@ PROGRESS_S = 1.0
 """Time between two signs of life."""
 
 
-def help_texts(purpose: str, *examples: str, more: str = "") -> dict[str, Any]:
+def help_texts(purpose: str | None, *examples: str, more: str = "") -> dict[str, Any]:
     r"""Return what makes --help readable, for a parser: the purpose by paragraphs, `more` as it stands, examples last.
+
+    A purpose that is a docstring is None under `python -OO`.
 
     >>> help_texts("Does it.", "tool FILE")["epilog"]
     'examples:\n  tool FILE'
     """
     width = max(shutil.get_terminal_size().columns - 2, NARROWEST)
-    paragraphs = [textwrap.fill(" ".join(part.split()), width) for part in purpose.split("\n\n")]
+    paragraphs = [textwrap.fill(" ".join(part.split()), width) for part in (purpose or "").split("\n\n")]
     shown = "\n".join(["examples:", *(f"  {example}" for example in examples)]) if examples else ""
     return {
         "description": "\n\n".join(paragraphs),

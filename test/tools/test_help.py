@@ -66,6 +66,15 @@ def test_python_m_runs_the_program(
     assert capsys.readouterr().out.startswith(f"usage: {program} ")
 
 
+@pytest.mark.parametrize("program", ["import_csv", "replay", "estimator"])
+def test_a_python_without_docstrings_runs_the_program(program: str) -> None:
+    """Every tool ended in a traceback, also without --help; a node's help was that of a base class of Python's."""
+    command = [sys.executable, "-OO", "-m", MODULES[program], "--help"]
+    shown = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert shown.startswith(f"usage: {program} ")
+    assert "ABC" not in shown
+
+
 def options_of(shown: str) -> str:
     """The part of a help that lists options or parameters, as one line."""
     return " ".join(shown.partition("\noptions:")[2].partition("\nexamples:")[0].split())

@@ -108,7 +108,7 @@ def _parser(
     program: str, make_node: Callable[[], Node], parameters: Sequence[Setting], examples: Sequence[str]
 ) -> argparse.ArgumentParser:
     """Return the parser of a node's own arguments; asked by a shell, it answers for those of ROS too and ends."""
-    purpose, _, _ = (inspect.getdoc(make_node) or "").partition("\n\n")
+    purpose, _, _ = inspect.cleandoc(make_node.__doc__ or "").partition("\n\n")  # its own, no base class's
     listed = "\n".join(
         line
         for group, members in by_group(parameters).items()
