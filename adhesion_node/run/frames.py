@@ -124,7 +124,9 @@ def _checked(frame: pd.DataFrame) -> dict[str, Array]:
                 f"frame column {name!r}: {hint}rename it to one of {', '.join(known)}, wheel_speed_1 ..., or drop it"
             )
     if "time" not in frame or not {"position", "speed"} & set(frame.columns):
-        raise ValueError(f"frame has the columns {list(frame.columns)}: give 'time' and 'position' or 'speed'")
+        is_index = frame.index.name == "time" or isinstance(frame.index, pd.DatetimeIndex)
+        hint = "; frame.reset_index(names='time') makes a column of its index" if is_index else ""
+        raise ValueError(f"frame has the columns {list(frame.columns)}: give 'time' and 'position' or 'speed'{hint}")
     for name in frame.columns[frame.columns.duplicated()]:
         raise ValueError(f"frame column {name!r}: is there twice: drop one")
     columns = {}

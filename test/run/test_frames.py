@@ -129,6 +129,7 @@ def slipped(**changes: Any) -> pd.DataFrame:
         (measured().rename(columns={"brake_pressure": "pressure"}), "column 'pressure': did you mean 'brake_pressure'"),
         (slipped(notes="wet"), "column 'notes': rename it to one of time, position, .*, or drop it"),
         (measured().drop(columns="time"), r"has the columns \['position', 'brake_pressure'\]: give 'time' and"),
+        (measured().set_index("time"), r"or 'speed'; frame.reset_index\(names='time'\) makes a column of its index"),
         (measured().drop(columns="position"), "give 'time' and 'position' or 'speed'"),
         (slipped(brake_pressure="4,1"), "column 'brake_pressure': .*: give numbers, NaN where nothing was measured"),
         (slipped(time="08:15:03"), "column 'time' is of .*: give seconds, or datetimes by pandas.to_datetime"),
