@@ -160,11 +160,12 @@ def record(path: Path, seed: int = 1, *, slides: bool = False, coasts: bool = Tr
 def test_brake_and_resistance_are_found_where_it_coasts_and_brakes(
     tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    record(tmp_path / "run")
-    proposal, result = tmp_path / "found.yaml", tmp_path / "result.json"
+    run = tmp_path / "a run\nof its own"
+    record(run)
+    proposal, result = tmp_path / "as found.yaml", tmp_path / "result.json"
     code, out, err = told(
         capfd,
-        *("--estimate", str(tmp_path / "run"), "--train", "metro"),
+        *("--estimate", str(run), "--train", "metro"),
         *("--output", str(proposal), "--json", str(result)),
     )
     assert code == 0, err
@@ -174,12 +175,13 @@ def test_brake_and_resistance_are_found_where_it_coasts_and_brakes(
     assert found["deceleration_mps2"] == pytest.approx(1.3 * BRAKE, abs=0.04)
     assert "believed: metro, six cars" in out
     assert "not dry throughout" in out
+    assert f"holds the proposal: train --check '{proposal}'\n" in out, "the command runs as it is printed"
     proposed = read_train(str(proposal))
     assert proposed.train.brake_force(380e3) == pytest.approx(
         BRAKE * read_train("metro").train.brake_force(380e3), rel=0.04
     )
     assert proposed.train.resistance_c0 == pytest.approx(1.2 * RESISTANCE, rel=0.08)
-    again, _, refused = told(capfd, "--estimate", str(tmp_path / "run"), "--output", str(proposal))
+    again, _, refused = told(capfd, "--estimate", str(run), "--output", str(proposal))
     assert again == 2
     assert "is there already" in refused
 

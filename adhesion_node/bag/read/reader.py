@@ -11,6 +11,7 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from shlex import join
 from typing import Any, Self
 
 from ...wire.messages.refused import Rejected
@@ -161,10 +162,8 @@ def _open_directory(path: Path, metadata: Metadata) -> Recording:
     elif databases := _numbered(path, ".db3"):
         recording = ForeignRecording(databases)
     elif compressed := sorted(path.glob("*.zstd")):
-        files = " ".join(str(file) for file in compressed)
-        raise ValueError(
-            f"bag = {path}: is compressed and has no readable metadata.yaml: decompress it: zstd -d {files}"
-        )
+        command = join(("zstd", "-d", *map(str, compressed)))
+        raise ValueError(f"bag = {path}: is compressed and has no readable metadata.yaml: decompress it: {command}")
     else:
         inner = sorted(file.parent for ending in ("mcap", "db3") for file in path.glob(f"*/*.{ending}"))
         hint = f", as {inner[0]}" if inner else ""

@@ -16,6 +16,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import join
 
 from ...bag import BagReader, left_out, select_from
 from ...command.checks import refuse
@@ -90,7 +91,8 @@ def _estimate(options: argparse.Namespace) -> int:
     text = [f"believed: {setup.train}", *found.told()]
     if options.output and found.says_anything:
         write_text(options.output, file_of(found, Path(options.estimate).name))
-        text.append(f"{options.output} holds the proposal: train --check {options.output}")
+        command = join(("train", "--check", options.output))
+        text.append(f"{options.output} holds the proposal: {command}")
     report(options.json, found.result(), "\n".join(text))
     return DONE if found.says_anything else FAILED
 

@@ -83,7 +83,7 @@ def file_of(found: Found, source: str) -> str:
         found.config.resistance_std if found.resistance is None else max(2.0 * found.resistance.std, 0.05)
     )
     return f"""\
-# Proposed by `train --estimate {source}`.
+# Proposed by `train --estimate {" ".join(source.split())}`.
 name: {json.dumps(f"as found in {source}")}
 mass_kg: {train.mass_kg:g}
 length_m: {train.length_m:g}

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shlex import quote
 
 import cdrs
 import pytest
@@ -62,10 +63,12 @@ def test_directories_without_a_recording_are_refused(tmp_path: Path) -> None:
         BagReader(tmp_path)
 
 
-@pytest.mark.parametrize("name", ["x.mcap.zstd", "x.db3.zstd"])
+@pytest.mark.parametrize("name", ["x.mcap.zstd", "x.db3.zstd", "x y.mcap.zstd"])
 def test_compressed_files_without_metadata_are_to_be_decompressed(tmp_path: Path, name: str) -> None:
     (tmp_path / name).touch()
-    with pytest.raises(ValueError, match=rf"no readable metadata\.yaml: decompress it: zstd -d {tmp_path / name}$"):
+    with pytest.raises(
+        ValueError, match=rf"no readable metadata\.yaml: decompress it: zstd -d {quote(str(tmp_path / name))}$"
+    ):
         BagReader(tmp_path)
 
 
