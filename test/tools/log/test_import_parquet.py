@@ -45,6 +45,18 @@ def test_parquet_as_well(importing: Import, tmp_path: Path, capsys: pytest.Captu
     assert "is no Parquet file" in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("written", ["dates", "texts", "a day and texts"])
+def test_a_row_without_a_time_is_refused(importing: Import, tmp_path: Path, written: str) -> None:
+    pytest.importorskip("pyarrow")
+    texts = MOMENTS.dt.strftime("%Y-%m-%d %H:%M:%S.%f")
+    day = {"date": texts.str[:10], "time": texts.str[11:]}
+    rows = ride().assign(**{"dates": {"time": MOMENTS}, "texts": {"time": texts}, "a day and texts": day}[written])
+    rows.loc[3, "time"] = None
+    rows.to_parquet(tmp_path / "log.parquet")
+    assert import_csv.main([str(tmp_path / "log.parquet"), "--output", str(importing.output)]) == 1
+    assert [sample.position_m for sample in importing.positions()] == rows["position"].drop(3).tolist()
+
+
 MOMENTS = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(ride().time, unit="s")
 
 TABLES: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], int]] = [

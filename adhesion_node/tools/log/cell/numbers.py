@@ -151,7 +151,8 @@ def time_formats(cells: Iterable[str]) -> list[str]:
     >>> time_formats(["21.11.2024 08:15:03", "21.11.2024 08:15:03,5"]), time_formats(["0.1", "0.2"])
     (['%d.%m.%Y %H:%M:%S.%f'], [])
     """
-    text = pd.Series([cell for cell in cells if ":" in cell or _BASIC.match(cell)], dtype=object).astype(str)
+    texts = map(str, cells)  # of Parquet a time may be missing
+    text = pd.Series([cell for cell in texts if ":" in cell or _BASIC.match(cell)], dtype=object).astype(str)
     counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS if len(text)}
     return [form for form, count in counts.items() if count == max(counts.values())]
 
