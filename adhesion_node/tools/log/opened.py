@@ -124,7 +124,7 @@ def _read_otherwise(cells: "pd.Series[Any]", form: Format) -> Iterator[str]:
 
 
 def _parquet(path: Path) -> pd.DataFrame:
-    """The table, its index as columns where it is named or a time."""
+    """The table, its index as columns where it is named or a time; a text that is missing is an empty cell."""
     try:
         table = pd.read_parquet(path)
     except ImportError:
@@ -135,7 +135,17 @@ def _parquet(path: Path) -> pd.DataFrame:
         table.index.name = table.index.name or "time"
     levels = [name for name in table.index.names if name is not None and name not in table]
     table = table.reset_index(level=levels).reset_index(drop=True) if levels else table.reset_index(drop=True)
-    return table.set_axis(list(map(str, table)), axis=1)
+    table = table.set_axis(list(map(str, table)), axis=1)
+    return table.apply(lambda cells: cells if _is_measured(cells) else cells.astype(object).where(cells.notna(), ""))
+
+
+def _is_measured(cells: "pd.Series[Any]") -> bool:
+    """Whether a column of Parquet holds numbers or times, not texts."""
+    kinds = pd.api.types
+    return any(
+        is_kind(cells)
+        for is_kind in (kinds.is_numeric_dtype, kinds.is_datetime64_any_dtype, kinds.is_timedelta64_dtype)
+    )
 
 
 def _again(first: Block, rest: Iterator[Block]) -> Iterator[Block]:

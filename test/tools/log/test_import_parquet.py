@@ -57,6 +57,28 @@ def test_a_row_without_a_time_is_refused(importing: Import, tmp_path: Path, writ
     assert [sample.position_m for sample in importing.positions()] == rows["position"].drop(3).tolist()
 
 
+@pytest.mark.parametrize("column", ["position", "speed"])
+def test_a_text_that_is_missing_is_an_empty_cell(importing: Import, tmp_path: Path, column: str) -> None:
+    pytest.importorskip("pyarrow")
+    rows = ride().drop(columns="speed" if column == "position" else "position")
+    told = rows[column].map("{:.6f}".format)
+    rows.assign(**{column: told.where(rows.index != 3, None)}).to_parquet(tmp_path / "log.parquet")
+    assert import_csv.main([str(tmp_path / "log.parquet"), "--output", str(importing.output)]) == 0
+    assert len(importing.messages(column)) == len(rows) - 1
+
+
+@pytest.mark.parametrize("column", ["time", "signal", "value", "unit"])
+def test_of_a_signal_to_a_row_any_cell_may_be_missing(importing: Import, tmp_path: Path, column: str) -> None:
+    pytest.importorskip("pyarrow")
+    rows = ride().melt("time", var_name="signal")
+    rows = rows.assign(unit=rows.signal.map({"position": "m", "speed": "m/s", "brake_pressure": "Pa"}))
+    rows[column] = rows[column].where(rows.index != 3, None)
+    rows.to_parquet(tmp_path / "log.parquet")
+    assert import_csv.main([str(tmp_path / "log.parquet"), "--output", str(importing.output)]) == (column == "time")
+    read = [len(importing.messages(name)) for name in ("position", "speed", "brake_pressure")]
+    assert sum(read) == len(rows) - (column != "unit")
+
+
 MOMENTS = pd.Timestamp("2024-11-21 08:15:03") + pd.to_timedelta(ride().time, unit="s")
 
 TABLES: list[tuple[str, Callable[[pd.DataFrame], pd.DataFrame], int]] = [

@@ -74,14 +74,15 @@ def spread(rows: Iterator[Block], signals: Signals, columns: Columns) -> Iterato
         refused += block.refused
         parts.append(block.cells.loc[block.cells[signals.name].isin(known), [*rest, signals.name, signals.value]])
     cells = pd.concat(parts)
-    nth = cells.groupby([*rest, signals.name]).cumcount()
-    at = cells.groupby([*(cells[name] for name in rest), nth], sort=False).ngroup().to_numpy()
+    nth = cells.groupby([*rest, signals.name], dropna=False).cumcount()
+    at = cells.groupby([*(cells[name] for name in rest), nth], sort=False, dropna=False).ngroup().to_numpy()
     first = np.unique(at, return_index=True)[1]
     wide = cells.iloc[first][rest].copy()
+    values = cells[signals.value].to_numpy(dtype=object, na_value="")
     for name in used:
         is_it = (cells[signals.name] == signals.columns[name]).to_numpy()
         filled = np.full(len(wide), "", dtype=object)
-        filled[at[is_it]] = cells[signals.value].to_numpy(dtype=object)[is_it]
+        filled[at[is_it]] = values[is_it]
         wide[name] = filled
     for begin in range(0, max(len(wide), 1), BLOCK):
         yield Block(wide.iloc[begin : begin + BLOCK], refused if begin == 0 else [])
