@@ -56,7 +56,8 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     memory = state.memory
     if memory is None:
         return _accepted(config, state, measurement, bank.met(config, measurement))
-    if measurement.has_position and memory.misled:
+    state = state._replace(leading=state.leading.heard(config, memory, measurement))
+    if measurement.has_position and (memory.misled or memory.aside):
         detail = f"position x = {measurement.position_m:.12g}"
         state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
     soon = measurement.has_position and 0 <= measurement.t_ns - memory.placed_ns < SOON_NS
@@ -143,12 +144,15 @@ def _accepted(
     stepping: Stepping | None = None,
     soon: bool = False,
 ) -> tuple[State, Estimate | None]:
+    if state.memory is not None:
+        memory, leading = state.leading.after(config, state.memory, memory, measurement)
+        state = state._replace(leading=leading)
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
     placed, seen = measurement.has_position, state.seen
     state = state.told(*memory.left_out)
     state = state._replace(
-        stepping=state.stepping if stepping is None else stepping,
+        stepping=Stepping() if memory.aside else state.stepping if stepping is None else stepping,
         counts=counted(state.counts, ACCEPTED if placed or soon else TICK),
         newest=measurement,
         memory=memory,

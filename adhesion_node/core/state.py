@@ -15,6 +15,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from .bank.layout import POSITION, SPEED
+from .bank.leading import Leading
 from .bank.memory import Memory
 from .bank.proving import Proving
 from .bank.steps import Stepping
@@ -83,6 +84,8 @@ class State(NamedTuple):
     stepping: Stepping = Stepping()
     """Whether the positions have stepped, where the bank follows them."""
     proving: Proving = Proving()
+    leading: Leading = Leading()
+    """Whether the positions are an axle's, where wheels are heard beside them."""
     knowledge: Knowledge = Knowledge()
     outliers: int = 0
     """Outliers in a row."""

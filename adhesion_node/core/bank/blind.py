@@ -50,7 +50,9 @@ def led_again(memory: Memory) -> Memory:
     """The brake is released, no wheel slides any more: positions count again, wherever they say that the train is."""
     bank = closed(memory.bank)
     bank = bank.with_fresh(POSITION, bank.mean[:, POSITION], math.sqrt(MAX_VARIANCE_M2))
-    return memory._replace(bank=bank, misled=False, course=Course(wandering=memory.course.wandering.unseen()))
+    return memory._replace(
+        bank=bank, misled=False, aside=False, course=Course(wandering=memory.course.wandering.unseen())
+    )
 
 
 def forwards(bank: Bank) -> Bank:

@@ -57,7 +57,7 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     """Open or close a braking, ask what has changed, weigh what wheels and slide protection tell."""
     bank, now_s = memory.bank, memory.t_ns / S
     pressed = memory.is_pressed(config)
-    if memory.misled:
+    if memory.misled or (memory.aside and not (pressed or memory.braked)):
         return memory._replace(bank=forwards(bank)) if pressed else led_again(memory)
     before = memory.braked
     braked = (pressed or (before and _goes_on(memory))) and bank.mean_of(SPEED) >= config.slowest_mps

@@ -78,6 +78,8 @@ class Memory(NamedTuple):
     """Beliefs of some seconds ago, to go back to where positions turn out to be wrong."""
     misled: bool = False
     """Whether the positions are those of a sliding wheel: they are left out until the brake is released."""
+    aside: bool = False
+    """Whether they are left out so, and the train is followed by its wheels meanwhile."""
     seen: int = 0
     """Measurements of the present braking; 0 while there is none."""
     slowed_mps: float = 0.0

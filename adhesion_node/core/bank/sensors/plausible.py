@@ -135,10 +135,7 @@ class Course(NamedTuple):
         if self.braked_ns is None or len(self.recent) < LEAST:
             return False
         speed = max(bank.mean_of(SPEED), 0.0)
-        brake = config.train.full_brake
-        c0, c1, c2 = config.train.resistance_si
-        grade = GRADE_SIGMA * config.grade_error
-        most = GRAVITY * (BRAKE_ERROR * brake + RESISTANCE_ERROR * (c0 + speed * (c1 + c2 * speed)) + grade)
+        grade, most = GRADE_SIGMA * config.grade_error, strongest_mps2(config, speed)
         time, places = self._from_newest()
         white, slow = _errors(bank, declared_m, rounded_m)
         seen = self.wandering.of(slow)
@@ -161,6 +158,13 @@ class Course(NamedTuple):
         newest_ns, newest_m = self.recent[-1]
         time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
         return time, np.array([place_m - newest_m for _, place_m in self.recent])
+
+
+def strongest_mps2(config: Config, speed_mps: float) -> float:
+    """By how much a train slows down at most, m/s^2."""
+    c0, c1, c2 = config.train.resistance_si
+    resisting = RESISTANCE_ERROR * (c0 + speed_mps * (c1 + c2 * speed_mps))
+    return GRAVITY * (BRAKE_ERROR * config.train.full_brake + resisting + GRADE_SIGMA * config.grade_error)
 
 
 def _seen(time: Array, span_s: float) -> int | None:

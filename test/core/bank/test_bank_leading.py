@@ -1,0 +1,138 @@
+# Copyright 2026 the adhesion_node authors. SPDX-License-Identifier: Apache-2.0
+#
+# Licensed under the Apache License, Version 2.0 (the "License"); you may not use this file except in compliance with
+# the License. You may obtain a copy of the License at http://www.apache.org/licenses/LICENSE-2.0 Unless required by
+# applicable law or agreed to in writing, software distributed under the License is distributed on an "AS IS" BASIS,
+# WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
+# governing permissions and limitations under the License.
+
+"""Positions of one axle's odometer beside the wheels of all: known as such, the train is followed by its wheels."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from banks import CONFIG, FULL, FULL_PA, S, bank_of
+from oracles import specific_resistance
+
+from adhesion_node.core import Estimate, Measurement, Outcome, State, WheelSample, init, predict, step
+from adhesion_node.core.bank.layout import RADIUS, SPEED
+from adhesion_node.core.bank.leading import SCALE, unscaled
+from adhesion_node.core.physics.train import Array
+
+BRAKE_S, COAST_S, AGAIN_S, H, AXLES = 30.0, 45.0, 60.0, 0.1, 8
+TIMES = np.arange(round((AGAIN_S + 5.0) / H)) * H
+FOUND_S = 3.0
+"""So long behind the brake axles have slid for two seconds."""
+
+
+class Drive(NamedTuple):
+    """A train that cruises, brakes on a rail that its axles slide on, coasts, and brakes again."""
+
+    places: Array
+    speeds: Array
+    rims: Array
+    """Shape (T, AXLES)."""
+
+
+@cache
+def drive(mu: float) -> Drive:
+    """Protection lets each axle creep by up to 12 % and roll again, one behind the other."""
+    speed, speeds = 40.0, []
+    for t in TIMES:
+        speeds.append(speed)
+        slowing = 9.8 * (min(mu, FULL) + float(specific_resistance(np.array(speed)))) if braked(t) else 0.0
+        speed -= H * slowing
+    held = np.array(speeds)
+    places = np.concatenate(([0.0], np.cumsum(0.5 * H * (held[1:] + held[:-1]))))
+    phase = TIMES[:, None] / 2.0 + np.arange(AXLES) / AXLES
+    slides = np.array([braked(t - 1.0) for t in TIMES])[:, None] & (mu < FULL)
+    creep = np.where(slides, 0.06 * (1.0 - np.cos(2.0 * np.pi * phase)), 0.002)
+    return Drive(places, held, held[:, None] * (1.0 - creep))
+
+
+def braked(t_s: float) -> bool:
+    """Whether the brake is applied."""
+    return BRAKE_S <= t_s < COAST_S or t_s >= AGAIN_S
+
+
+def followed(mu: float, positions: Array, std_m: float = 1.0) -> tuple[State, list[Estimate], list[int]]:
+    """What is told of it, and how many positions were left out by then as those of a sliding wheel."""
+    state, estimates, left_out = init(CONFIG, 1), [], []
+    noise = 0.02 * np.random.default_rng(7).standard_normal((TIMES.size, AXLES))
+    for t, place, rims in zip(TIMES.tolist(), positions.tolist(), drive(mu).rims + noise, strict=True):
+        t_ns = S + round(t * S)
+        wheels = WheelSample(t_ns, tuple((rims / CONFIG.train.wheel_radius_m).tolist()))
+        pressure = FULL_PA if braked(t) else 0.0
+        state, estimate = step(CONFIG, state, Measurement(t_ns, place, std_m**2, pressure, wheels=(wheels,)))
+        left_out.append(state.counts[Outcome.SLIDING])
+        estimates += [] if estimate is None else [estimate]
+    return state, estimates, left_out
+
+
+def odometer(mu: float, axle: int, scale: float) -> Array:
+    """Positions that it gives."""
+    rim = drive(mu).rims[:, axle]
+    way = np.concatenate(([0.0], np.cumsum(0.5 * H * (rim[1:] + rim[:-1]))))
+    return np.asarray(scale * way + 0.03 * np.random.default_rng(axle).standard_normal(way.size))
+
+
+def shortest_way(mu: float, speed_mps: float) -> float:
+    """To a standstill on that rail, but for the resistance of the train."""
+    return speed_mps**2 / (2.0 * 9.8 * (mu + float(specific_resistance(np.array(speed_mps)))))
+
+
+@pytest.mark.parametrize("mu", [0.03, 0.06])
+@pytest.mark.parametrize(("axle", "scale"), [(0, 1.0), (3, 1.008), (7, 0.992)])
+def test_the_train_is_followed_by_its_wheels(mu: float, axle: int, scale: float) -> None:
+    """Before: its positions were believed, or the train was followed blind and its curve many times too long."""
+    state, estimates, left_out = followed(mu, odometer(mu, axle, scale))
+    truth = drive(mu)
+    braking = [each for each in estimates if BRAKE_S + FOUND_S < each.t_ns / S - 1.0 < COAST_S]
+    assert len(braking) > 20
+    for each in braking:
+        true = float(np.interp(each.t_ns / S - 1.0, TIMES, truth.speeds))
+        safe = predict(CONFIG, each).safe
+        assert not each.withheld
+        assert abs(each.speed_mps - true) < 3.0 * each.speed_std_mps < 3.0
+        assert each.mu_lower <= mu
+        assert safe is not None
+        assert safe.distance_m[-1] > shortest_way(mu, true)
+    assert safe is not None
+    assert safe.distance_m[-1] < 2.0 * shortest_way(mu, true)
+    assert 0.8 * mu < braking[-1].mu < 1.2 * mu
+    coasting, again = (np.array(left_out)[(start < TIMES) & (end > TIMES)] for start, end in ((50, 59), (60.3, 65)))
+    assert coasting[0] == coasting[-1]
+    assert np.all(np.diff(again) == 1)  # it is known from the start, this time
+    assert state.memory is not None
+    assert state.memory.aside
+
+
+@pytest.mark.parametrize("mu", [0.03, 0.06, 0.2])
+@pytest.mark.parametrize("white_m", [0.02, 0.1, 0.3])
+def test_satellites_lead_though_axles_slide(mu: float, white_m: float) -> None:
+    rng = np.random.default_rng(5)
+    positions = drive(mu).places + white_m * rng.standard_normal(TIMES.size)
+    state, _, _ = followed(mu, positions)
+    assert not state.counts[Outcome.SLIDING]
+
+
+def test_an_odometer_whose_axle_rolls_leads() -> None:
+    state, _, _ = followed(0.2, odometer(0.2, 3, 1.008))
+    assert not state.counts[Outcome.SLIDING]
+
+
+def test_what_the_speed_is_off_by_the_radii_are_the_other_way() -> None:
+    """The speeds of the rims are known as well as before."""
+    bank = bank_of([2, 3])
+    after = unscaled(bank)
+    more = after.covariance - bank.covariance
+    np.testing.assert_allclose(more[:, SPEED, SPEED], (SCALE * bank.mean[:, SPEED]) ** 2)
+    slope = np.zeros(bank.mean.shape)
+    slope[:, SPEED], slope[:, RADIUS] = 1.0 + bank.mean[:, RADIUS], bank.mean[:, SPEED]
+    np.testing.assert_allclose(np.einsum("hi,hij,hj->h", slope, more, slope), 0.0, atol=1e-9)
+    assert math.isclose(float(np.linalg.eigvalsh(more).min()), 0.0, abs_tol=1e-9)
