@@ -175,7 +175,8 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
         before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
-    told = Gaussian(belief.mean, belief.covariance + SPEED_ERROR)
+    scale_mps = state.leading.odometer.scale_error * float(belief.mean[1])
+    told = Gaussian(belief.mean, belief.covariance + SPEED_ERROR + np.diag([0.0, scale_mps**2]))
     verdict = _verdict(memory, findings, told, memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict, findings.known)
     estimate = estimate_of(newest.t_ns, verdict, knowledge.changes, findings.ahead, memory.misled)

@@ -21,7 +21,7 @@ from .following import followed
 from .gear.wheels import FEWEST
 from .layout import RADIUS, SIZE, SPEED, Bank
 from .memory import Memory
-from .sensors.odometer import Odometer
+from .sensors.odometer import SCALE, Odometer
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -31,9 +31,6 @@ MOST = 500
 
 CALM = 250
 """... and after which there is no need to go farther back while nothing speaks for an axle."""
-
-SCALE = 0.01
-"""Error of an odometer's scale: its wheel's radius is known no better."""
 
 
 class Leading(NamedTuple):

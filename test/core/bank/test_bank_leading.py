@@ -21,7 +21,8 @@ from oracles import specific_resistance
 
 from adhesion_node.core import Estimate, Measurement, Outcome, State, WheelSample, init, predict, step
 from adhesion_node.core.bank.layout import RADIUS, SPEED
-from adhesion_node.core.bank.leading import SCALE, unscaled
+from adhesion_node.core.bank.leading import unscaled
+from adhesion_node.core.bank.sensors.odometer import SCALE
 from adhesion_node.core.physics.train import Array
 
 BRAKE_S, COAST_S, AGAIN_S, H, AXLES = 30.0, 45.0, 60.0, 0.1, 8
@@ -121,9 +122,27 @@ def test_satellites_lead_though_axles_slide(mu: float, white_m: float) -> None:
     assert not state.counts[Outcome.SLIDING]
 
 
-def test_an_odometer_whose_axle_rolls_leads() -> None:
-    state, _, _ = followed(0.2, odometer(0.2, 3, 1.008))
+@pytest.mark.parametrize("scale", [1.008, 0.992])
+def test_an_odometer_whose_axle_rolls_leads_and_its_scale_is_not_trusted(scale: float) -> None:
+    """Before: the speed was told to within 0.1 m/s, and off by 0.3."""
+    state, estimates, _ = followed(0.2, odometer(0.2, 3, scale))
     assert not state.counts[Outcome.SLIDING]
+    for each in estimates[30:]:
+        true = float(np.interp(each.t_ns / S - 1.0, TIMES, drive(0.2).speeds))
+        assert abs(each.speed_mps - true) < 3.0 * each.speed_std_mps < 1.5
+
+
+def test_the_speed_by_satellites_and_wheels_is_told_as_well_as_it_is_known() -> None:
+    positions = drive(0.2).places + 0.1 * np.random.default_rng(5).standard_normal(TIMES.size)
+    _, estimates, _ = followed(0.2, positions, 0.1)
+    assert max(each.speed_std_mps for each in estimates[30:]) < 0.2
+
+
+@pytest.mark.parametrize("step_m", [-6.0, 6.0])
+def test_what_a_balise_corrects_is_no_noise_of_the_odometer(step_m: float) -> None:
+    state, _, left_out = followed(0.06, odometer(0.06, 3, 1.0) + step_m * (TIMES > BRAKE_S - 3.0))
+    assert left_out[round((BRAKE_S + FOUND_S + 1.0) / H)] > 0
+    assert state.leading.odometer.is_found
 
 
 def test_what_the_speed_is_off_by_the_radii_are_the_other_way() -> None:

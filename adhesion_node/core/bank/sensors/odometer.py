@@ -26,12 +26,19 @@ S = 1_000_000_000
 LOOK_NS, LONGEST_NS, SAMPLES = S // 2, 2 * S, 3
 """Time, at least and at most, and samples of the wheels at least, over which positions are held against them."""
 
-LEARNT, LEAST_LEARNT = 0.05, 12
-"""Share of a new look in what is known of how positions differ from wheels that roll, and looks from which it is."""
+LEAST_LEARNT, MOST_LEARNT = 12, 20
+"""Looks from which it is known how positions differ from wheels that roll, and over how many the mean of that is."""
 
-LEAST, UNEQUAL, QUIET_MPS = 0.005, 0.02, 0.5
-"""What they differ by at least, relative, as a look takes the mean of few samples; more than the next is a spin; and
-standard deviation from which they are no odometer's."""
+LEAST, APART_MPS = 0.005, 1.0
+"""What they differ by at least, relative, as a look takes the mean of few samples; more than the latter is a step, or a
+spin, unless it lasts."""
+
+NOISY_MPS, QUIET_MPS = 0.5, 0.15
+"""Standard deviations of that from which positions are no odometer's, and below which they may be: satellites that err
+by 0.1 m white differ by 0.3 m/s."""
+
+SCALE = 0.01
+"""Error of an odometer's scale: its wheel's radius is known no better."""
 
 MATCHED, MOST = 3.0, 6.5
 """Standard deviations within which positions go with an axle, and log odds that one look tells at most."""
@@ -65,6 +72,11 @@ class Odometer(NamedTuple):
     def is_found(self) -> bool:
         """Whether the positions are those of an axle."""
         return max(self.running, default=0.0) > FOUND
+
+    @property
+    def scale_error(self) -> float:
+        """Error of the speed that they tell, relative: what wheels roll as no receiver does may be an axle's own."""
+        return SCALE if self.learnt >= LEAST_LEARNT and self.variance < QUIET_MPS**2 else 0.0
 
     def after(self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool) -> Odometer:
         """Take in what wheels and positions say up to a measurement."""
@@ -103,15 +115,17 @@ class Odometer(NamedTuple):
 
     def _learning(self, speed_mps: float, rim_mps: float) -> Odometer:
         """No brake is applied: wheels roll, but for such as spin."""
-        part = max(LEARNT, 1.0 / (self.learnt + 1))
-        scale = self.scale + part * (speed_mps / rim_mps - self.scale)
-        off = min(abs(speed_mps - self.scale * rim_mps), UNEQUAL * rim_mps) if self.learnt else 0.0
-        variance = self.variance + part * (off**2 - self.variance)
-        return self._replace(scale=scale, variance=variance, learnt=self.learnt + 1, least_mps=rim_mps)
+        off = speed_mps - self.scale * rim_mps
+        if self.learnt >= LEAST_LEARNT and abs(off) > APART_MPS:
+            return self._replace(learnt=self.learnt - 1, least_mps=rim_mps)
+        part = 1.0 / (self.learnt + 1)
+        variance = self.variance + part * (off**2 - self.variance) if self.learnt else 0.0
+        learnt, scale = min(self.learnt + 1, MOST_LEARNT), self.scale + part * off / rim_mps
+        return self._replace(scale=scale, variance=variance, learnt=learnt, least_mps=rim_mps)
 
     def _held_against(self, speed_mps: float, rims: list[float], least_mps: float) -> Odometer:
         """Under the brake: positions that are slower than the train can be go with an axle, or err."""
-        if self.learnt < LEAST_LEARNT or self.variance > QUIET_MPS**2:
+        if self.learnt < LEAST_LEARNT or self.variance > NOISY_MPS**2:
             return self
         speed_mps, variance = speed_mps / self.scale, self.variance + (LEAST * least_mps) ** 2
         by_train = (speed_mps - least_mps) ** 2
