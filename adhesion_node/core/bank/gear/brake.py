@@ -34,8 +34,9 @@ axles gently, whatever the wheels show: for so long the brake is not said to lim
 HELD_NS = 4 * S
 """So long behind a dump the brake counts as demanded as before."""
 
-EMPTY_NS = 3 * S // 2
-"""A cylinder that has been empty so long was released."""
+EMPTY_NS, EMPTIED_NS = 3 * S // 2, 4 * S
+"""A cylinder that has been empty so long was released; the latter where axles are seen to slide: gentle protection
+empties it until a rim has come back, which takes seconds on a film."""
 
 LATELY, KEPT, HELD, EMPTY = 1.5, 3.5, 8.0, 4.5
 """Samples that the times of a fall, of those that are kept, behind a dump and of an empty cylinder hold at least, where
@@ -121,7 +122,8 @@ class BrakeSeen(NamedTuple):
         fell_ns = t_ns if fell else self.fell_ns
         dumped_ns = t_ns if dumps and not rolls else dumped_ns
         held = dumped_ns is not None and (rolls is False or t_ns - dumped_ns < at_least(HELD_NS, HELD, every_ns))
-        dumping = held and full_ns is not None and t_ns - full_ns < at_least(EMPTY_NS, EMPTY, every_ns)
+        empty_ns = at_least(EMPTIED_NS if rolls is False else EMPTY_NS, EMPTY, every_ns)
+        dumping = held and full_ns is not None and t_ns - full_ns < empty_ns
         demanded = demand_pa
         if demanded is None:
             demanded = max(self.demanded_pa, peak) if dumping else pressure  # it fell before that was a dump

@@ -62,9 +62,20 @@ def test_a_cylinder_that_is_held_low_while_axles_slide_is_not_eased() -> None:
         brake = brake.after(CYLINDER, [sample], None, rolls=False)
     assert brake.demanded_pa == FULL_PA
     assert brake.after(CYLINDER, [PressureSample(31 * S, 0.2 * FULL_PA)], None, rolls=True).demanded_pa == 0.2 * FULL_PA
-    for index in range(20):
+    for index in range(50):
         brake = brake.after(CYLINDER, [PressureSample(31 * S + index * 100 * MS, 0.0)], None, rolls=False)
     assert brake.demanded_pa < FULL_PA
+
+
+@pytest.mark.parametrize(("rolls", "demanded_pa"), [(False, FULL_PA), (True, 0.0), (None, 0.0)])
+def test_a_cylinder_that_is_empty_for_seconds_while_axles_slide_is_not_released(
+    rolls: bool | None, demanded_pa: float
+) -> None:
+    """Gentle protection empties it until the rim has come back: on a film of 0.02 that takes as long."""
+    brake = BrakeSeen()
+    for sample in sampled(lambda time: applying(time) if time < 4.0 else 0.0, 7.0):
+        brake = brake.after(CYLINDER, [sample], None, rolls=False if sample.t_ns < 6 * S else rolls)
+    assert brake.demanded_pa == demanded_pa
 
 
 @pytest.mark.parametrize("least_pa", [200e3, 300e3])
