@@ -72,7 +72,7 @@ def _expected(estimate: Estimate) -> float | AdhesionLaw:
 
 def _slowed(slowing: Slowdown, mu: float | AdhesionLaw | Ahead) -> BrakingCurve:
     """The curve by an adhesion, which may depend on what else slows the train down."""
-    return slowing.curve(mu.against(slowing.resistance) if isinstance(mu, Ahead) else mu)
+    return slowing.curve(mu.against(slowing.train, slowing.resistance) if isinstance(mu, Ahead) else mu)
 
 
 def _curve(config: Config, estimate: Estimate, train: Train, mu: float | AdhesionLaw | Ahead) -> BrakingCurve | None:

@@ -196,6 +196,15 @@ def test_who_may_be_eight_times_as_fast_has_the_way_of_that_train_on_any_grade(s
     assert (safe.speed_mps[0], safe.speed_mps[-1]) == (2.0, 0.0)
 
 
+def test_the_fastest_train_uses_no_more_than_its_brake_does() -> None:
+    """With rotating masses the limit of the brake took away what had been left for the fastest train."""
+    train = Train(rotating_mass_fraction=0.08, resistance_c0=0.0, resistance_c1=0.0, resistance_c2=0.0)
+    given = estimate(speed_mps=10.0)._replace(ahead=Ahead((0.0,), (NOTHING,), train.full_brake, 0.16))
+    safe = predict(windowed(train=train), given).safe
+    assert safe is not None
+    assert safe.distance_m[-1] == pytest.approx(25.0**2 / (2.0 * G * train.full_brake / 1.08), rel=1e-3)
+
+
 @pytest.mark.parametrize("slope", [0.0, 0.02])
 def test_no_less_is_counted_on_than_the_floor_of_the_fastest_train(slope: float) -> None:
     given = estimate(speed_mps=20.0)._replace(ahead=Ahead((0.0,), (0.01,), 0.05, 0.5))

@@ -22,15 +22,13 @@ from .gear.wheels import FEWEST
 from .layout import RADIUS, SIZE, SPEED, Bank
 from .memory import Memory
 from .sensors.odometer import SCALE, Odometer
+from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
 
 MOST = 500
-"""Measurements after which it is too late to go back, ..."""
-
-CALM = 250
-"""... and after which there is no need to go farther back while nothing speaks for an axle."""
+"""Measurements after which it is too late to go back."""
 
 
 class Leading(NamedTuple):
@@ -43,18 +41,27 @@ class Leading(NamedTuple):
     since: tuple[Measurement, ...] = ()
 
     def heard(self, config: Config, memory: Memory, measurement: Measurement) -> Leading:
-        """Hold a measurement against the wheels, whether it is believed or not."""
-        return self._replace(odometer=self.odometer.after(config, memory.wheels, measurement, memory.braked))
+        """Hold a measurement, whether it is believed or not, against the wheels that do not seem to hang."""
+        hanging = memory.axles.hanging(memory.slowed_mps)
+        turning = tuple(sample.without(hanging) for sample in measurement.wheels)
+        heard = measurement._replace(wheels=turning) if hanging else measurement
+        return self._replace(odometer=self.odometer.after(config, memory.wheels, heard, memory.braked))
 
     def after(self, config: Config, before: Memory, memory: Memory, measurement: Measurement) -> tuple[Memory, Leading]:
         """The train followed up to a measurement, and anew by its wheels where positions turn out to be an axle's."""
         leading = self._with(before, memory, measurement)
         if leading.before is None or not (memory.misled or self.odometer.is_found):
             return memory, leading
-        again = leading.before._replace(pointing=memory.pointing, aside=True, bank=unscaled(leading.before.bank))
+        again = leading.before._replace(
+            bank=unscaled(leading.before.bank),
+            pointing=memory.pointing,
+            course=Course(wandering=leading.before.course.wandering.unseen()),
+            aside=True,
+        )
         for each in leading.since:
             again = followed(config, again, each._replace(variance_m2=math.inf), lambda: leading.known)
-        return again, leading._replace(before=None, since=())
+        told = again._replace(changes=max(again.changes, memory.changes))  # no fewer than were told already
+        return told, leading._replace(before=None, since=())
 
     def _with(self, before: Memory, memory: Memory, measurement: Measurement) -> Leading:
         """With a measurement; there is nothing to go back to without wheels, nor late in a braking."""
@@ -65,8 +72,6 @@ class Leading(NamedTuple):
             return self._replace(before=None, since=())
         if opens:
             return self._replace(before=before, known=memory.known, since=(measurement,))
-        if len(self.since) >= CALM and not any(self.odometer.running):
-            return self._replace(before=before, since=(measurement,))
         return self if self.before is None else self._replace(since=(*self.since, measurement))
 
 

@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -39,7 +40,7 @@ class Proving(NamedTuple):
             return memory, Proving(self.before or before, (*self.since, measurement))
         if memory.pointing.forward is not False or self.before is None:
             return memory, Proving()
-        again = self.before._replace(pointing=memory.pointing)
+        again = self.before._replace(pointing=memory.pointing, aside=memory.aside)
         for each in (*self.since, measurement):
-            again = followed(config, again, each, rail)
+            again = followed(config, again, each._replace(variance_m2=math.inf) if memory.aside else each, rail)
         return again, Proving()

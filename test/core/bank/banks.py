@@ -97,7 +97,7 @@ def ahead_bank(mu: float, speed: float, kinds: list[int] | None = None) -> Bank:
 
 def counted(ahead: Ahead, speeds: Array = SPEEDS) -> Array:
     """Adhesion that is counted on ahead of the train of these tests on the level, at some speeds."""
-    return ahead.against(CRH3.specific_resistance(speeds))(speeds)
+    return ahead.against(CRH3, CRH3.specific_resistance(speeds))(speeds)
 
 
 def memory_of(bank: Bank, braking: Braking, seen: int) -> Memory:

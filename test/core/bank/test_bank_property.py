@@ -97,7 +97,7 @@ def probe(index: int, measurements: list[Measurement]) -> None:
         assert 0.0 <= findings.rail.lower <= findings.rail.mu < math.inf
         assert 0.0 < findings.rail.std < math.inf
         resistance = config.train.specific_resistance(SPEEDS)
-        slowing = resistance + findings.ahead.against(resistance)(SPEEDS)
+        slowing = resistance + findings.ahead.against(config.train, resistance)(SPEEDS)
         assert ((slowing >= -1e-15) & np.isfinite(slowing)).all()
 
 

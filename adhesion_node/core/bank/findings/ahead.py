@@ -17,7 +17,7 @@ import numpy as np
 
 from ...belief.rail import Rail
 from ...physics.adhesion import AdhesionLaw
-from ...physics.train import Array
+from ...physics.train import Array, Train
 from ...setting import once
 from ..blind import STANDS_MPS
 from ..gear.wheels import HINTED
@@ -87,9 +87,13 @@ class Ahead(NamedTuple):
     share: float = 1.0
     """... of what slows the train down by which such a part counts: it may be faster than told, and needs more way."""
 
-    def against(self, resistance: Array | float) -> AdhesionLaw:
-        """Adhesion at speeds, element by element, where resistance and grade, over the weight, slow the train, too."""
-        least = self.share * (self.floor + resistance) - resistance
+    def against(self, train: Train, resistance: Array | float) -> AdhesionLaw:
+        """Adhesion at speeds, element by element, where resistance and grade, over the weight, slow the train, too.
+
+        The fastest train that there may be uses no more than its brake does.
+        """
+        floor = train.used_adhesion(self.floor, train.full_brake, resistance)
+        least = self.share * (floor + resistance) - resistance
         return lambda speed_mps: np.maximum(np.interp(speed_mps, self.speed_mps, self.mu), least)
 
     def at_least(self, other: Ahead) -> Ahead:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from ...intake.standing import Standing
-from .repeating import Repeating
+from .repeating import BY_CHANCE, Repeating
 
 FASTEST_FALL_MPS2 = 100.0
 """No brake stops a wheel faster, at the rim."""
@@ -43,6 +43,11 @@ class Axles(NamedTuple):
             for one, rim in zip(before.standing, rims_mps, strict=True)
         )
         return Axles(tuple(repeating), tuple(standing))
+
+    def hanging(self, slowed_mps: float) -> tuple[int, ...]:
+        """Those that are not believed, and such as have come again so often that they may not be soon."""
+        again = (axle for axle, one in enumerate(self.repeating) if one.again > BY_CHANCE)
+        return tuple(sorted({*again, *self.lying(slowed_mps)}))
 
     def lying(self, slowed_mps: float) -> tuple[int, ...]:
         """Those that are not believed, counted from 0."""

@@ -43,9 +43,10 @@ SCALE = 0.01
 MATCHED, MOST = 3.0, 6.5
 """Standard deviations within which positions go with an axle, and log odds that one look tells at most."""
 
-FOUND, KEPT = 12.0, 24.0
-"""Log odds from which positions are an axle's, which takes two looks, and that are kept at most, as sensors change. Of
-satellites that err by 0.1 m white and by 2 m over 30 s they were found so in none of 120 brakings."""
+FOUND, KEPT, CARRIED = 12.0, 24.0, 6.0
+"""Log odds from which positions are an axle's, which takes two looks, that are kept at most, and that go into the next
+braking, as sensors change: one look is enough there. Of satellites that err by 0.1 m white and by 2 m over 30 s they
+were found so in none of 120 brakings."""
 
 
 class Odometer(NamedTuple):
@@ -64,7 +65,9 @@ class Odometer(NamedTuple):
     learnt: int = 0
     """... and of how many looks."""
     least_mps: float = 0.0
-    """The train is as fast at least, on the scale of the rims: as the fastest, or as the hardest brake has left it."""
+    """The train is as fast at least, as rims tell it: as the fastest, or as the hardest brake has left it, ..."""
+    least_ns: int = 0
+    """... at this time."""
     running: tuple[float, ...] = ()
     """Log odds of each axle that positions are its own, not the train's; no less than 0 (Page 1954)."""
 
@@ -83,23 +86,28 @@ class Odometer(NamedTuple):
         odometer = self
         for sample in measurement.wheels if wheels.is_learnt else ():
             odometer = odometer._turned(config, wheels.radius, sample)
-        if not measurement.has_position:
-            return odometer
+        return odometer._placed(config, wheels, measurement, braked) if measurement.has_position else odometer
+
+    def _placed(self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool) -> Odometer:
         t_ns, place_m = measurement[:2]
-        begun = odometer._replace(since=(t_ns, place_m), sums_mps=(), samples=0)
-        elapsed_ns = t_ns - (odometer.since or (0, 0.0))[0]
-        if odometer.since is None or not wheels.is_learnt or elapsed_ns > LONGEST_NS:
+        begun = self._replace(since=(t_ns, place_m), sums_mps=(), samples=0)
+        elapsed_ns = t_ns - (self.since or (0, 0.0))[0]
+        if self.since is None or not wheels.is_learnt or elapsed_ns > LONGEST_NS:
             return begun
-        if elapsed_ns < LOOK_NS or odometer.samples < SAMPLES:
-            return odometer
-        rims = [each / odometer.samples for each in odometer.sums_mps]
+        if elapsed_ns < LOOK_NS or self.samples < SAMPLES:
+            return self
+        rims = [each / self.samples for each in self.sums_mps]
         known = [each for each in rims if not math.isnan(each)]
         if len(known) < FEWEST or median(known) < LEARNING_MPS:
             return begun
-        speed_mps = S * (place_m - odometer.since[1]) / elapsed_ns
+        speed_mps = S * (place_m - self.since[1]) / elapsed_ns
+        least_mps = min(median(known), speed_mps / self.scale)  # axles that spin are faster than the train
+        begun = begun._replace(least_mps=least_mps, least_ns=t_ns)
         if not braked:
             return begun._learning(speed_mps, median(known))
-        left_mps = self.least_mps - strongest_mps2(config, self.least_mps) * elapsed_ns / S
+        if wheels.may_spin(t_ns):
+            return begun
+        left_mps = self.least_mps - strongest_mps2(config, self.least_mps) * (t_ns - self.least_ns) / S
         return begun._held_against(speed_mps, rims, max(wheels.fastest(known), left_mps))
 
     def _turned(self, config: Config, radius: tuple[float, ...], sample: WheelSample) -> Odometer:
@@ -116,12 +124,13 @@ class Odometer(NamedTuple):
     def _learning(self, speed_mps: float, rim_mps: float) -> Odometer:
         """No brake is applied: wheels roll, but for such as spin."""
         off = speed_mps - self.scale * rim_mps
+        odometer = self._replace(running=tuple(min(odds, CARRIED) for odds in self.running))
         if self.learnt >= LEAST_LEARNT and abs(off) > APART_MPS:
-            return self._replace(learnt=self.learnt - 1, least_mps=rim_mps)
+            return odometer._replace(learnt=self.learnt - 1)
         part = 1.0 / (self.learnt + 1)
         variance = self.variance + part * (off**2 - self.variance) if self.learnt else 0.0
         learnt, scale = min(self.learnt + 1, MOST_LEARNT), self.scale + part * off / rim_mps
-        return self._replace(scale=scale, variance=variance, learnt=learnt, least_mps=rim_mps)
+        return odometer._replace(scale=scale, variance=variance, learnt=learnt)
 
     def _held_against(self, speed_mps: float, rims: list[float], least_mps: float) -> Odometer:
         """Under the brake: positions that are slower than the train can be go with an axle, or err."""

@@ -94,18 +94,18 @@ def test_ahead_is_counted_on_in_the_braking_curve(mu: float, speed: float) -> No
     assert ahead.speed_mps[-1] == pytest.approx(speed, rel=0.05)
     assert all(0.0 <= low <= 3.0 * mu for low in ahead.mu)
     assert ahead.mu[-1] < min(mu, FULL)
-    here = curve(CRH3, speed, ahead.against(0.0))
+    here = curve(CRH3, speed, ahead.against(CRH3, 0.0))
     # the curve lies between those of its least and of its largest value
     longest, shortest = (curve(CRH3, speed, part(ahead.mu)) for part in (min, max))
     assert shortest.distance_m[-1] - 1e-6 <= here.distance_m[-1] <= longest.distance_m[-1] + 1e-6
-    better = curve(CRH3, speed, ahead.at_least(Ahead((0.0,), (0.0,), 0.02)).against(0.0))
+    better = curve(CRH3, speed, ahead.at_least(Ahead((0.0,), (0.0,), 0.02)).against(CRH3, 0.0))
     assert better.distance_m[-1] <= here.distance_m[-1] + 1e-9
 
 
 def test_the_safer_the_longer() -> None:
     bank = ahead_bank(0.05, 50.0)
     lengths = [
-        curve(CRH3, 50.0, counted_on(CONFIG, bank, missed, Braking(FULL), NOTHING).against(0.0)).distance_m[-1]
+        curve(CRH3, 50.0, counted_on(CONFIG, bank, missed, Braking(FULL), NOTHING).against(CRH3, 0.0)).distance_m[-1]
         for missed in (0.5, 0.1, 0.05, 0.01, 0.001)
     ]
     assert lengths == sorted(lengths)
@@ -194,8 +194,10 @@ def test_less_than_hardly_any_rail_gives_counts_once_it_is_likely(probability: f
 
 def test_ahead_is_linear_between_its_speeds_and_constant_beyond() -> None:
     ahead = Ahead((0.0, 10.0, 20.0), (0.06, 0.05, 0.03))
-    assert ahead.against(0.0)(np.array([0.0, 5.0, 15.0, 20.0, 90.0])) == pytest.approx([0.06, 0.055, 0.04, 0.03, 0.03])
-    assert constant(-1.0).against(0.0)(np.array([0.0, 80.0])) == pytest.approx([0.0, 0.0])
+    assert ahead.against(CRH3, 0.0)(np.array([0.0, 5.0, 15.0, 20.0, 90.0])) == pytest.approx(
+        [0.06, 0.055, 0.04, 0.03, 0.03]
+    )
+    assert constant(-1.0).against(CRH3, 0.0)(np.array([0.0, 80.0])) == pytest.approx([0.0, 0.0])
 
 
 def test_a_train_that_may_be_faster_than_told_counts_on_less() -> None:
