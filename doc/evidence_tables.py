@@ -11,6 +11,7 @@
 import json
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from statistics import fmean
 
 from forms import COLUMNS, Row, cell, listed
 from interface_tables import table
@@ -41,6 +42,8 @@ BRIEFLY = {
 }
 PRINTED = "the paper's method, as printed (its noise is not)"
 KEPT = "lower bound kept by the bank; by the rail condition (asked: 95 %)"
+CONFIDENCE = 0.99
+"""Of the safe curve, by default."""
 EARLIER = {"SBI": "sbi_m", "W": "warning_m", "P": "permitted_m", "I": "indication_m"}
 
 
@@ -55,6 +58,8 @@ def parts() -> dict[str, str]:
         "bound": ("bound", map(_at_speeds, files["bound"])),
         "distances": ("distances", files["distances"]),
         "safety": ("safety", files["safety"]),
+        "worlds": ("worlds", (row for row in files["worlds"] if row["curve_confidence"] == CONFIDENCE)),
+        "calibration": ("worlds", _calibrated(files["worlds"])),
         "saved": ("distances", _saved(files["distances"])),
         "creep experiments": ("creep", (_switched(row) for row in creep if "samples" in row)),
         "creep withheld": ("creep", map(_wrong, creep[0]["withholding"])),
@@ -70,6 +75,18 @@ def parts() -> dict[str, str]:
         head = f"km/h, before {limits[0]['target_kmh']:.0f} km/h"
         made[f"intervention {name}"] = "intervention", _crossed(head, _limits(limits))
     return {name: f"{shown}\n\n{_source(file)}" for name, (file, shown) in made.items()}
+
+
+def _calibrated(rows: Sequence[Row]) -> Iterator[Row]:
+    """By the confidence that the safe curve is asked for: how often it is long enough, and how much longer."""
+    for asked in sorted({row["curve_confidence"] for row in rows}):
+        own = [row for row in rows if row["curve_confidence"] == asked]
+        least = min(own, key=lambda row: row["safe"])
+        sound = [row["excess_percent"] for row in own if "odometer" not in row["sensors"]]
+        yield {
+            **{"curve_confidence": asked, "safe": fmean(row["safe"] for row in own), "least": least["safe"]},
+            **{"sensors": least["sensors"], "excess_percent": fmean(sound)},
+        }
 
 
 def _source(file: str) -> str:

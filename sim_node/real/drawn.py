@@ -94,10 +94,11 @@ def _rail(rng: np.random.Generator) -> Rail:
     """One level, one that rises or falls by up to a tenth in a kilometre, patches, or a fall."""
     level, other = (_between(LEAST_MU0, MOST_MU0, rng) for _ in range(2))
     falls_m, length_m, lost = rng.uniform(200.0, 1500.0), rng.uniform(1.0, 300.0), rng.uniform(0.3, 0.75)
+    changes = 1.0 + rng.uniform(-0.1, 0.1)
     levels = (
         steady(level),
         steady(level),
-        along((0.0, level), (WAY_M, level * np.exp(rng.uniform(-1.0, 1.0) * WAY_M / 10e3))),
+        along(*((1e3 * km, max(level * changes**km, LEAST_MU0)) for km in range(round(WAY_M / 1e3)))),
         patches(level, other, (200.0, 1000.0), (100.0, 800.0)),
         along((falls_m, level), (falls_m + length_m, max(lost * level, LEAST_MU0))),
     )

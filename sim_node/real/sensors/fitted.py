@@ -116,6 +116,7 @@ FITTED: Mapping[str, Fitted] = MappingProxyType(
             ("doppler_only", "the receiver's speed, no position", _DOPPLER, _DEMANDED),
             ("tacho", "the position of an axle that slides", _TACHO, _DEMANDED),
             ("tacho_1hz", "the same once a second", _TACHO_1HZ, _DEMANDED),
+            ("tacho_wheels", "the position of an axle that slides, and the wheels", _TACHO, _DEMANDED, _WHEELS),
             ("one_cylinder", "satellites, the pressure of one cylinder", _gnss(), _CYLINDER),
             ("one_cylinder_wheels", "the same and the wheels", _gnss(), _CYLINDER, _WHEELS),
             ("mean_cylinder", "satellites, the mean pressure of the cylinders", _gnss(), _MEAN),
