@@ -56,7 +56,9 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     memory = state.memory
     if memory is None:
         return _accepted(config, state, measurement, bank.met(config, measurement))
-    state = state._replace(leading=state.leading.heard(config, memory, measurement))
+    hanging = memory.axles.hanging(memory.slowed_mps)
+    odometer = state.odometer.after(config, memory.wheels, measurement, memory.braked, hanging)
+    state = state._replace(odometer=odometer)
     if measurement.has_position and (memory.misled or memory.aside):
         detail = f"position x = {measurement.position_m:.12g}"
         state, measurement = state.told(Event(Outcome.SLIDING, detail)), measurement._replace(variance_m2=math.inf)
@@ -85,9 +87,6 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
         return _unbelieved(config, state, memory, measurement, off, elsewhere, rail)
     measurement = measurement._replace(variance_m2=math.inf) if soon else measurement
     followed = bank.followed(config, memory, measurement, rail, off)
-    if measurement.imu or state.proving.since:
-        followed, proving = state.proving.after(config, memory, followed, measurement, rail)
-        state = state._replace(proving=proving)
     if followed.pointing.askew and not memory.pointing.askew and (measurement.has_position or not memory.is_placed):
         return _undeceived(config, state, measurement, followed)
     return _accepted(config, state, measurement, followed, stepping, soon)
@@ -145,8 +144,8 @@ def _accepted(
     soon: bool = False,
 ) -> tuple[State, Estimate | None]:
     if state.memory is not None:
-        memory, leading = state.leading.after(config, state.memory, memory, measurement)
-        state = state._replace(leading=leading)
+        memory, anew = state.anew.after(config, state.memory, memory, measurement, state.odometer.is_found)
+        state = state._replace(anew=anew)
     if not memory.bank.is_sound():
         raise FloatingPointError("not finite, or a variance below 0")
     placed, seen = measurement.has_position, state.seen
@@ -175,7 +174,7 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
         before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
-    scale_mps = state.leading.odometer.scale_error * float(belief.mean[1])
+    scale_mps = state.odometer.scale_error * float(belief.mean[1])
     told = Gaussian(belief.mean, belief.covariance + SPEED_ERROR + np.diag([0.0, scale_mps**2]))
     verdict = _verdict(memory, findings, told, memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict, findings.known)

@@ -14,10 +14,10 @@ import math
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from .bank.anew import Anew
 from .bank.layout import POSITION, SPEED
-from .bank.leading import Leading
 from .bank.memory import Memory
-from .bank.proving import Proving
+from .bank.sensors.odometer import Odometer
 from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .estimate import Estimate, Knowledge
@@ -83,9 +83,10 @@ class State(NamedTuple):
     """The bank's, where that identifies the adhesion."""
     stepping: Stepping = Stepping()
     """Whether the positions have stepped, where the bank follows them."""
-    proving: Proving = Proving()
-    leading: Leading = Leading()
+    odometer: Odometer = Odometer()
     """Whether the positions are an axle's, where wheels are heard beside them."""
+    anew: Anew = Anew()
+    """What the bank goes back to where something turns out to be wrong."""
     knowledge: Knowledge = Knowledge()
     outliers: int = 0
     """Outliers in a row."""

@@ -81,11 +81,13 @@ class Odometer(NamedTuple):
         """Error of the speed that they tell, relative: what wheels roll as no receiver does may be an axle's own."""
         return SCALE if self.learnt >= LEAST_LEARNT and self.variance < QUIET_MPS**2 else 0.0
 
-    def after(self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool) -> Odometer:
-        """Take in what wheels and positions say up to a measurement."""
+    def after(
+        self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool, hanging: tuple[int, ...] = ()
+    ) -> Odometer:
+        """Take in what positions, believed or not, and wheels that do not seem to hang say up to a measurement."""
         odometer = self
         for sample in measurement.wheels if wheels.is_learnt else ():
-            odometer = odometer._turned(config, wheels.radius, sample)
+            odometer = odometer._turned(config, wheels.radius, sample.without(hanging))
         return odometer._placed(config, wheels, measurement, braked) if measurement.has_position else odometer
 
     def _placed(self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool) -> Odometer:

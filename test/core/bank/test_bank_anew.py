@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Positions of one axle's odometer beside the wheels of all: known as such, the train is followed by its wheels."""
+"""An axle's odometer beside the wheels of all, an accelerometer that lies: once known the train is followed without."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ from banks import CONFIG, FULL, FULL_PA, S, bank_of
 from oracles import specific_resistance
 
 from adhesion_node.core import Estimate, Measurement, Outcome, State, WheelSample, init, predict, step
+from adhesion_node.core.bank.anew import MOST, unscaled
+from adhesion_node.core.bank.following import followed as bank_followed
 from adhesion_node.core.bank.layout import RADIUS, SPEED
-from adhesion_node.core.bank.leading import unscaled
-from adhesion_node.core.bank.proving import Proving
 from adhesion_node.core.bank.sensors.odometer import SCALE
 from adhesion_node.core.belief.rail import Rail
+from adhesion_node.core.intake.samples import ImuSample
 from adhesion_node.core.physics.train import Array
 
 BRAKE_S, COAST_S, AGAIN_S, H, AXLES = 30.0, 45.0, 60.0, 0.1, 8
@@ -64,15 +65,25 @@ def braked(t_s: float) -> bool:
     return BRAKE_S <= t_s < COAST_S or t_s >= AGAIN_S
 
 
-def followed(mu: float, positions: Array, std_m: float = 1.0) -> tuple[State, list[Estimate], list[int]]:
-    """What is told of it, and how many positions were left out by then as those of a sliding wheel."""
+def followed(
+    mu: float, positions: Array, std_m: float = 1.0, until_s: float = math.inf, felt: Array | None = None
+) -> tuple[State, list[Estimate], list[int]]:
+    """What is told of it, and how many positions were left out by then as those of a sliding wheel.
+
+    `felt` is what an accelerometer shows.
+    """
     state, estimates, left_out = init(CONFIG, 1), [], []
     noise = 0.02 * np.random.default_rng(7).standard_normal((TIMES.size, AXLES))
-    for t, place, rims in zip(TIMES.tolist(), positions.tolist(), drive(mu).rims + noise, strict=True):
+    for index, (t, place, rims) in enumerate(
+        zip(TIMES.tolist(), positions.tolist(), drive(mu).rims + noise, strict=True)
+    ):
+        if t >= until_s:
+            break
         t_ns = S + round(t * S)
         wheels = WheelSample(t_ns, tuple((rims / CONFIG.train.wheel_radius_m).tolist()))
+        imu = () if felt is None else (ImuSample(t_ns, float(felt[index])),)
         pressure = FULL_PA if braked(t) else 0.0
-        state, estimate = step(CONFIG, state, Measurement(t_ns, place, std_m**2, pressure, wheels=(wheels,)))
+        state, estimate = step(CONFIG, state, Measurement(t_ns, place, std_m**2, pressure, wheels=(wheels,), imu=imu))
         left_out.append(state.counts[Outcome.SLIDING])
         estimates += [] if estimate is None else [estimate]
     return state, estimates, left_out
@@ -148,7 +159,7 @@ def test_a_gap_under_the_brake_makes_no_odometer_of_satellites(gone: str, seed: 
         pressure = FULL_PA if braked(t) else 0.0
         wheels = (WheelSample(t_ns, seen),)
         state, _ = step(CONFIG, state, Measurement(t_ns, place, variance, pressure, wheels=wheels))
-        assert not state.leading.odometer.is_found, t
+        assert not state.odometer.is_found, t
     assert not state.counts[Outcome.SLIDING]
 
 
@@ -165,20 +176,75 @@ def test_axles_that_span_until_the_brake_make_no_odometer_of_satellites(seed: in
         seen = place + 0.05 * float(rng.standard_normal())
         wheels = (WheelSample(t_ns, tuple(turns.tolist())),)
         state, _ = step(CONFIG, state, Measurement(t_ns, seen, 0.25, FULL_PA * brakes, wheels=wheels))
-        assert not state.leading.odometer.is_found, tick
+        assert not state.odometer.is_found, tick
         place, speed = place + H * speed, speed + H * (-0.5 if brakes else 0.5)
 
 
-def test_an_accelerometer_that_turns_out_to_lie_does_not_make_an_odometers_positions_lead_again() -> None:
-    state, _, _ = followed(0.06, odometer(0.06, 3, 1.0))
-    memory, t_ns = state.memory, S + round(TIMES[-1] * S)
-    assert memory is not None
+def turned(mu: float) -> Array:
+    """What an accelerometer that is turned round shows."""
+    return np.asarray(-np.gradient(drive(mu).speeds, H) + 0.05 * np.random.default_rng(3).standard_normal(TIMES.size))
+
+
+@pytest.mark.parametrize(("mu", "dead"), [(0.02, False), (0.02, True), (0.06, True)])
+def test_an_accelerometer_that_lies_leaves_nothing_behind_beside_an_odometer(mu: float, dead: bool) -> None:
+    """Whichever is found first. Some of it was left in the speed, 0.3 to 0.5 m/s, for seconds."""
+    positions, until_s = odometer(mu, 3, 1.0), BRAKE_S + 14.0
+    felt = np.zeros(TIMES.size) if dead else turned(mu)
+    state, estimates, _ = followed(mu, positions, until_s=until_s, felt=felt)
+    _, alone, _ = followed(mu, positions, until_s=until_s)
+    assert state.memory is not None
+    assert state.memory.aside
+    assert state.memory.pointing.lies
+    for one, other in zip(estimates, alone, strict=True):
+        if one.t_ns > S + round((BRAKE_S + 6.0) * S):
+            assert one.speed_mps == pytest.approx(other.speed_mps, abs=0.05)
+            assert one.mu == pytest.approx(other.mu, rel=0.05)
+
+
+def missed(places: Array, seed: int) -> Array:
+    """Such positions, of which every seventh is off by tens of metres or more."""
+    rng = np.random.default_rng(seed)
+    return np.asarray(places + np.where(rng.random(TIMES.size) < 0.15, 60.0 * rng.standard_normal(TIMES.size), 0.0))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_accelerometer_that_lies_leaves_nothing_behind_where_it_made_positions_seem_a_sliding_wheels(
+    seed: int,
+) -> None:
+    """Wheels and the lie led on together, in one of three cases: the train was taken to be 6 m/s faster than it was."""
+    positions = missed(satellites(0.02, seed), seed)
+    _, estimates, _ = followed(0.02, positions, 0.5, BRAKE_S + 14.0, turned(0.02))
+    for each in estimates:
+        if each.t_ns > S + round((BRAKE_S + 10.0) * S):
+            true = float(np.interp(each.t_ns / S - 1.0, TIMES, drive(0.02).speeds))
+            assert each.speed_mps == pytest.approx(true, abs=0.3)
+
+
+def test_what_is_gone_back_over_holds_what_was_not_believed_too() -> None:
+    """Pressures, wheels and accelerations of the time stand beside such a position."""
+    state, _, _ = followed(0.06, missed(drive(0.06).places, 1), until_s=BRAKE_S + 10.0)
+    assert state.counts[Outcome.OUTLIER] > 10
+    assert len(state.anew.since) == 100
+    assert state.anew.before is not None
+    assert state.anew.before.t_ns < state.anew.since[0].t_ns == S + round(BRAKE_S * S)
+
+
+def test_behind_the_longest_way_back_another_begins() -> None:
+    """Positions that were found to be an axle's only then led on, until the physical check left the train blind."""
+    state, _, _ = followed(0.2, odometer(0.2, 3, 1.0), until_s=BRAKE_S + 3.0)
+    before = state.memory
+    assert before is not None
+    full = state.anew._replace(since=state.anew.since[:1] * MOST)
+    measurement = state.anew.since[-1]
+    later, t_ns = full, before.t_ns
+    memory = before
+    for tick in range(1, 4):
+        measurement = measurement._replace(t_ns=t_ns + tick * S // 10, variance_m2=math.inf)
+        after = bank_followed(CONFIG, memory, measurement, lambda: RAIL)
+        memory, later = later.after(CONFIG, memory, after, measurement, tick == 3)
+    assert len(later.since) == 3
     assert memory.aside
-    lies = memory._replace(pointing=memory.pointing._replace(forward=False))
-    since = tuple(Measurement(t_ns + index * S // 10, 1e4, 1.0, FULL_PA) for index in (1, 2))
-    again, _ = Proving(memory._replace(aside=False), since[:1]).after(CONFIG, memory, lies, since[1], lambda: RAIL)
-    assert again.aside
-    assert again.placed_ns == memory.placed_ns
+    assert memory.braked
 
 
 @pytest.mark.parametrize("scale", [1.008, 0.992])
@@ -201,7 +267,7 @@ def test_the_speed_by_satellites_and_wheels_is_told_as_well_as_it_is_known() -> 
 def test_what_a_balise_corrects_is_no_noise_of_the_odometer(step_m: float) -> None:
     state, _, left_out = followed(0.06, odometer(0.06, 3, 1.0) + step_m * (TIMES > BRAKE_S - 3.0))
     assert left_out[round((BRAKE_S + FOUND_S + 1.0) / H)] > 0
-    assert state.leading.odometer.is_found
+    assert state.odometer.is_found
 
 
 def test_what_the_speed_is_off_by_the_radii_are_the_other_way() -> None:
