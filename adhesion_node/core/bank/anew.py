@@ -87,8 +87,8 @@ def by_wheels(before: Memory, memory: Memory, axles_own: bool) -> Memory | None:
 
     Wheels must be learnt, and so many that some roll. What the accelerometer has shown by now stays known.
     """
-    wheels = before.wheels
-    if before.aside or not (axles_own or memory.misled) or not wheels.is_learnt or len(wheels.radius) < FEWEST:
+    radii = before.wheels.radii
+    if before.aside or not (axles_own or memory.misled) or not radii.is_learnt or len(radii.own) < FEWEST:
         return None
     course = Course(wandering=before.course.wandering.unseen())
     return before._replace(bank=unscaled(before.bank), pointing=memory.pointing, course=course, aside=True)

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..belief.rail import Rail
 from .free import by_noise
-from .gear.wheels import FALLS
+from .gear.slides import FALLS
 from .kernels import springing, uniting
 from .kernels.springing import Rule
 from .kernels.uniting import Pruning

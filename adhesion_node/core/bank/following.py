@@ -22,7 +22,8 @@ from ..intake.samples import MAX_VARIANCE_M2, ImuSample, Measurement, PressureSa
 from ..physics.train import GRAVITY, Array
 from .free import either
 from .gear.brake import BrakeSeen
-from .gear.wheels import BRAKE_BELOW, FILLED_NS, UNLEARNT, told
+from .gear.radii import UNLEARNT
+from .gear.slides import BRAKE_BELOW, FILLED_NS, told
 from .judging import judged
 from .kernels import weighing
 from .labels.kinds import FREE, FREE_STD
@@ -132,7 +133,7 @@ def followed(
         bank = memory.bank_at(config, until_ns) if ahead is None else ahead
         since_ns, before_ns, before = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
-        share = memory.wheels.share(until_ns)
+        share = memory.wheels.slides.share(until_ns)
         brake = memory.brake.after(config, now, demand_pa, None if share is None else share < BRAKE_BELOW)
         memory = memory._replace(
             bank=bank,
@@ -246,12 +247,12 @@ def _pressures(config: Config, brake: BrakeSeen, measurement: Measurement) -> tu
 
 def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int, undemanded: bool) -> Braking:
     """What the brake does from now on."""
-    wheels = memory.wheels
-    share, held = wheels.share(now_ns), wheels.share(now_ns, FILLED_NS)
+    slides, fell = memory.wheels.slides, memory.wheels.fastest.fell(now_ns)
+    share, held = slides.share(now_ns), slides.share(now_ns, FILLED_NS)
     applied = config.train.specific_brake(brake.applied_pa)
     sliding = held if held is not None and held >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
     fills = config.pressure_kind == "demanded" and brake.applied_pa < brake.demanded_pa
     filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
-    slid = told(share, brake.has_slid(now_ns), wheels.fell(now_ns), wheels.one_rolls(now_ns))
+    slid = told(share, brake.has_slid(now_ns), fell, slides.one_rolls(now_ns))
     alone = undemanded and config.pressure_kind != "demanded"
     return Braking(applied, sliding, brake.rising, slid, filling, alone)

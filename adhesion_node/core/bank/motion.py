@@ -26,7 +26,8 @@ import numpy as np
 
 from ..physics.train import GRAVITY, Array
 from ..setting import once
-from .gear.wheels import HINTED, UNLEARNT
+from .gear.radii import UNLEARNT
+from .gear.slides import HINTED
 from .kernels import moving
 from .kernels.weighing import variances
 from .labels import kinds, noises

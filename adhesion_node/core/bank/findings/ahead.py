@@ -20,7 +20,7 @@ from ...physics.adhesion import AdhesionLaw
 from ...physics.train import Array, Train
 from ...setting import once
 from ..blind import STANDS_MPS
-from ..gear.wheels import HINTED
+from ..gear.slides import HINTED
 from ..kernels import mixture, weighing
 from ..labels import kinds
 from ..layout import BRAKE, SPEED, Bank

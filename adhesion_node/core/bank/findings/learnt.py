@@ -64,4 +64,4 @@ def learnt(memory: Memory) -> dict[str, float]:
             found[name] = math.sqrt(max(scatter.variance, 0.0))
     weight = memory.bank.weight
     found |= {f"{KIND}{kind.name}": float(weight[memory.bank.kind == k].sum()) for k, kind in enumerate(KINDS)}
-    return found | {f"{WHEEL}{axle}": own / (1.0 + mean[RADIUS]) for axle, own in enumerate(memory.wheels.radius)}
+    return found | {f"{WHEEL}{axle}": own / (1.0 + mean[RADIUS]) for axle, own in enumerate(memory.wheels.radii.own)}

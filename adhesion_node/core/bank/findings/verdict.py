@@ -17,7 +17,7 @@ import numpy as np
 from ...belief.rail import Rail
 from ...belief.regime import Regime
 from ..following import SPEED_ERROR_MPS
-from ..gear.wheels import BRAKE_BELOW
+from ..gear.slides import BRAKE_BELOW
 from ..labels.laws import SLIPPERY
 from ..memory import Memory
 from ..motion import ANOTHER, SLOWED, resistance, use
@@ -123,7 +123,7 @@ def _is_slowed(config: Config, memory: Memory, low: float, high: float) -> bool:
 
 def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     """What limits: the wheels know best; else nothing is claimed that a wrong brake could explain as well."""
-    share = memory.wheels.share(memory.t_ns)
+    share = memory.wheels.slides.share(memory.t_ns)
     demanded = config.train.specific_brake(memory.brake.demanded_pa)
     part, error, fell = mu / max(demanded, 1e-6), config.brake_error, memory.brake.has_fallen(memory.t_ns)
     if share is not None and share >= SLIDES_FROM:
@@ -135,7 +135,7 @@ def _regime(config: Config, memory: Memory, slides: float, mu: float) -> Regime:
     alone = config.pressure_kind == "cylinder"  # the axle that is heard may be the only one that slides
     dumped = memory.braking.told > 0.0 and (part < 1.0 - error or not alone)
     gauge = memory.brake.gauged and config.pressure_kind != "demanded"
-    shows = gauge or memory.wheels.one_rolls(memory.t_ns)
+    shows = gauge or memory.wheels.slides.one_rolls(memory.t_ns)
     if slides > CLAIMED and (dumped or part < 1.0 - (UNDUMPED if shows else DOUBTS) * error):
         return Regime.ADHESION_LIMITED
     dumps = config.pressure_kind == "mean" and demanded < PARTIAL * config.train.full_brake

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from ..gear.slides import ROLLING, UNSURE
 from ..gear.wander import Errors, Wander
-from ..gear.wheels import ROLLING, UNSURE
 from ..layout import RADIUS, SPEED, Bank
 from ..memory import Memory, S
 from ..motion import slowing
@@ -39,24 +39,25 @@ TRUSTED_NS = 450_000_000
 def beside_fastest(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
     """Take in under the brake how fast the fastest rim was at a time, from which on it has slowed as the train has."""
     bank = memory.bank
-    rim_mps = memory.wheels.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
+    rim_mps = memory.wheels.radii.fastest(rims) - slowing(config, bank, memory.braking) * (memory.t_ns - t_ns) / S
     memory = halting(config, memory, rims, t_ns)
     if stands(config, memory):
         return standing(memory)
     if rim_mps <= config.slowest_mps:
         return memory
-    bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels.beside(rim_mps, memory.t_ns)
-    if wheels.fall_mps2 > memory.wheels.fall_mps2:
-        bank = fall_seen(config, bank.normalised(), memory.braking, wheels.fall_mps2)
-    if memory.t_ns >= wheels.trusted_ns:
-        wander, errors = wheels.wander.after(memory.t_ns, rim_mps), Errors()
+    bank, wheels = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps), memory.wheels
+    fastest = wheels.fastest.after(rim_mps, wheels.radii.noise, memory.t_ns)
+    if fastest.fall_mps2 > wheels.fastest.fall_mps2:
+        bank = fall_seen(config, bank.normalised(), memory.braking, fastest.fall_mps2)
+    if memory.t_ns >= fastest.trusted_ns:
+        wander, errors = fastest.wander.after(memory.t_ns, rim_mps), Errors()
         if memory.braking.told > 0.0:
             bank, wander, errors = _creeping(bank, wander, rim_mps)
         roll = memory.braking.told < 0.0 or (_tells_of_none(config, memory) and wheels.all_roll(t_ns))
         slides = HIDDEN if roll and len(rims) >= FEW else slides_of(len(rims))
         bank = as_fast(bank, rim_mps, errors.quick * rim_mps, slides)
-        wheels = wheels._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
-    return memory._replace(wheels=wheels, bank=bank.normalised())
+        fastest = fastest._replace(trusted_ns=memory.t_ns + TRUSTED_NS, wander=wander)
+    return memory._replace(wheels=wheels._replace(fastest=fastest), bank=bank.normalised())
 
 
 def _tells_of_none(config: Config, memory: Memory) -> bool:

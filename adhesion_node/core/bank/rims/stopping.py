@@ -31,15 +31,16 @@ stop it while it says otherwise lock."""
 
 def halting(config: Config, memory: Memory, rims: list[float], t_ns: int) -> Memory:
     """Note how fast the rims were at a time under the brake."""
-    after = memory.wheels.halting.after(rims, t_ns, _asked(config, memory))
-    return memory._replace(wheels=memory.wheels._replace(halting=after))
+    fastest = memory.wheels.fastest
+    fastest = fastest._replace(halting=fastest.halting.after(rims, t_ns, _asked(config, memory)))
+    return memory._replace(wheels=memory.wheels._replace(fastest=fastest))
 
 
 def stands(config: Config, memory: Memory) -> bool:
     """Whether wheels show that the train stands, and neither a position nor a speed that is no axle's is heard."""
     speeds = memory.speeds.quick.before if config.speed_source != "axle" else ()
     dark_ns = memory.t_ns - max([memory.placed_ns, *(t_ns for t_ns, _ in speeds)])
-    return dark_ns > DARK_NS and memory.wheels.halting.stands(GRAVITY * config.train.full_brake)
+    return dark_ns > DARK_NS and memory.wheels.fastest.halting.stands(GRAVITY * config.train.full_brake)
 
 
 def _asked(config: Config, memory: Memory) -> float:

@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 from ...intake.outcome import Event, Outcome
 from ...intake.samples import Measurement, WheelSample
 from ..free import runs_back
-from ..gear.wheels import LEARNING_MPS, UNTOLD_NS
+from ..gear.fastest import UNTOLD_NS
+from ..gear.radii import LEARNING_MPS
 from ..layout import MU, SPEED, Bank
 from ..memory import Memory
 from ..motion import SLOWED
@@ -39,25 +40,26 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     back = runs_back(memory.bank)
     if not measurement.wheels or (back and not _all_stand(config, measurement.wheels[-1])):
         return memory
-    pressed = memory.is_pressed(config) or memory.braked or memory.untold or memory.wheels.fell(memory.t_ns, UNTOLD_NS)
+    fastest = memory.wheels.fastest
+    pressed = memory.is_pressed(config) or memory.braked or memory.untold or fastest.fell(memory.t_ns, UNTOLD_NS)
     pressed = pressed or _is_slowed(config, memory)
     axles, wheels, newest = memory.axles, memory.wheels, measurement.wheels[-1]
     pulled = _is_pulled(config, memory.bank)
     wheels, drives = wheels._replace(pulled_ns=memory.t_ns) if pulled else wheels, pulled and not pressed
-    rim, std = rim_speed(as_rolled(memory.bank, memory.wheels.wander.rolled))
+    rim, std = rim_speed(as_rolled(memory.bank, fastest.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
         rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
         axles = axles.after(rims, sample.t_ns, memory.slowed_mps, runs)
         newest = sample.without(axles.lying(memory.slowed_mps))
         wheels = wheels.after(config, newest, rim, std, pressed, drives)
-    rims = wheels.rims(config, newest)
-    known = rims if wheels.is_learnt else []
+    rims = wheels.radii.rims(config, newest)
+    known = rims if wheels.radii.is_learnt else []
     wheels = wheels.agreeing(known, (1.0 - config.sliding_creep) * rim - MANY * std, newest.t_ns)
     memory = _telling(memory._replace(axles=axles, wheels=wheels))
     if memory.braked:
         return beside_fastest(config, memory, known, newest.t_ns) if known else memory
-    memory, rolls = unbraked.waiting(config, memory, rims, newest.t_ns, rim - MANY * std), wheels.rolling(rims, drives)
+    memory, rolls = unbraked.waiting(config, memory, rims, newest.t_ns, rim - MANY * std), unbraked.rolls(rims, drives)
     if rolls > LEARNING_MPS and drives and MANY * std < rim:
         return unbraked.spinning(memory, rolls, len(rims))
     if rolls > LEARNING_MPS:

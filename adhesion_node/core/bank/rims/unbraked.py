@@ -14,9 +14,8 @@ import math
 from statistics import median
 from typing import TYPE_CHECKING
 
-from ..gear.halting import Halting
-from ..gear.wander import Wander
-from ..gear.wheels import UNISON_S
+from ..gear.fastest import UNISON_S
+from ..gear.radii import UNEQUAL
 from ..layout import RADIUS, Bank
 from ..memory import Memory, S
 from . import rim
@@ -28,21 +27,34 @@ if TYPE_CHECKING:
 SLOW_MPS = 0.5
 """Error of a rim that turns slowly or stands, as sensors tell little of it."""
 
+TURNS = 0.5
+"""Share of the middle rim's speed from which an axle turns with the others, and is not dead."""
+
 
 def waiting(config: Config, memory: Memory, rims: list[float], t_ns: int, least_mps: float) -> Memory:
     """No braking is open: the fastest rim will not be believed before all might have slid, radii are what they were.
 
     A spin that ends leaves rims as fast as the train, by what is known of it `least_mps`; a slide that begins does not.
     """
-    learnt, trusted_ns = memory.wheels.is_learnt, memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
-    sure = rims and learnt and (median(rims) < least_mps or not memory.wheels.may_spin(t_ns))
-    wheels = memory.wheels.beside(median(rims), t_ns) if sure else memory.wheels
-    return memory._replace(
-        bank=as_rolled(memory.bank, memory.wheels.wander.rolled),
-        wheels=wheels._replace(
-            trusted_ns=trusted_ns, risen=False, lowest_mps=math.inf, fall_mps2=0.0, wander=Wander(), halting=Halting()
-        ),
-    )
+    wheels, trusted_ns = memory.wheels, memory.t_ns + round((config.brake_build_up_s + UNISON_S) * S)
+    fastest, radii = wheels.fastest, wheels.radii
+    if rims and radii.is_learnt and (median(rims) < least_mps or not wheels.may_spin(t_ns)):
+        fastest = fastest.after(median(rims), radii.noise, t_ns)
+    bank = as_rolled(memory.bank, wheels.fastest.wander.rolled)
+    return memory._replace(bank=bank, wheels=wheels._replace(fastest=fastest.waiting(trusted_ns)))
+
+
+def rolls(rims: list[float], pulled: bool) -> float:
+    """Speed of a rim while no brake is applied: the middle one, as some may be dead; NaN: none is heard.
+
+    While a train is `pulled` driven axles may spin, half of all or more: the slowest that turns with the others, but
+    none that is slower than all of them, as it may drag, or lose pulses. Such as count backwards tell nothing.
+    """
+    middle = median(rims) if rims else math.nan
+    if not (pulled and middle > 0.0):
+        return middle
+    slowest, *others = sorted(rim for rim in rims if rim >= TURNS * middle)
+    return others[0] if len(others) > 1 and slowest < (1.0 - UNEQUAL) * others[0] else slowest
 
 
 def rolling(memory: Memory, rim_mps: float, pressed: bool) -> Memory:
@@ -50,7 +62,7 @@ def rolling(memory: Memory, rim_mps: float, pressed: bool) -> Memory:
 
     While nothing is learnt of them it may lie between such as turn and such as are dead.
     """
-    if not memory.wheels.is_learnt:
+    if not memory.wheels.radii.is_learnt:
         return memory
     bank = memory.bank
     bank = not_slower(bank, rim_mps, FASTEST_SHARE * rim_mps) if pressed else rim.rolling(bank, rim_mps)
@@ -62,7 +74,7 @@ def spinning(memory: Memory, rim_mps: float, count: int) -> Memory:
 
     Of radii that tells nothing.
     """
-    if not memory.wheels.is_learnt:
+    if not memory.wheels.radii.is_learnt:
         return memory
     bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, slides_of(count)).normalised()
     return memory._replace(bank=_of_radii_nothing(memory.bank, bank), fixes=memory.fixes + 1)

@@ -15,7 +15,8 @@ from statistics import median
 from typing import TYPE_CHECKING, NamedTuple
 
 from ...intake.samples import Measurement, WheelSample
-from ..gear.wheels import FEWEST, LEARNING_MPS, WheelsSeen
+from ..gear.radii import LEARNING_MPS
+from ..gear.wheels import FEWEST, WheelsSeen
 from .plausible import strongest_mps2
 
 if TYPE_CHECKING:
@@ -86,15 +87,15 @@ class Odometer(NamedTuple):
     ) -> Odometer:
         """Take in what positions, believed or not, and wheels that do not seem to hang say up to a measurement."""
         odometer = self
-        for sample in measurement.wheels if wheels.is_learnt else ():
-            odometer = odometer._turned(config, wheels.radius, sample.without(hanging))
+        for sample in measurement.wheels if wheels.radii.is_learnt else ():
+            odometer = odometer._turned(config, wheels.radii.own, sample.without(hanging))
         return odometer._placed(config, wheels, measurement, braked) if measurement.has_position else odometer
 
     def _placed(self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool) -> Odometer:
         t_ns, place_m = measurement[:2]
         begun = self._replace(since=(t_ns, place_m), sums_mps=(), samples=0)
         elapsed_ns = t_ns - (self.since or (0, 0.0))[0]
-        if self.since is None or not wheels.is_learnt or elapsed_ns > LONGEST_NS:
+        if self.since is None or not wheels.radii.is_learnt or elapsed_ns > LONGEST_NS:
             return begun
         if elapsed_ns < LOOK_NS or self.samples < SAMPLES:
             return self
@@ -110,7 +111,7 @@ class Odometer(NamedTuple):
         if wheels.may_spin(t_ns):
             return begun
         left_mps = self.least_mps - strongest_mps2(config, self.least_mps) * (t_ns - self.least_ns) / S
-        return begun._held_against(speed_mps, rims, max(wheels.fastest(known), left_mps))
+        return begun._held_against(speed_mps, rims, max(wheels.radii.fastest(known), left_mps))
 
     def _turned(self, config: Config, radius: tuple[float, ...], sample: WheelSample) -> Odometer:
         """Take in the speeds of the wheels, each by its own radius."""

@@ -23,6 +23,7 @@ from scipy.stats import norm
 from adhesion_node.core.bank.findings.ahead import constant
 from adhesion_node.core.bank.findings.verdict import found
 from adhesion_node.core.bank.gear.brake import BrakeSeen
+from adhesion_node.core.bank.gear.slides import Slides
 from adhesion_node.core.bank.gear.wheels import WheelsSeen
 from adhesion_node.core.bank.labels.kinds import HELD, KINDS, OTHER, STEADY
 from adhesion_node.core.bank.layout import BRAKE, GRADE, MU, ROUGH, SPEED
@@ -110,7 +111,7 @@ def test_while_the_gauge_shows_no_brake_nothing_is_claimed_and_learnt(seen: int,
     bank.mean[:, MU] = 0.04
     memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(0.0, alone=True), seen)
     released = memory.brake._replace(demanded_pa=0.0, applied_pa=0.0)
-    wheels = WheelsSeen((1.0,) * axles, 0, 0.03, (None,) * axles, (10 * S,) * axles)
+    wheels = WheelsSeen(slides=Slides((None,) * axles, (10 * S,) * axles))
     findings = found(CONFIG, memory._replace(brake=released, wheels=wheels), NOTHING, NOTHING)
     assert findings.rail.mu == pytest.approx(0.04)
     assert (findings.regime, findings.known) == (Regime.COASTING, NOTHING)
@@ -139,7 +140,7 @@ def test_what_limits_is_said_by_the_wheels_and_where_some_slide_by_nothing(slidi
     """Of four axles; to the train's motion it is the brake in each of the cases."""
     memory = memory_of(bank_of([HELD], spread=0.0), Braking(FULL), 3)
     slid = () if sliding is None else tuple(10 * S if axle < sliding else None for axle in range(4))
-    memory = memory._replace(wheels=WheelsSeen((1.0,) * len(slid), 0, 0.03, slid, (10 * S,) * len(slid)))
+    memory = memory._replace(wheels=WheelsSeen(slides=Slides(slid, (10 * S,) * len(slid))))
     assert found(CONFIG, memory, NOTHING, NOTHING).regime is regime
 
 
@@ -153,7 +154,7 @@ def test_while_the_pressure_falls_and_rises_the_brake_is_not_said_to_limit(
     A driver who lets go a part once is past it 8 s later.
     """
     memory = memory_of(bank_of([HELD], spread=0.0), Braking(FULL), 3)
-    slid = WheelsSeen((1.0,) * len(wheels), 0, 0.03, wheels, (10 * S,) * len(wheels))
+    slid = WheelsSeen(slides=Slides(wheels, (10 * S,) * len(wheels)))
     samples = sampled(lambda time: 250e3 + rises_pa_s * (time % 2.0) if time >= 2.0 else 320e3, 12.0)
     brake = seen_by(CONFIG, samples, rolls=True)[-1]
     pressed = memory.brake._replace(fell_ns=brake.fell_ns)
@@ -171,7 +172,7 @@ def test_where_far_less_is_used_than_the_brake_should_give_rolling_wheels_claim_
     bank = bank_of([HELD], spread=0.0)
     bank.mean[:, BRAKE] = part
     memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(FULL), 3)
-    memory = memory._replace(wheels=WheelsSeen((1.0,) * 4, 0, 0.03, (None,) * 4, (10 * S,) * 4))
+    memory = memory._replace(wheels=WheelsSeen(slides=Slides((None,) * 4, (10 * S,) * 4)))
     assert found(config, memory, NOTHING, NOTHING).regime is regime
 
 
@@ -191,7 +192,7 @@ def test_wheels_that_roll_say_that_no_rail_limits_whatever_the_brake_lacks() -> 
     bank.mean[:, MU] = 0.5 * FULL
     memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(FULL), 3)
     assert found(CONFIG, memory, NOTHING, NOTHING).regime is Regime.ADHESION_LIMITED
-    rolling = memory._replace(wheels=WheelsSeen((1.0,) * 4, 0, 0.03, (None,) * 4, (10 * S,) * 4))
+    rolling = memory._replace(wheels=WheelsSeen(slides=Slides((None,) * 4, (10 * S,) * 4)))
     assert found(CONFIG, rolling, NOTHING, NOTHING).regime is Regime.COASTING
 
 
@@ -232,7 +233,7 @@ def test_whether_a_brake_weaker_than_a_film_limits_wheels_alone_can_tell() -> No
         bank.mean[:, BRAKE] = 1.0
         memory = memory_of(bank._replace(covariance=1e-8 * bank.covariance), Braking(FULL / mass), 3)
         assert found(config, memory, NOTHING, NOTHING).regime is regime
-        rolls = memory._replace(wheels=WheelsSeen((1.0,) * 4, 0, 0.03, (None,) * 4, (10 * S,) * 4))
+        rolls = memory._replace(wheels=WheelsSeen(slides=Slides((None,) * 4, (10 * S,) * 4)))
         assert found(config, rolls, NOTHING, NOTHING).regime is Regime.BRAKE_LIMITED
 
 

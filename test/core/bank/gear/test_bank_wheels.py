@@ -17,7 +17,8 @@ import pytest
 from banks import S
 
 from adhesion_node.core.bank.following import followed, met
-from adhesion_node.core.bank.gear.wheels import FRESH_NS, SLID_NS, WheelsSeen, told
+from adhesion_node.core.bank.gear.slides import FRESH_NS, SLID_NS, told
+from adhesion_node.core.bank.gear.wheels import WheelsSeen
 from adhesion_node.core.bank.layout import SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail
@@ -59,12 +60,12 @@ NOW = 100 * S + 900 * MS
 
 def test_radii_are_learnt_while_coasting() -> None:
     wheels = coasted(WORN)
-    assert wheels.radius == pytest.approx(WORN / np.median(WORN), rel=1e-3)
-    assert (wheels.learnt, wheels.is_learnt) == (300, True)
-    assert 1e-3 < math.sqrt(wheels.noise) < 3e-3
-    rims = wheels.rims(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN))
+    assert wheels.radii.own == pytest.approx(WORN / np.median(WORN), rel=1e-3)
+    assert (wheels.radii.learnt, wheels.radii.is_learnt) == (300, True)
+    assert 1e-3 < math.sqrt(wheels.radii.noise) < 3e-3
+    rims = wheels.radii.rims(CONFIG, sample(40 * S, 35.0, np.zeros(4), WORN))
     assert rims == pytest.approx([35.0 / np.median(WORN)] * 4, rel=2e-3)
-    assert wheels.fastest(rims) == pytest.approx(35.0 / np.median(WORN), rel=4e-3)
+    assert wheels.radii.fastest(rims) == pytest.approx(35.0 / np.median(WORN), rel=4e-3)
 
 
 @pytest.mark.parametrize(("rate_hz", "speed", "seconds"), [(10.0, 40.0, 0.7), (1.0, 40.0, 6.5), (10.0, 6.0, 2.2)])
@@ -75,21 +76,21 @@ def test_radii_are_soon_learnt(rate_hz: float, speed: float, seconds: float) -> 
         wheels = wheels.after(
             CONFIG, sample(S + round(index * S / rate_hz), speed, np.zeros(4), WORN), speed, 0.1, False
         )
-        learnt_s = min(learnt_s, index / rate_hz) if wheels.is_learnt else learnt_s
+        learnt_s = min(learnt_s, index / rate_hz) if wheels.radii.is_learnt else learnt_s
     assert max(5.0 / rate_hz, 12.0 / speed) <= learnt_s < seconds
 
 
 def test_nothing_is_learnt_slowly() -> None:
     wheels = coasted(WORN, speed=4.0)
-    assert wheels.radius == (1.0,) * 4
-    assert not wheels.is_learnt
+    assert wheels.radii.own == (1.0,) * 4
+    assert not wheels.radii.is_learnt
 
 
 def test_of_many_that_roll_the_fastest_is_fast_by_chance() -> None:
     rng, wheels = np.random.default_rng(7), coasted(np.ones(16))
-    told = [wheels.rims(CONFIG, sample(S, 40.0, np.zeros(16), np.ones(16), rng)) for _ in range(200)]
+    told = [wheels.radii.rims(CONFIG, sample(S, 40.0, np.zeros(16), np.ones(16), rng)) for _ in range(200)]
     assert np.mean([max(rims) for rims in told]) > 1.003 * 40.0
-    assert np.mean([wheels.fastest(rims) for rims in told]) == pytest.approx(40.0, rel=2e-3)
+    assert np.mean([wheels.radii.fastest(rims) for rims in told]) == pytest.approx(40.0, rel=2e-3)
 
 
 @pytest.mark.parametrize("radius", [EVEN, WORN])
@@ -97,7 +98,7 @@ def test_of_many_that_roll_the_fastest_is_fast_by_chance() -> None:
 def test_sliding_axles_are_counted_each_by_its_own_radius(radius: Array, sliding: int) -> None:
     creep = np.where(np.arange(4) < sliding, 0.12, 0.003)
     wheels = braked(coasted(radius), creep, radius)
-    assert wheels.share(NOW) == pytest.approx(sliding / 4)
+    assert wheels.slides.share(NOW) == pytest.approx(sliding / 4)
 
 
 @pytest.mark.parametrize("sliding", [0, 1, 3])
@@ -105,12 +106,12 @@ def test_worn_wheels_of_which_nothing_was_learnt_slide_by_the_others_at_most(sli
     """Wear of 3 % beside the creep of a slide, 15 %: neither is taken for the other."""
     creep = np.where(np.arange(4) < sliding, 0.15, 0.003)
     wheels = braked(WheelsSeen(), creep, np.array([0.985, 0.99, 1.0, 0.995]))
-    share = wheels.share(NOW)
+    share = wheels.slides.share(NOW)
     assert share == pytest.approx(sliding / 4)
 
 
 def test_all_axles_that_slide_alike_are_told_by_the_trains_speed() -> None:
-    assert braked(coasted(EVEN), np.full(4, 0.1), EVEN).share(NOW) == 1.0
+    assert braked(coasted(EVEN), np.full(4, 0.1), EVEN).slides.share(NOW) == 1.0
 
 
 @pytest.mark.parametrize("creep", [0.05, 0.1, 0.3])
@@ -121,24 +122,26 @@ def test_a_train_held_slower_than_it_is_claims_no_rolling(creep: float) -> None:
     for index in range(10):
         stamp = 100 * S + index * 100 * MS
         wheels = wheels.after(CONFIG, sample(stamp, 40.0, slips, EVEN), 40.0 * (1.0 - creep), 0.1, True)
-    assert wheels.share(NOW) == 0.75
-    assert wheels.fastest(wheels.rims(CONFIG, sample(NOW, 40.0, slips, EVEN))) == pytest.approx(39.92, rel=3e-3)
+    assert wheels.slides.share(NOW) == 0.75
+    assert wheels.radii.fastest(wheels.radii.rims(CONFIG, sample(NOW, 40.0, slips, EVEN))) == pytest.approx(
+        39.92, rel=3e-3
+    )
 
 
 def test_an_unsure_speed_claims_neither() -> None:
     wheels = braked(coasted(EVEN), np.full(4, 0.05), EVEN, std=4.0)
-    assert wheels.share(NOW) is None
+    assert wheels.slides.share(NOW) is None
 
 
 def test_a_dropout_leaves_the_others() -> None:
     creep = np.array([0.12, math.nan, 0.003, math.nan])
     wheels = braked(coasted(WORN), creep, WORN)
-    assert wheels.share(NOW) == 0.5
-    assert all(math.isfinite(each) for each in wheels.radius)
+    assert wheels.slides.share(NOW) == 0.5
+    assert all(math.isfinite(each) for each in wheels.radii.own)
     three = braked(coasted(WORN), np.array([0.12, math.nan, math.nan, math.nan]), WORN)
-    assert three.share(NOW) is None  # of too few it is known
+    assert three.slides.share(NOW) is None  # of too few it is known
     nothing = sample(NOW, 40.0, np.full(4, math.nan), WORN)
-    assert wheels.after(CONFIG, nothing, 40.0, 0.1, True).share(NOW) == 0.5
+    assert wheels.after(CONFIG, nothing, 40.0, 0.1, True).slides.share(NOW) == 0.5
 
 
 def test_dropouts_while_learning_spoil_nothing() -> None:
@@ -147,24 +150,24 @@ def test_dropouts_while_learning_spoil_nothing() -> None:
         rates = list(sample(S + index * 100 * MS, 40.0, np.zeros(4), WORN, rng).speeds_radps)
         rates[index % 4] = math.nan if index % 2 else 0.0
         wheels = wheels.after(CONFIG, WheelSample(S + index * 100 * MS, tuple(rates)), 40.0, 0.1, False)
-    assert wheels.radius == pytest.approx(WORN / np.median(WORN), rel=3e-3)
+    assert wheels.radii.own == pytest.approx(WORN / np.median(WORN), rel=3e-3)
 
 
 def test_another_number_of_axles_is_another_train() -> None:
     wheels = coasted(WORN)
     two = sample(50 * S, 40.0, np.zeros(2), EVEN[:2])
-    assert wheels.rims(CONFIG, two) == []
+    assert wheels.radii.rims(CONFIG, two) == []
     after = wheels.after(CONFIG, two, 40.0, 0.1, True)
-    assert len(after.radius) == len(after.slid_ns) == len(after.rolled_ns) == 2
-    assert after.radius == (1.0, 1.0)
-    assert after.learnt == 0
+    assert len(after.radii.own) == len(after.slides.slid_ns) == len(after.slides.rolled_ns) == 2
+    assert after.radii.own == (1.0, 1.0)
+    assert after.radii.learnt == 0
 
 
 def test_what_was_seen_fades() -> None:
     wheels = braked(coasted(EVEN), np.array([0.12, 0.003, 0.003, 0.003]), EVEN)
-    assert wheels.share(NOW + FRESH_NS - 1) == 0.25
-    assert wheels.share(NOW + FRESH_NS) is None  # of those that rolled nothing is heard
-    assert wheels.share(NOW + SLID_NS) is None
+    assert wheels.slides.share(NOW + FRESH_NS - 1) == 0.25
+    assert wheels.slides.share(NOW + FRESH_NS) is None  # of those that rolled nothing is heard
+    assert wheels.slides.share(NOW + SLID_NS) is None
 
 
 def test_an_axle_counts_as_sliding_between_its_slides() -> None:
@@ -173,7 +176,7 @@ def test_an_axle_counts_as_sliding_between_its_slides() -> None:
         creep = np.where(index % 20 < 8, np.array([0.2, 0.0, 0.0, 0.0]), 0.003)
         stamp = 100 * S + index * 100 * MS
         wheels = wheels.after(CONFIG, sample(stamp, 40.0, creep, EVEN), 40.0, 0.1, True)
-        assert wheels.share(stamp) == 0.25
+        assert wheels.slides.share(stamp) == 0.25
 
 
 def test_an_axle_whose_slides_fall_between_samples_counts_as_sliding() -> None:
@@ -182,7 +185,7 @@ def test_an_axle_whose_slides_fall_between_samples_counts_as_sliding() -> None:
     for index in range(40):
         creep = np.where(index % 5 == 0, np.array([0.2, 0.0, 0.0, 0.0]), 0.003)
         wheels = wheels.after(CONFIG, sample((100 + index) * S, 40.0, creep, EVEN), 40.0, 0.1, True)
-        assert wheels.share((100 + index) * S) == 0.25
+        assert wheels.slides.share((100 + index) * S) == 0.25
 
 
 def test_axles_that_protection_lets_roll_in_turns_use_no_more_than_the_rail_gives() -> None:
@@ -226,9 +229,9 @@ def test_radii_are_learnt_whatever_a_released_cylinder_seems_to_hold(idle_pa: fl
         measured = Measurement(t_ns, 4.0 * index, 0.04, idle_pa, 40.0, speeds=speeds, wheels=wheels)
         memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
     assert memory is not None
-    assert memory.wheels.learnt > 50
-    assert memory.wheels.radius == pytest.approx(WORN / np.median(WORN), rel=3e-3)
-    assert memory.wheels.share(memory.t_ns) is None
+    assert memory.wheels.radii.learnt > 50
+    assert memory.wheels.radii.own == pytest.approx(WORN / np.median(WORN), rel=3e-3)
+    assert memory.wheels.slides.share(memory.t_ns) is None
 
 
 def test_the_fastest_rim_bounds_the_speed_while_positions_are_out() -> None:
@@ -257,7 +260,7 @@ def test_axles_that_begin_to_slide_unseen_and_all_alike_are_thought_of() -> None
         measured = Measurement(t_ns, where, 0.04, 410e3 * (braked_s > 0.0), wheels=wheels)
         memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
     assert memory is not None
-    assert memory.wheels.share(memory.t_ns) == 0.0
+    assert memory.wheels.slides.share(memory.t_ns) == 0.0
     speeds = memory.bank.mean[:, SPEED]
     assert speeds.min() < speed - 0.2, "the brake holds"
     assert speeds.max() > speed - 0.1, "or none of them rolls"

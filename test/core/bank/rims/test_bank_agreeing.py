@@ -18,6 +18,7 @@ import pytest
 from banks import FULL_PA, S
 
 from adhesion_node.core.bank.following import followed, met
+from adhesion_node.core.bank.gear.radii import Radii
 from adhesion_node.core.bank.gear.wheels import AGREE_NS, WheelsSeen
 from adhesion_node.core.bank.layout import SPEED
 from adhesion_node.core.bank.memory import Memory
@@ -63,7 +64,7 @@ def test_a_speed_that_is_too_badly_known_to_tell_of_any_axle_is_that_of_wheels_w
 
 @pytest.mark.parametrize(("noise", "spread", "agree"), [(0.0, 0.009, True), (0.0, 0.015, False), (1e-5, 0.015, True)])
 def test_rims_agree_that_differ_by_no_more_than_their_noise(noise: float, spread: float, agree: bool) -> None:
-    wheels, rims = WheelsSeen(noise=noise), [20.0, *(20.0 * (1.0 - spread),) * (AXLES - 1)]
+    wheels, rims = WheelsSeen(Radii(noise=noise)), [20.0, *(20.0 * (1.0 - spread),) * (AXLES - 1)]
     for t_ns in (0, AGREE_NS):
         wheels = wheels.agreeing(rims, 15.0, t_ns)
     assert wheels.agree(AGREE_NS) is agree

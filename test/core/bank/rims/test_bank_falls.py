@@ -18,7 +18,9 @@ import pytest
 from banks import FULL_PA, S
 
 from adhesion_node.core.bank.following import followed, met
-from adhesion_node.core.bank.gear.wheels import FALLS, LEAST_LEARNT, LEAST_M, UNISON_S, WheelsSeen
+from adhesion_node.core.bank.gear.fastest import UNISON_S, Fastest
+from adhesion_node.core.bank.gear.slides import FALLS
+from adhesion_node.core.bank.gear.wheels import WheelsSeen
 from adhesion_node.core.bank.layout import MU, SPEED
 from adhesion_node.core.bank.memory import Memory
 from adhesion_node.core.belief.rail import Rail
@@ -115,7 +117,7 @@ def test_driven_axles_that_spin_and_grip_again_are_no_slide_of_all(
         sample = WheelSample(t_ns, tuple((speeds / CONFIG.train.wheel_radius_m).tolist()))
         measured = Measurement(t_ns, place, 0.09, 0.0, wheels=(sample,))
         memory = met(CONFIG, measured) if memory is None else followed(CONFIG, memory, measured, lambda: RAIL)
-        assert memory.wheels.fell_ns is None
+        assert memory.wheels.fastest.fell_ns is None
         place, speed = place + 0.1 * speed, speed + 0.1 * gained_mps2
     assert memory is not None
     assert memory.bank.mean_of(SPEED) == pytest.approx(speed, abs=0.1)
@@ -149,12 +151,12 @@ def test_how_fast_all_axles_fall_tells_how_little_the_rail_gives() -> None:
         assert much < 0.5 * before
 
 
-def rims(speeds: list[float], noise: float = 1e-6) -> WheelsSeen:
+def rims(speeds: list[float], noise: float = 1e-6) -> Fastest:
     """The fastest rim at 10 Hz."""
-    wheels = WheelsSeen(learnt=LEAST_LEARNT, way_m=LEAST_M, noise=noise, trusted_ns=10**6 * S)
+    fastest = Fastest(trusted_ns=10**6 * S)
     for tick, speed in enumerate(speeds):
-        wheels = wheels.beside(speed, S + tick * S // 10)
-    return wheels
+        fastest = fastest.after(speed, noise, S + tick * S // 10)
+    return fastest
 
 
 def test_a_fall_is_one_beyond_what_brakes_and_noise_explain() -> None:
@@ -194,4 +196,4 @@ def test_a_slide_is_no_noise_of_the_wheels() -> None:
         sample = WheelSample(S + tick * S // 10, tuple((speeds / config.train.wheel_radius_m).tolist()))
         wheels = wheels.after(config, sample, 40.0, 0.1, False)
         if tick == 110:
-            assert math.sqrt(wheels.noise) < 0.01
+            assert math.sqrt(wheels.radii.noise) < 0.01
