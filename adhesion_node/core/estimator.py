@@ -58,6 +58,7 @@ def gate_of(config: Config) -> Gate:
             Source(SpeedSample, wait, wait, each=True, leads=True),
             Source(WheelSample, wait, wait, each=True, leads=True),
             Source(ImuSample, wait, wait, each=True),
+            Source(DemandSample, wait, wait, each=True),
         ),
         max_lag_ns=round(config.max_lag_s * 1e9),
         far_ns=round(config.max_gap_s * 1e9),
@@ -172,8 +173,8 @@ def _measurement(config: Config, matched: Matched) -> Measurement:
     t_ns, position_m, variance_m2 = (
         (matched.anchor.t_ns, 0.0, math.inf) if isinstance(matched.anchor, Tick) else matched.anchor
     )
-    pressure, demand, pressures, speeds, wheels, imu = matched.values
+    pressure, demand, pressures, speeds, wheels, imu, demands = matched.values
     fresh = bool(speeds) and t_ns - speeds[-1].t_ns <= round(config.pressure_wait_s * 1e9)
     speed_mps = speeds[-1].speed_mps if fresh else None
     newest = pressure and pressure.pressure_pa, speed_mps, demand and demand.pressure_pa
-    return Measurement(t_ns, position_m, variance_m2, *newest, pressures, speeds, wheels, imu)
+    return Measurement(t_ns, position_m, variance_m2, *newest, pressures, speeds, wheels, imu, demands)

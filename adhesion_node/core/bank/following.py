@@ -134,7 +134,9 @@ def followed(
         since_ns, before_ns, before = before_ns, until_ns, memory.braking
         now = [each for each in pressures if since_ns < each.t_ns <= until_ns]
         share = memory.wheels.slides.share(until_ns)
-        brake = memory.brake.after(config, now, demand_pa, None if share is None else share < BRAKE_BELOW)
+        brake = memory.brake.after(
+            config, now, demand_pa, None if share is None else share < BRAKE_BELOW, measurement.demands
+        )
         memory = memory._replace(
             bank=bank,
             t_ns=until_ns,
@@ -251,7 +253,8 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int, unde
     share, held = slides.share(now_ns), slides.share(now_ns, FILLED_NS)
     applied = config.train.specific_brake(brake.applied_pa)
     sliding = held if held is not None and held >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
-    fills = config.pressure_kind == "demanded" and brake.applied_pa < brake.demanded_pa
+    follows = config.pressure_kind == "demanded" or not undemanded
+    fills = follows and brake.applied_pa < brake.demanded_pa
     filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
     slid = told(share, brake.has_slid(now_ns), fell, slides.one_rolls(now_ns))
     alone = undemanded and config.pressure_kind != "demanded"

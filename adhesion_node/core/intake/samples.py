@@ -125,8 +125,8 @@ class Measurement(NamedTuple):
     """What is known of one time: a position with what the other sensors measured up to it, or that alone.
 
     Pressures are gauge; None stands for "not measured". Without a position `variance_m2` is infinite, and `position_m`
-    says nothing. `pressures`, `speeds`, `wheels` and `imu` are all samples since the measurement before, by their
-    stamps; each comes once. One that was late may be stamped before that, by `pressure_wait_s` at most.
+    says nothing. `pressures`, `speeds`, `wheels`, `imu` and `demands` are all samples since the measurement before, by
+    their stamps; each comes once. One that was late may be stamped before that, by `pressure_wait_s` at most.
     """
 
     t_ns: int
@@ -142,6 +142,7 @@ class Measurement(NamedTuple):
     speeds: tuple[SpeedSample, ...] = ()
     wheels: tuple[WheelSample, ...] = ()
     imu: tuple[ImuSample, ...] = ()
+    demands: tuple[DemandSample, ...] = ()
 
     @property
     def has_position(self) -> bool:
@@ -163,7 +164,7 @@ class Measurement(NamedTuple):
         )
         beside = [kind(self.t_ns, value) for kind, value in scalars if value is not None]
         position = [PositionSample(*self[:3])] if self.has_position else []
-        every = chain(position, beside, self.pressures, self.speeds, self.wheels, self.imu)
+        every = chain(position, beside, self.pressures, self.speeds, self.wheels, self.imu, self.demands)
         return all(sample.is_valid() for sample in every)
 
 

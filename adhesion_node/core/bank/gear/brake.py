@@ -15,7 +15,7 @@ from bisect import bisect_left
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from ...intake.samples import PressureSample
+from ...intake.samples import DemandSample, PressureSample
 from .seldom import apart_ns, at_least
 
 if TYPE_CHECKING:
@@ -78,19 +78,30 @@ class BrakeSeen(NamedTuple):
     """When the pressure fell last as gentle slide protection lets it fall."""
     gauged: bool = False
     """Whether samples come each by itself: what is said again between them is none."""
+    asked: tuple[DemandSample, ...] = ()
+    """The newest demand that was heard, if any."""
 
     def after(
-        self, config: Config, pressures: Iterable[PressureSample], demand_pa: float | None, rolls: bool | None = None
+        self,
+        config: Config,
+        pressures: Iterable[PressureSample],
+        demand_pa: float | None,
+        rolls: bool | None = None,
+        demands: Sequence[DemandSample] = (),
     ) -> BrakeSeen:
         """Take in pressures, by their stamps, and what the handle or valve demands, if that is known.
+
+        Of the `demands` heard since the call before each counts from its stamp on, else the one given, the newest.
 
         Where every axle `rolls`, or as the demand falls, what falls was released; None: no wheels are seen. As long as
         some are seen to slide the protection that has dumped is at work.
         """
-        brake = self
+        brake, heard = self, sorted({*self.asked, *demands})
         for sample in pressures:
-            brake = brake._pressed(config, sample, demand_pa, rolls)
-        return brake
+            by_then = [each.pressure_pa for each in heard if each.t_ns <= sample.t_ns]
+            asked_pa = by_then[-1] if by_then and demand_pa is not None else demand_pa
+            brake = brake._pressed(config, sample, asked_pa, rolls)
+        return brake._replace(asked=tuple(heard[-1:])) if demands else brake
 
     def _pressed(
         self, config: Config, sample: PressureSample, demand_pa: float | None, rolls: bool | None
@@ -103,7 +114,7 @@ class BrakeSeen(NamedTuple):
         full_ns = self.full_ns if empty else t_ns
         if config.pressure_kind == "demanded":
             follows = self._following(config, sample, pressure)
-            return BrakeSeen(recent, pressure, follows, None, full_ns, gauged=self.gauged)
+            return BrakeSeen(recent, pressure, follows, None, full_ns, gauged=self.gauged, asked=self.asked)
         lately = recent[bisect_left(recent, (t_ns - at_least(DUMP_NS, LATELY, every_ns),)) :]
         peak = max([each.pressure_pa for each in lately])
         dumped_ns = None if rolls else self.dumped_ns
@@ -134,7 +145,9 @@ class BrakeSeen(NamedTuple):
             applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
         if demand_pa is not None:  # what cylinders lack of it an electric brake gives
             applied = max(applied, self._following(config, sample, demand_pa))
-        return BrakeSeen(recent, demanded, applied, dumped_ns if dumping else None, full_ns, fell_ns, self.gauged)
+        return BrakeSeen(
+            recent, demanded, applied, dumped_ns if dumping else None, full_ns, fell_ns, self.gauged, self.asked
+        )
 
     def _following(self, config: Config, sample: PressureSample, demanded_pa: float) -> float:
         """What presses by now of what is demanded, as the brake builds up and is released."""

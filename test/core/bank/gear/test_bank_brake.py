@@ -20,6 +20,7 @@ from pressures import CYLINDER, DEMANDED, MEAN, MS, applying, cycling, released,
 
 from adhesion_node.core.bank.gear.brake import BrakeSeen
 from adhesion_node.core.config import Config
+from adhesion_node.core.intake.samples import DemandSample
 
 
 @pytest.mark.parametrize("config", [CYLINDER, MEAN])
@@ -32,6 +33,21 @@ def test_a_release_that_wheels_or_the_demand_tell_is_no_dump(config: Config, tol
         brake = brake.after(config, [sample], demand_pa, rolls=told_by == "wheels")
         assert not brake.has_slid(sample.t_ns)
         assert time < 7.0 or brake.applied_pa == pytest.approx(150e3, rel=0.02)
+
+
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+def test_a_demand_counts_from_its_own_time_on(config: Config) -> None:
+    """In a tick that brings five pressures and a demand; the next ones bring it later than their pressures."""
+    empty, demands = sampled(lambda _: 0.0, 0.8), [DemandSample(S + S // 2, FULL_PA)]
+    before = BrakeSeen().after(config, empty[:1], 0.0, None, [DemandSample(S, 0.0)])
+    assert before.after(config, empty[1:5], FULL_PA, None, demands).applied_pa == 0.0
+    brake = before.after(config, empty[1:6], FULL_PA, None, demands)
+    assert brake.applied_pa == pytest.approx(FULL_PA * 0.1 / config.brake_build_up_s)
+    for index, sample in enumerate(empty[6:], 2):
+        brake = brake.after(config, [sample], FULL_PA, None, [DemandSample(sample.t_ns + MS, FULL_PA)])
+        assert brake.demanded_pa == FULL_PA
+        assert brake.applied_pa == pytest.approx(FULL_PA * 0.1 * index / config.brake_build_up_s)
+    assert brake.after(config, [sample._replace(t_ns=2 * S)], None).applied_pa < brake.applied_pa  # heard no more
 
 
 @pytest.mark.parametrize("config", [CYLINDER, MEAN])
