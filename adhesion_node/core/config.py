@@ -218,7 +218,7 @@ class Config:
         0.0,
         1.0,
     )
-    speed_scale_std: float = _unsure(0.005, "Standard deviation of the scale of measured speeds", "", 0.0, 0.5)
+    speed_scale_std: float = _unsure(0.01, "Standard deviation of the scale of measured speeds", "", 0.0, 0.5)
     grade_std: float = _unsure(
         0.008, "Standard deviation of the grade, rise over run, that the track profile leaves open", "", 0.0, 0.1
     )

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Memory stays flat: an hour of 10 Hz through the pipeline, with every fault that could make something pile up."""
+"""Memory stays flat: half an hour of 10 Hz through the pipeline, with every fault that could make something pile up."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ from adhesion_node.wire.messages.refused import Rejected
 from adhesion_node.wire.topics import BRAKE_PRESSURE, POSITION
 
 S = 10**9
-TURN = 2700
-"""Ticks under each fault: 4.5 minutes, several times brake, release and acceleration."""
+TURN = 1350
+"""Ticks under each fault: 2 minutes, several times brake, release and acceleration."""
 
 PARTS = 3
 """Of a turn: what grows is greater in the last one than in the first."""
@@ -179,7 +179,7 @@ def peaks(pipeline: Pipeline, stream: Iterable[tuple[Sent, ...]]) -> list[int]:
     return [int(max(part)) for part in np.array_split(sizes, PARTS)]
 
 
-def test_an_hour_of_faults_leaves_no_more_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_half_an_hour_of_faults_leaves_no_more_behind(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stream, "MOST", MOST)
     pipeline = Pipeline(CONFIG, 1)
     pairs = journey(10.0, np.random.default_rng(1))
@@ -188,5 +188,5 @@ def test_an_hour_of_faults_leaves_no_more_behind(monkeypatch: pytest.MonkeyPatch
     assert {name: parts for name, parts in most.items() if max(parts) > MORE * parts[0]} == {}
     # what is left of a fault goes as soon as two stamps agree on the new time
     assert max(afterwards[1:]) <= MORE * most["none"][0]
-    assert pipeline.windows > 500
+    assert pipeline.windows > 250
     assert all(pipeline.dropped[reason] > TURN // 3 for reason in REASONS), pipeline.dropped

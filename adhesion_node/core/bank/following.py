@@ -41,7 +41,7 @@ from .motion import (
     white_variances,
 )
 from .rims.taken import with_wheels
-from .seeing import CLIPPED, SWINGING, acceleration_seen, speed_seen
+from .seeing import CLIPPED, SWINGING, acceleration_seen, considered, speed_seen
 from .sensors.pointing import ASKEW_MPS2
 from .sensors.scatter import BRAKED_FAR, PLACE_FAR, SLOW_FAR
 
@@ -155,7 +155,10 @@ def followed(
                 memory = _with_speed(config, memory, speed)
     if measurement.has_position and not memory.misled:
         memory = _with_position(memory, measurement, predicted)
-    return judged(config, with_wheels(config, memory, measurement), rail)
+    with_them = with_wheels(config, memory, measurement)
+    if with_them.bank is not memory.bank and memory.is_dark:
+        with_them = with_them._replace(bank=considered(memory.bank, with_them.bank, SCALE))
+    return judged(config, with_them, rail)
 
 
 def heard(memory: Memory, measurement: Measurement) -> tuple[Memory, Measurement]:

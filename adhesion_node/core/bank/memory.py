@@ -24,9 +24,9 @@ from .gear.brake import BrakeSeen
 from .gear.repeating import Repeating
 from .gear.wheels import WheelsSeen
 from .kernels import weighing
-from .layout import POSITION, Bank
+from .layout import POSITION, SCALE, Bank
 from .motion import Braking, moved
-from .seeing import Observation, corrected
+from .seeing import Observation, considered, corrected
 from .sensors.coarse import Coarse
 from .sensors.leaping import Leaping
 from .sensors.plausible import Course
@@ -37,6 +37,9 @@ if TYPE_CHECKING:
     from ..config import Config
 
 S = 1_000_000_000
+
+DARK_NS = 5 * S
+"""So long behind a position the speed goes on by others."""
 
 HALF_LOG_2PI = 0.5 * math.log(2.0 * math.pi)
 
@@ -115,9 +118,19 @@ class Memory(NamedTuple):
         """Whether any position has said where the train is."""
         return bool(self.bank.covariance[0, POSITION, POSITION] < 0.5 * MAX_VARIANCE_M2)
 
+    @property
+    def is_dark(self) -> bool:
+        """Whether no position tells how fast the train is: then nothing tells what the scale of its speed is off by.
+
+        But where that has leapt it is the train that tells.
+        """
+        placed = self.is_placed and self.t_ns - self.placed_ns < DARK_NS and not self.misled
+        return not placed and self.leaping.by_mps == 0.0
+
     def told(self, seen: Observation, fixes: int = 0) -> Memory:
         """Take in an observation."""
         bank = corrected(self.bank, seen)
+        bank = considered(self.bank, bank, SCALE) if self.is_dark else bank
         total = weighing.total(bank.log_weight)
         return self._replace(
             bank=bank.believing(bank.mean, bank.covariance, bank.log_weight - total),

@@ -86,6 +86,13 @@ def corrected(bank: Bank, seen: Observation) -> Bank:
     return bank.believing(*weighing.corrected(*before, seen.innovation, seen.slope, seen.variances, CLIPPED))
 
 
+def considered(before: Bank, bank: Bank, component: int) -> Bank:
+    """The bank with a component as it was known before: it is considered, not estimated (Schmidt 1966)."""
+    bank.mean[:, component] = before.mean[:, component]
+    bank.covariance[:, component, component] = before.covariance[:, component, component]
+    return bank
+
+
 def wheels_seen(config: Config, bank: Bank, braking: Braking, elapsed_s: float) -> Bank:
     """Take in that wheels were seen to slide, or to roll: adhesion is below, or above, what the brake needs.
 

@@ -54,7 +54,7 @@ def counted_on(config: Config, bank: Bank, missed: float, braking: Braking, know
     swinging = swings(bank.kind)
     lengths = np.where(swinging, time_s / kinds.SWING_S, way_m / kinds.ROUGHNESS_M)
     rough_kept, rough_added = _mean_ahead(lengths, 1.0)
-    grade_kept, grade_added = _mean_ahead(way_m, kinds.grade_m_of(config))
+    grade_kept, grade_added = _mean_ahead(way_m, kinds.RESIDUAL_M)
     slope = used.slope.copy()
     slope[:, ROUGH] *= rough_kept
     slope[:, GRADE] = grade_kept

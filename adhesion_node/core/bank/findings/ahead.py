@@ -181,7 +181,7 @@ def _ahead_of(config: Config) -> mixture.Ahead:
         fading=kinds.FADING,
         drift=np.square(np.minimum(kinds.DRIFT, DRIFT_AHEAD)),
         growth=np.minimum(kinds.GROWTH, 0.0),
-        grade_m=kinds.grade_m_of(config),
+        grade_m=kinds.RESIDUAL_M,
         resistance=np.array(config.train.resistance_si),
         grade_error=float(config.grade_error),
         resistance_error=float(config.resistance_std),

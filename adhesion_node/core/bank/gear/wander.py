@@ -45,13 +45,24 @@ class Errors(NamedTuple):
     """Variance over 1 s of what does."""
 
 
+class Rolled(NamedTuple):
+    """What the radius of all was, beside the expected one, when axles began to slide in this braking."""
+
+    radius: float
+    variance: float
+    """Of what does not go with the scale of the measured speeds."""
+    by_scale: float = 0.0
+    """By how much it goes with that: where speeds are read too high, rims seem to be slow."""
+    scale: float = 0.0
+    """What the scale was believed to be."""
+
+
 class Wander(NamedTuple):
     """How fast the fastest rim was each time that it was taken for the train's speed."""
 
     taken: tuple[tuple[int, float], ...] = ()
     """Stamps, ns, and speeds."""
-    rolled: tuple[float, float] | None = None
-    """Radius of all, beside the expected one, and its variance when axles began to slide in this braking."""
+    rolled: Rolled | None = None
 
     def after(self, t_ns: int, rim_mps: float) -> Wander:
         """Note the next one."""
@@ -64,7 +75,7 @@ class Wander(NamedTuple):
         >>> steady.errors().quick
         0.003
         """
-        least = Errors(lasting=(SWAY * max(self.rolled[0] - radius, 0.0)) ** 2 if self.rolled else 0.0)
+        least = Errors(lasting=(SWAY * max(self.rolled.radius - radius, 0.0)) ** 2 if self.rolled else 0.0)
         if len(self.taken) < SAMPLES:
             return least
         stamps, speeds = np.array(self.taken).T

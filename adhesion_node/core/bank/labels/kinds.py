@@ -67,7 +67,8 @@ SWINGS = np.array([kind.swings for kind in KINDS])
 RESTLESSNESS = np.array([kind.restlessness_mps for kind in KINDS])
 
 ROUGHNESS_M, GRADE_M, RESIDUAL_M = 100.0, 4000.0, 1500.0
-"""Correlation lengths of the roughness, of a grade that no profile tells and of what a profile leaves open of it."""
+"""Correlation lengths of the roughness, of a grade that no profile tells, as a slope may be long, and of what a profile
+leaves open of it; on the way ahead the last one counts for either, as a slope may end."""
 
 SWING_S = 0.7
 """Correlation time of a swing."""

@@ -18,7 +18,7 @@ from ..layout import RADIUS, SPEED, Bank
 from ..memory import Memory, S
 from ..motion import slowing
 from ..seeing import fall_seen
-from .rim import FASTEST_SHARE, FEW, as_fast, not_slower, rim_speed, slides_of
+from .rim import FASTEST_SHARE, FEW, as_fast, not_slower, rim_speed, rolled_of, slides_of
 from .stopping import halting, standing, stands
 
 if TYPE_CHECKING:
@@ -71,11 +71,10 @@ def _creeping(bank: Bank, wander: Wander, rim_mps: float) -> tuple[Bank, Wander,
 
     At first it may creep by all that it is behind.
     """
-    mean, before = bank.moments()
-    errors, covariance = wander.errors(float(mean[RADIUS])), bank.covariance.copy()
+    errors, covariance = wander.errors(bank.mean_of(RADIUS)), bank.covariance.copy()
     variance, behind = errors.lasting * TRUSTED_NS / S, 1.0 - rim_mps / max(rim_speed(bank)[0], rim_mps)
     if wander.rolled is None and behind < HELD:
-        wander = wander._replace(rolled=(float(mean[RADIUS]), float(before[RADIUS, RADIUS])))
+        wander = wander._replace(rolled=rolled_of(bank))
         variance = LAGS**2 + behind**2
     covariance[:, RADIUS, RADIUS] += variance
     return bank._replace(covariance=covariance), wander, errors

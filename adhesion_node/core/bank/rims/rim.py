@@ -14,7 +14,8 @@ import math
 
 import numpy as np
 
-from ..layout import RADIUS, SPEED, Bank
+from ..gear.wander import Rolled
+from ..layout import RADIUS, SCALE, SPEED, Bank
 from ..seeing import CLIPPED, corrected, speed_seen
 
 ROLLING_SHARE, FASTEST_SHARE = 0.02, 0.008
@@ -29,6 +30,9 @@ SLIDES = 0.2
 FEW = 6
 """Rims heard; of fewer the fastest slides the likelier, the fewer they are, and where it creeps no other shows it."""
 
+TINY = 1e-12
+"""Variance of a scale that is known."""
+
 UNSEEN = 1e12
 """Variance of what is not seen."""
 
@@ -41,13 +45,23 @@ def rim_speed(bank: Bank) -> tuple[float, float]:
     return float(slope[0] * mean[SPEED]), math.sqrt(max(float(slope @ both @ slope), 0.0))
 
 
-def as_rolled(bank: Bank, rolled: tuple[float, float] | None) -> Bank:
+def rolled_of(bank: Bank) -> Rolled:
+    """What radii are while axles roll: where they were learnt by measured speeds they go with the scale of these."""
+    mean, covariance = bank.moments()
+    by_scale = covariance[RADIUS, SCALE] / max(covariance[SCALE, SCALE], TINY)
+    own = covariance[RADIUS, RADIUS] - by_scale * covariance[RADIUS, SCALE]
+    return Rolled(float(mean[RADIUS]), float(own), float(by_scale), float(mean[SCALE]))
+
+
+def as_rolled(bank: Bank, rolled: Rolled | None) -> Bank:
     """Where axles have slid: radii are again what they were, and their variance, before all of them crept."""
     if rolled is None:
         return bank
     mean, covariance = bank.mean.copy(), bank.covariance.copy()
-    covariance[:, RADIUS, :] = covariance[:, :, RADIUS] = 0.0
-    mean[:, RADIUS], covariance[:, RADIUS, RADIUS] = rolled
+    mean[:, RADIUS] = rolled.radius + rolled.by_scale * (mean[:, SCALE] - rolled.scale)
+    along = rolled.by_scale * covariance[:, SCALE]
+    covariance[:, RADIUS, :] = covariance[:, :, RADIUS] = along
+    covariance[:, RADIUS, RADIUS] = rolled.variance + rolled.by_scale * along[:, SCALE]
     return bank._replace(mean=mean, covariance=covariance)
 
 

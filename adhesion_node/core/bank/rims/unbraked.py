@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING
 
 from ..gear.fastest import UNISON_S
 from ..gear.radii import UNEQUAL
-from ..layout import RADIUS, Bank
+from ..layout import RADIUS
 from ..memory import Memory, S
+from ..seeing import considered
 from . import rim
 from .rim import FASTEST_SHARE, ROLLING_SHARE, as_fast, as_rolled, not_slower, slides_of
 
@@ -77,7 +78,7 @@ def spinning(memory: Memory, rim_mps: float, count: int) -> Memory:
     if not memory.wheels.radii.is_learnt:
         return memory
     bank = as_fast(memory.bank, rim_mps, ROLLING_SHARE * rim_mps, slides_of(count)).normalised()
-    return memory._replace(bank=_of_radii_nothing(memory.bank, bank), fixes=memory.fixes + 1)
+    return memory._replace(bank=considered(memory.bank, bank, RADIUS), fixes=memory.fixes + 1)
 
 
 def slow(memory: Memory, rim_mps: float, back: bool) -> Memory:
@@ -86,11 +87,4 @@ def slow(memory: Memory, rim_mps: float, back: bool) -> Memory:
     Of radii that tells nothing.
     """
     bank = memory.bank if back else not_slower(memory.bank, rim_mps, SLOW_MPS)
-    return memory._replace(bank=_of_radii_nothing(memory.bank, as_fast(bank, rim_mps, SLOW_MPS).normalised()))
-
-
-def _of_radii_nothing(before: Bank, bank: Bank) -> Bank:
-    """The bank with radii as they were known before: they are considered, not estimated (Schmidt 1966)."""
-    variance = before.covariance[:, RADIUS, RADIUS]
-    bank.mean[:, RADIUS], bank.covariance[:, RADIUS, RADIUS] = before.mean[:, RADIUS], variance
-    return bank
+    return memory._replace(bank=considered(memory.bank, as_fast(bank, rim_mps, SLOW_MPS).normalised(), RADIUS))

@@ -11,6 +11,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,6 +20,7 @@ from scipy.stats import norm
 
 from adhesion_node.core.bank.findings.learnt import learnt
 from adhesion_node.core.bank.following import followed, met
+from adhesion_node.core.bank.free import either
 from adhesion_node.core.bank.gear.axles import ROLLS
 from adhesion_node.core.bank.layout import RADIUS, SPEED
 from adhesion_node.core.bank.memory import Memory
@@ -27,10 +29,13 @@ from adhesion_node.core.bank.rims.rim import (
     FASTEST_SHARE,
     SLIDES,
     as_fast,
+    as_rolled,
     not_slower,
     rim_speed,
+    rolled_of,
     rolling,
 )
+from adhesion_node.core.bank.seeing import corrected, speed_seen
 from adhesion_node.core.belief.rail import Rail
 from adhesion_node.core.config import Config
 from adhesion_node.core.intake.samples import Measurement, WheelSample
@@ -49,6 +54,24 @@ def test_a_slower_rim_says_nothing() -> None:
     assert after.mean == pytest.approx(BANK.mean, abs=1e-6)
     assert after.covariance == pytest.approx(BANK.covariance, rel=1e-6, abs=1e-9)
     assert np.array_equal(after.log_weight, BANK.log_weight)
+
+
+def test_radii_that_measured_speeds_have_told_go_with_the_scale_of_these_behind_a_slide_too() -> None:
+    """Each braking made the speed known better than its scale, by rims that the same speeds had measured."""
+    bank = either(met(CONFIG, Measurement(S, 0.0, math.inf, 0.0)).bank)
+    bank = bank.with_fresh(SPEED, np.full(bank.kind.size, 26.0), 1.0)
+    for _ in range(50):
+        bank = corrected(bank, speed_seen(bank, 26.0, 0.01)).normalised()
+        bank = rolling(bank, 26.3).normalised()
+    before, rolled = bank.std_of(SPEED), rolled_of(bank)
+    for _ in range(3):  # all rims creep, and roll again
+        bank.covariance[:, RADIUS, RADIUS] += 0.02**2
+        bank = rolling(as_rolled(bank, rolled), 26.3).normalised()
+        rolled = rolled_of(bank)
+    assert bank.std_of(SPEED) == pytest.approx(before, rel=0.01)
+    assert bank.mean_of(RADIUS) == pytest.approx(0.9 * 0.3 / 26.0, rel=0.02)  # radii: 0.03, scale: 0.01
+    assert as_rolled(bank, None) is bank
+    assert rolled_of(rolling(met(replace(CONFIG, speed_scale_std=0.0), Measurement(S, 0.0, math.inf)).bank, 26.3))
 
 
 def test_a_faster_rim_corrects_and_weighs() -> None:

@@ -57,8 +57,8 @@ def test_axles_that_spun_do_not_slide_when_they_roll_again(
     gained_mps2: float, driven: int, share: float, *, dark: bool
 ) -> None:
     """Radii were learnt too small by what they spun: the rail was told to limit in 37 to 64 % of the next braking."""
-    told = [each.regime for seed in range(4) for each in departed(seed, gained_mps2, driven, dark=dark)]
-    assert len(told) > 50
+    told = [each.regime for seed in range(2) for each in departed(seed, gained_mps2, driven, dark=dark)]
+    assert len(told) > 25
     assert np.mean([each is Regime.ADHESION_LIMITED for each in told]) < share
 
 
