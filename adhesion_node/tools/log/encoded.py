@@ -35,8 +35,12 @@ NO_TEXT = (
 _UTF_16 = ((slice(1, 4, 2), slice(0, 4, 2), "utf-16-le"), (slice(0, 4, 2), slice(1, 4, 2), "utf-16-be"))
 """Where the zeros stand in Latin letters of 16 bits, and where the letters."""
 
-_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
-"""Byte order marks and what they say of the encoding."""
+_MARKS = (
+    (codecs.BOM_UTF8, "utf-8-sig"),
+    *((mark, "utf-32") for mark in (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE)),
+    *((mark, "utf-16") for mark in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)),
+)
+"""Byte order marks and what they say of the encoding; one of 32 bits begins as one of 16."""
 
 _HEAD = 1024
 
@@ -73,7 +77,7 @@ def encoding_of(path: Path) -> str:
             if piece[:4][zeros] == b"\0\0" and 0 not in piece[:4][letters]:
                 return encoding
         if 0 in piece.partition(b"\n")[0]:  # further on they are of a recorder whose power failed
-            raise ValueError(f"{path}: is no text: save it as CSV or as Parquet")
+            raise ValueError(f"{path}: is no text: save it as CSV or as Parquet, or name its --encoding")
         try:
             while piece:
                 decoder.decode(piece)

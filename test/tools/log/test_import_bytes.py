@@ -30,10 +30,10 @@ __all__ = ["importing"]
         (b"PK\x03\x04\x14", "is a zip file or a workbook, no text: unpack it, or save it as CSV"),
         (b"\xd0\xcf\x11\xe0", "is a workbook, no text: unpack it, or save it as CSV"),
         (b"\x89MCAP0\r\n\0", "is a recording, no log: replay --offline reads it"),
-        (b"MDF     4.10\0\0\0", "is no text: save it as CSV or as Parquet"),
-        (b"TDSm\x0e\0\0\0", "is no text: save it as CSV or as Parquet"),
-        (np.arange(99).astype("<i4").tobytes(), "is no text: save it as CSV or as Parquet"),
-        (b"\0" * 99, "is no text: save it as CSV or as Parquet"),
+        (b"MDF     4.10\0\0\0", "is no text: save it as CSV or as Parquet, or name its --encoding"),
+        (b"TDSm\x0e\0\0\0", "is no text: save it as CSV or as Parquet, or name its --encoding"),
+        (np.arange(99).astype("<i4").tobytes(), "is no text: save it as CSV or as Parquet, or name its --encoding"),
+        (b"\0" * 99, "is no text: save it as CSV or as Parquet, or name its --encoding"),
     ],
 )
 def test_what_is_no_text_is_told(importing: Import, begins: bytes, what: str) -> None:

@@ -72,6 +72,7 @@ WRITTEN: list[tuple[str, Callable[[pd.DataFrame], str | bytes], str]] = [
         lambda rows: text(rows).replace("\n", "\ns,m,m/s^1,Pa\n", 1),
         "line 2 left out as units",
     ),
+    ("utf-32", lambda rows: text(rows, ";").encode("utf-32"), "utf-32"),
     ("utf-16 without a mark", lambda rows: text(rows, ";").encode("utf-16-le"), "utf-16-le"),
     ("delimiters at the ends", lambda rows: text(rows).replace("\n", ",\n").replace(",\n", "\n", 1), "delimiter ','"),
 ]
