@@ -39,6 +39,8 @@ class Content(NamedTuple):
 
     messages: list[Message]
     declared: list[Schema | Channel]
+    beyond: int
+    """How many messages are left out, whose log time is later than any that a recording may hold."""
 
 
 def unpack(opcode: int, body: bytes) -> Content:
@@ -53,7 +55,7 @@ def unpack(opcode: int, body: bytes) -> Content:
         content = _content(chunk)
         if chunk.uncompressed_crc and crc32(content) != chunk.uncompressed_crc:
             raise ValueError(f"chunk of {len(content)} bytes: its checksum is another")
-    messages, declared, offset = list[Message](), list[Schema | Channel](), 0
+    messages, declared, beyond, offset = list[Message](), list[Schema | Channel](), 0, 0
     while offset < len(content):
         kind, length = HEAD.unpack_from(content, offset)
         offset, end = offset + HEAD.size, offset + HEAD.size + length
@@ -64,13 +66,14 @@ def unpack(opcode: int, body: bytes) -> Content:
                 raise ValueError(f"message of {length} bytes: shorter than its head")
             channel_id, log_ns = _MESSAGE.unpack_from(content, offset)
             if log_ns > LATEST_NS:
-                raise ValueError(f"log time = {log_ns} ns: beyond what a recording may hold")
-            messages.append((channel_id, log_ns, content[offset + _MESSAGE.size : end]))
+                beyond += 1
+            else:
+                messages.append((channel_id, log_ns, content[offset + _MESSAGE.size : end]))
         elif kind in (Opcode.SCHEMA, Opcode.CHANNEL):
             read = Schema.read if kind == Opcode.SCHEMA else Channel.read
             declared.append(read(ReadDataStream(BytesIO(content[offset:end]))))
         offset = end
-    return Content(messages, declared)
+    return Content(messages, declared, beyond)
 
 
 def _content(chunk: Chunk) -> bytes:

@@ -140,11 +140,14 @@ class McapFile:
         try:
             if opcode == Opcode.MESSAGE and self.blocks and self.blocks[-1].opcode == Opcode.CHUNK:
                 raise ValueError("behind a chunk comes its index, which one wrong bit makes a message")
-            messages, declared = unpack(opcode, body)
+            messages, declared, beyond = unpack(opcode, body)
             self._declare(declared)
         except _UNREADABLE:
             self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
             return
+        if beyond:
+            later = f"{beyond} messages are left out, their log time is beyond 2^63 - 1 ns"
+            self.damage.append(f"{self.path} is damaged at byte {offset}: {later}")
         if messages:
             self.blocks.append(Block(min(log_ns for _, log_ns, _ in messages), offset, opcode, len(body)))
             self.counts.update(channel for channel, _, _ in messages)
