@@ -44,7 +44,7 @@ NO_ROOM = ": make room, or name a place on another disk"
 ESCAPED = "backslashreplace"
 """What becomes of letters that a terminal's encoding has not, and of bytes in a file's name that are none."""
 
-WRITTEN, READ = ("output", "map", "out", "json"), ("file", "bag", "bags", "check", "estimate", "train", "params", "set")
+WRITTEN, READ = ("output", "map", "out", "json"), ("file", "bag", "bags", "check", "estimate", "train", "params")
 """Options of all tools that name a file to write, or a folder, and one to read, maybe as NAME=FILE."""
 
 NARROWEST = 11

@@ -130,7 +130,6 @@ def reading(args: list[str]) -> int:
     parser.add_argument("bags", nargs="+")
     parser.add_argument("--out")
     parser.add_argument("--output")
-    parser.add_argument("--set", action="append", default=[])
 
     def work(options: argparse.Namespace) -> int:
         for path in filter(None, (options.out, options.json)):
@@ -153,7 +152,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.parametrize("option", ["--out", "--json"])
 @pytest.mark.parametrize("path", ["log.csv", "./log.csv", "link.csv"])
-@pytest.mark.parametrize("given", [["log.csv"], ["unit_7=log.csv"], ["run", "--set", "train_file=log.csv"]])
+@pytest.mark.parametrize("given", [["log.csv"], ["unit_7=log.csv"]])
 def test_no_result_takes_the_place_of_what_is_read(
     option: str, path: str, given: list[str], here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -192,12 +191,11 @@ def test_two_files_that_are_begun_at_once_are_two(tmp_path: Path) -> None:
     assert (one.read_text(), other.read_text()) == ("one", "other")
 
 
-@pytest.mark.parametrize("given", [["run", "--set", "method=bank"], ["bank=log.csv"]])
-def test_what_is_no_file_that_is_read_may_be_the_name_of_a_result(given: list[str], here: Path) -> None:
+def test_what_is_no_file_that_is_read_may_be_the_name_of_a_result(here: Path) -> None:
     (here / "bank=log.csv").write_text("another log")
     for path in ("bank", "log.csv", "log.csv"):
-        assert reading([*given, "--json", path]) == DONE, "a file of that very name is meant"
-    assert reading([*given, "--json", "/dev/null", "--out", "/dev/null"]) == DONE
+        assert reading(["bank=log.csv", "--json", path]) == DONE, "a file of that very name is meant"
+    assert reading(["bank=log.csv", "--json", "/dev/null", "--out", "/dev/null"]) == DONE
 
 
 def test_two_results_are_not_one_file(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -100,28 +100,39 @@ def test_a_map_of_later_trains_is_told(later: bool, tmp_path: Path, bag: Path, o
     assert [f"t_ns = {first_ns}, " in line for line in told] == [True] * later
 
 
+@pytest.mark.parametrize("by", ["--params", "--set"])
 @pytest.mark.parametrize("setting", ["train_file", "track_line", "rail_map"])
-def test_no_result_takes_the_place_of_a_file_that_the_parameters_name(
-    setting: str, tmp_path: Path, bag: Path, offline: Offline, monkeypatch: pytest.MonkeyPatch
+def test_no_result_takes_the_place_of_a_file_that_a_setting_names(
+    setting: str, by: str, tmp_path: Path, bag: Path, offline: Offline, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was read, and then lost."""
     monkeypatch.chdir(tmp_path)
     Path("named").write_text("read")
     Path("params.yaml").write_text(f"estimator:\n  ros__parameters:\n    {setting}: {tmp_path / 'named'}\n")
-    code, _, _, err = offline(bag, "--params", "params.yaml", "--json", "named", fast=False)
+    given = "params.yaml" if by == "--params" else f"{setting}=named"
+    code, _, _, err = offline(bag, by, given, "--json", "named", fast=False)
     assert (code, err) == (2, ["replay: --json named: is read, and would be lost: name another file"])
     assert Path("named").read_text() == "read"
 
 
+@pytest.mark.parametrize("given", [["--params", "params.yaml"], ["--set", "method=bank"]])
 def test_another_value_may_be_the_name_of_a_result(
-    tmp_path: Path, bag: Path, offline: Offline, monkeypatch: pytest.MonkeyPatch
+    given: list[str], tmp_path: Path, bag: Path, offline: Offline, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It was said to be read."""
     monkeypatch.chdir(tmp_path)
     Path("bank").write_text("of an earlier call")
     Path("params.yaml").write_text("estimator:\n  ros__parameters:\n    method: bank\n")
-    _, _, _, err = offline(bag, "--params", "params.yaml", "--json", "bank", fast=False)
+    _, _, _, err = offline(bag, *given, "--json", "bank", fast=False)
     assert not any("would be lost" in line for line in err)
+
+
+def test_a_setting_without_a_value_is_refused_by_its_name(tmp_path: Path, bag: Path, offline: Offline) -> None:
+    """It was passed over, and the default held."""
+    file = tmp_path / "params.yaml"
+    file.write_text("estimator:\n  ros__parameters:\n    confidence: {}\n")
+    code, _, _, err = offline(bag, "--params", str(file), fast=False)
+    assert (code, err) == (2, ["replay: confidence = {}: give a value of type float (a value from 0.5 to 0.9999)"])
 
 
 def test_other_nodes_in_the_parameter_file_are_left_alone(tmp_path: Path, bag: Path, offline: Offline) -> None:

@@ -32,7 +32,7 @@ from adhesion_node.command.signals import StopRequest, stop_on_signals
 
 from ...command.options import BAD_INPUT, DONE, FAILED, complain, complete, help_texts, version_option
 from ...core.setting import Setting, by_group
-from ...wire.files.parameters import unheeded
+from ...wire.files.parameters import unheeded, without_value
 
 POLL_S = 0.1
 """Longest time until a signal is seen: no signal interrupts rclpy's wait."""
@@ -48,6 +48,9 @@ _BAD_START = (ValueError, OSError, RuntimeError, ParameterException, NameValidat
 
 _UNKNOWN = "UnknownROSArgsError"
 """The one of rclpy, not among its public names, that lists arguments and says nothing of them."""
+
+_NOT_SET = "PARAMETER_NOT_SET"
+"""What rclpy says of a parameter without a value, whose name it keeps for itself."""
 
 
 def run(
@@ -138,8 +141,7 @@ def _start_and_spin(program: str, make_node: Callable[[], Node], ros: list[str],
         rclpy.init(args=ros, signal_handler_options=SignalHandlerOptions.NO)
         node = make_node()
     except _BAD_START as error:
-        unknown = f"ROS arguments {error}: ROS has none such; a parameter is given as -p NAME:=VALUE"
-        return complain(program, ValueError(unknown) if type(error).__name__ == _UNKNOWN else error, BAD_INPUT)
+        return complain(program, _named(error, ros), BAD_INPUT)
     for warning in unheeded(ros, node.get_fully_qualified_name()):
         node.get_logger().warning(warning)
     executor = SingleThreadedExecutor()
@@ -153,6 +155,13 @@ def _start_and_spin(program: str, make_node: Callable[[], Node], ros: list[str],
     finally:
         executor.shutdown()
         node.destroy_node()
+
+
+def _named(error: Exception, ros: Sequence[str]) -> Exception:
+    """An error of rclpy with what it is about, which some leave out."""
+    if type(error).__name__ == _UNKNOWN:
+        return ValueError(f"ROS arguments {error}: ROS has none such; a parameter is given as -p NAME:=VALUE")
+    return ValueError(next(without_value(ros), error)) if _NOT_SET in str(error) else error
 
 
 def _spin(executor: SingleThreadedExecutor, node: Node, stop: StopRequest) -> None:

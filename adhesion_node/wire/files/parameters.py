@@ -109,6 +109,17 @@ def unheeded(ros_arguments: Sequence[str], node: str) -> list[str]:
     ]
 
 
+def without_value(ros_arguments: Sequence[str]) -> Iterator[str]:
+    """Say of every parameter that is given without a value that it is, which keeps ROS from making any node it is for.
+
+    The arguments are those of `unheeded`.
+    """
+    for source, found in _given(ros_arguments):
+        for name, value in (each for one in found for each in one.values.items()):
+            if value in ({}, []):
+                yield f"{source}: {name} = {value}: give a value, or leave it out"
+
+
 def _given(ros_arguments: Sequence[str]) -> Iterator[tuple[str, list[Section]]]:
     """Yield what gives parameters, as it stands on the command line, with its sections."""
     for option, text in pairwise(ros_arguments):
@@ -208,8 +219,8 @@ def _named(content: Mapping[str, Any], name: str) -> Iterator[Section]:
 
 
 def _flat(values: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Parameter names as ROS spells them: `train: {mass_kg: 1}` is `train.mass_kg`."""
+    """Parameter names as ROS spells them: `train: {mass_kg: 1}` is `train.mass_kg`; an empty group is a value."""
     flat: dict[str, Any] = {}
     for name, value in values.items():
-        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) else {f"{prefix}{name}": value}
+        flat |= _flat(value, f"{prefix}{name}.") if isinstance(value, Mapping) and value else {f"{prefix}{name}": value}
     return flat

@@ -32,10 +32,11 @@ def given(options: argparse.Namespace, node: str, settings: Sequence[Setting]) -
     if not options.params:
         refuse(options, ["node"], "says whose of --params: add that, or leave this out")
     values = parameters.read(options.params, options.node or node) if options.params else {}
-    require_apart(written_by(options), [str(values[each.name]) for each in FILES if each.name in values])
     if options.train:
         values |= {TRAIN_FILE.name: options.train}
-    return values | dict(parse_setting(text, settings) for text in options.set)
+    values |= dict(parse_setting(text, settings) for text in options.set)
+    require_apart(written_by(options), [str(values[each.name]) for each in FILES if each.name in values])
+    return values
 
 
 def parse_setting(text: str, settings: Sequence[Setting] = SETTINGS) -> tuple[str, bool | int | float | str]:

@@ -72,6 +72,14 @@ def test_a_parameter_file_without_parameters_is_told(start: Start, tmp_path: Pat
     assert f"params = {file}: not a readable ROS parameter file: it is to hold, one in the other, NODE" in errors
 
 
+@pytest.mark.parametrize("value", ["{}", "[]"])
+def test_a_parameter_without_a_value_is_named(start: Start, tmp_path: Path, value: str) -> None:
+    file = tmp_path / "parameters.yaml"
+    file.write_text(f"probe:\n  ros__parameters:\n    gain: {value}\n")
+    told = f"probe: --params-file {file}: gain = {value}: give a value, or leave it out"
+    assert end(start("--ros-args", "--params-file", str(file))) == (BAD_INPUT, [told])
+
+
 def test_nested_namespaces_are_sections_too(tmp_path: Path) -> None:
     file = tmp_path / "parameters.yaml"
     file.write_text("train1:\n  probe: {ros__parameters: {gain: 1.0}}\n  other: {ros__parameters: {}}\n")
