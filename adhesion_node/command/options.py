@@ -22,7 +22,7 @@ from contextlib import suppress
 from typing import Any, TypeVar
 
 from .signals import interrupted, interrupted_by_sigterm
-from .streams import open_closed_streams
+from .streams import open_closed_streams, show_controls
 from .written import require_apart, require_folder, write_text
 
 Item = TypeVar("Item")
@@ -168,6 +168,7 @@ def _worked(
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors=ESCAPED)
+    show_controls()
     version_option(parser)
     complete(parser)
     options = parser.parse_args(args)

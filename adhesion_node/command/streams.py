@@ -6,13 +6,22 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Standard streams that were closed before the program began, as by `>&-`: Python has None in their place."""
+"""Standard streams: those that were closed before the program began, as by `>&-`, and what a terminal is told.
+
+Python has None in the place of a closed one.
+"""
 
 import os
 import sys
+from typing import TextIO
+
+from .written import naming
 
 STREAMS = ("stdin", "stdout", "stderr")
 """By their numbers."""
+
+CONTROLS = {number: f"\\x{number:02x}" for number in (*range(32), *range(127, 160)) if chr(number) not in "\t\n"}
+"""What a terminal obeys instead of showing it, as a name in a file may hold it, and how it is shown."""
 
 
 def open_closed_streams() -> None:
@@ -26,3 +35,24 @@ def open_closed_streams() -> None:
     for name in closed:
         mode = "r" if name == "stdin" else "w"
         setattr(sys, name, os.fdopen(nowhere, mode, encoding="utf-8", errors="backslashreplace", closefd=False))
+
+
+def show_controls() -> None:
+    """Escape from now on what a terminal would obey, and let an error of a stream name it."""
+    for stream, name in ((sys.stdout, "standard output"), (sys.stderr, "standard error")):
+        if "write" not in vars(stream):
+            _show_controls(stream, name)
+
+
+def _show_controls(stream: TextIO, name: str) -> None:
+    plain, empty = stream.write, stream.flush
+
+    def write(text: str) -> int:
+        with naming(name):
+            return plain(text.translate(CONTROLS))
+
+    def flush() -> None:
+        with naming(name):
+            empty()
+
+    stream.write, stream.flush = write, flush  # type: ignore[method-assign]

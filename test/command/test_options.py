@@ -22,6 +22,8 @@ import pytest
 from adhesion_node.command.options import BAD_INPUT, DONE, FAILED, help_texts, json_option, run_tool
 from adhesion_node.command.written import whole, write_text
 
+FULL = "No space left on device: make room, or name a place on another disk"
+
 
 def interrupted_in_a_kernel(_: argparse.Namespace) -> int:
     """What a compiled kernel makes of a Ctrl-C, called by another one."""
@@ -64,7 +66,7 @@ def test_a_full_disk_is_one_line(lines: int) -> None:
     command = [sys.executable, "-c", program, *([] if lines else ["--version"])]
     with Path("/dev/full").open("w") as full:
         ended = subprocess.run(command, check=False, stdout=full, stderr=subprocess.PIPE, text=True, env=buffered)
-    assert (ended.returncode, ended.stderr) == (FAILED, "tool: input/output: No space left on device\n")
+    assert (ended.returncode, ended.stderr) == (FAILED, f"tool: standard output: {FULL}\n")
 
 
 def broken(_: argparse.Namespace) -> int:
@@ -89,6 +91,17 @@ def test_what_a_terminal_cannot_show_is_escaped(monkeypatch: pytest.MonkeyPatch)
     assert written.getvalue() == b"\\u03bc of t\\udcff\n"
 
 
+def test_what_a_terminal_would_obey_is_escaped(capsys: pytest.CaptureFixture[str]) -> None:
+    """A topic's or a column's name went out as it stands in the file: it could clear the screen."""
+
+    def work(_: argparse.Namespace) -> int:
+        print("a\tb\r\x1b[31m")
+        raise ValueError("μ\x1b[31m\x9b")
+
+    assert run_tool(argparse.ArgumentParser("tool"), work, []) == BAD_INPUT
+    assert capsys.readouterr() == ("a\tb\\x0d\\x1b[31m\n", "tool: μ\\x1b[31m\\x9b\n")
+
+
 def test_what_is_no_text_is_escaped_in_a_file_too(tmp_path: Path) -> None:
     """The file was left empty."""
     write_text(tmp_path / "page", os.fsdecode(b"\xce\xbc of t\xff"))
@@ -101,8 +114,7 @@ def test_a_full_disk_names_the_file_and_what_to_do(capsys: pytest.CaptureFixture
         return DONE
 
     assert run_tool(argparse.ArgumentParser("tool"), work, []) == FAILED
-    told = "tool: /dev/full: No space left on device: make room, or name a place on another disk\n"
-    assert capsys.readouterr().err == told
+    assert capsys.readouterr().err == f"tool: /dev/full: {FULL}\n"
 
 
 def test_a_folder_that_is_not_there_is_told_before_the_work(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
