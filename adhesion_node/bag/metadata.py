@@ -45,12 +45,11 @@ class File(NamedTuple):
 
 
 class Metadata(NamedTuple):
-    """What is read of the metadata: whether there is any, the files, messages by topic, whether they are compressed."""
+    """What is read of the metadata: whether there is any, the files, messages by topic."""
 
     readable: bool = False
     files: tuple[str, ...] = ()
     messages: Mapping[str, int] = MappingProxyType({})
-    compressed: bool = False
 
 
 def read_metadata(bag: Path) -> Metadata:
@@ -64,7 +63,6 @@ def read_metadata(bag: Path) -> Metadata:
                 str(entry["topic_metadata"]["name"]): int(entry["message_count"])
                 for entry in information.get("topics_with_message_count") or ()
             },
-            str(information.get("compression_mode") or "none").lower() != "none",
         )
     except (OSError, ValueError, OverflowError, yaml.YAMLError, AttributeError, LookupError, TypeError, RecursionError):
         return Metadata()

@@ -6,7 +6,7 @@
 # WITHOUT WARRANTIES OR CONDITIONS OF ANY KIND, either express or implied. See the License for the specific language
 # governing permissions and limitations under the License.
 
-"""Recordings in rosbag2's other forms (sqlite3, compressed files or messages), read through rosbags."""
+"""Recordings in rosbag2's other form, sqlite3, read through rosbags."""
 
 import heapq
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +24,7 @@ _ENCODINGS = {MessageDefinitionFormat.MSG: "ros2msg", MessageDefinitionFormat.ID
 
 
 class ForeignRecording:
-    """One compressed rosbag2 directory or several storage files."""
+    """Files of a recording."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
         self.damage: list[str] = []

@@ -11,18 +11,18 @@
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from shlex import join
 from typing import Any, Self
 
 from ...wire.messages.refused import Rejected
 from ..definitions import difference
-from ..metadata import Metadata, read_metadata
+from ..metadata import read_metadata
 from ..types import same_name
-from .foreign import ForeignRecording
 from .mcap_file import TopicInfo
-from .recordings import McapRecording, Record, Recording
+from .opened import open_recording
+from .recordings import Record
 from .statuses import TYPE as DIAGNOSTICS
 from .statuses import statuses
+from .unpacked import unpacked
 
 
 class BagReader:
@@ -38,7 +38,7 @@ class BagReader:
     def __init__(self, path: Path | str) -> None:
         self.path = Path(path)
         metadata = read_metadata(self.path)
-        self._recording = _open(self.path, metadata)
+        self._recording = open_recording(self.path, metadata)
         try:
             self.infos, self.counts, self.unread = self._survey()
         except BaseException:
@@ -61,7 +61,9 @@ class BagReader:
         topics come those that are defined otherwise, too, and what is of the type and the definition of the first.
         """
         chosen = set(self.topics) if names is None else {self.resolve(name) for name in names}
-        return self._recording.records(lambda info: info.name in chosen and _is_alike(info, self.infos[info.name]))
+        return unpacked(
+            self._recording.records(lambda info: info.name in chosen and _is_alike(info, self.infos[info.name]))
+        )
 
     def decoded(self, records: Iterable[Record]) -> Iterator[tuple[Record, Any]]:
         """Yield records, each with its message; those that do not decode are left out.
@@ -132,48 +134,3 @@ def _why_unread(info: TopicInfo, known: TopicInfo) -> str | None:
     if info.type != known.type:
         return f"recorded as {known.type} and as {info.type}"
     return difference(info.type, info.definition)
-
-
-def _open(path: Path, metadata: Metadata) -> Recording:
-    if path.is_dir():
-        return _open_directory(path, metadata)
-    if not path.exists():
-        raise ValueError(f"bag = {path}: does not exist: name a rosbag2 directory or an .mcap file")
-    if path.suffix == ".mcap":
-        return McapRecording([path])
-    if path.suffix == ".db3":
-        return ForeignRecording([path])
-    hints = {
-        ".zstd": "name its directory",
-        ".bag": "convert it with rosbags-convert",
-        ".csv": "make one of a log by import_csv",
-    }
-    hint = hints.get(path.suffix.lower(), "name a rosbag2 directory or an .mcap file")
-    raise ValueError(f"bag = {path}: is no recording of ROS 2: {hint}")
-
-
-def _open_directory(path: Path, metadata: Metadata) -> Recording:
-    """Open what is there: the metadata is only asked for what the files cannot tell."""
-    if metadata.compressed:
-        return ForeignRecording([path])
-    recording: Recording
-    if mcaps := _numbered(path, ".mcap"):
-        recording = McapRecording(mcaps)
-    elif databases := _numbered(path, ".db3"):
-        recording = ForeignRecording(databases)
-    elif compressed := sorted(path.glob("*.zstd")):
-        command = join(("zstd", "-d", *map(str, compressed)))
-        raise ValueError(f"bag = {path}: is compressed and has no readable metadata.yaml: decompress it: {command}")
-    else:
-        inner = sorted(file.parent for ending in ("mcap", "db3") for file in path.glob(f"*/*.{ending}"))
-        hint = f", as {inner[0]}" if inner else ""
-        raise ValueError(f"bag = {path}: holds no .mcap or .db3 file: name the directory of a recording{hint}")
-    if not (metadata.readable or recording.damage):
-        recording.damage.append(f"{path} has no readable metadata.yaml: its recording was interrupted")
-    recording.damage += [f"{path / name} is missing" for name in metadata.files if not (path / name).exists()]
-    return recording
-
-
-def _numbered(path: Path, suffix: str) -> list[Path]:
-    """Return the files of a split recording in their order: x_2 before x_10."""
-    return sorted(path.glob(f"*{suffix}"), key=lambda file: (len(file.name), file.name))

@@ -67,8 +67,16 @@ class McapRecording:
     """MCAP files, also unfinished and damaged ones."""
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        self._files = [McapFile(path) for path in paths]
-        self.damage = [sentence for file in self._files for sentence in file.damage]
+        self._files = list[McapFile]()
+        self.damage = list[str]()
+        for path in paths:
+            try:
+                self._files.append(file := McapFile(path))
+                self.damage += file.damage
+            except ValueError as error:
+                if len(paths) == 1:
+                    raise
+                self.damage.append(str(error))
 
     def infos(self) -> Iterator[tuple[TopicInfo, int]]:
         """Yield the topics of every file."""
