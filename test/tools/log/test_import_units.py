@@ -87,6 +87,12 @@ def test_a_column_is_named_with_its_unit_or_without(importing: Import) -> None:
         assert SPEED.read(importing.messages("speed")[0]).speed_mps == 10.0
 
 
+def test_a_column_may_be_named_by_its_unit_alone(importing: Import) -> None:
+    """It was read in m/s."""
+    assert importing("s,km/h\n1,36\n2,36\n", "--time", "s", "--speed", "km/h") == 0
+    assert SPEED.read(importing.messages("speed")[0]).speed_mps == 10.0
+
+
 def test_an_option_counts_more_than_the_log_and_that_is_said(importing: Import) -> None:
     assert importing("time,speed [km/h]\n1,36\n2,36\n", "--speed-unit", "mps") == 1
     assert SPEED.read(importing.messages("speed")[0]).speed_mps == 36.0

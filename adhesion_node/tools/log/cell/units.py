@@ -102,15 +102,20 @@ def _known(text: str, column: str) -> tuple[str | None, str | None]:
 def parted(name: str, column: str) -> tuple[str, str]:
     """Return the name of a column of ours without its unit, and the unit as it is written, or nothing.
 
+    A name may be a unit and nothing else.
+
     >>> parted("v [km/h]", "speed"), parted("speed_kmh", "speed"), parted("speed_std", "speed")
     (('v', 'km/h'), ('speed', 'kmh'), ('speed_std', ''))
     >>> parted("v in km/h", "speed"), parted("v / (km/h)", "speed"), parted("s/m", "position"), parted("in/x", "speed")
     (('v', 'km/h'), ('v', 'km/h'), ('s', 'm'), ('in/x', ''))
+    >>> parted("km/h", "speed"), parted("km", "position")
+    (('km/h', 'km/h'), ('km', 'km'))
     """
     if match := _BRACKETS.fullmatch(name):
         return match[1], match[2]
     parts = (mark.match(name) for mark in _MARKS)
-    return next(((part[1], part[2]) for part in parts if part and known(part[2], column)), (name, ""))
+    whole = name, name if known(name, column) else ""
+    return next(((part[1], part[2]) for part in parts if part and known(part[2], column)), whole)
 
 
 def meant(name: str, column: str, header: Sequence[str]) -> list[str]:
