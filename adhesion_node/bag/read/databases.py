@@ -42,7 +42,7 @@ class DamagedDatabases:
         self.damage: list[str] = []
         with ExitStack() as stack:
             folder = Path(stack.enter_context(TemporaryDirectory(prefix="adhesion_node_")))
-            with naming(folder):
+            with naming(f"{folder} (TMPDIR)"):
                 copies = [_copied(path, folder) for path in paths]
             self._files = [stack.enter_context(closing(_Database(*each))) for each in zip(paths, copies, strict=True)]
             self._stack = stack.pop_all()
@@ -76,10 +76,11 @@ def has_more_beside(path: Path) -> bool:
 def _copied(path: Path, folder: Path) -> Path:
     """Copy a file with what is beside it; of a page that is cut off sqlite3 would take the rest to be zeros."""
     copy = folder / path.name
-    shutil.copyfile(path, copy)
-    for ending in _BESIDE:
-        with suppress(FileNotFoundError):
-            shutil.copyfile(f"{path}{ending}", f"{copy}{ending}")
+    for ending in ("", *_BESIDE):
+        source = path.with_name(path.name + ending)
+        if source.exists():
+            with source.open("rb") as read, copy.with_name(source.name).open("wb") as written:
+                shutil.copyfileobj(read, written)
     with copy.open("r+b") as file:
         page_bytes = int.from_bytes(file.read(18)[16:], "big")
         page_bytes = 65_536 if page_bytes == 1 else page_bytes or 1

@@ -16,6 +16,7 @@ from tempfile import TemporaryDirectory
 
 from zstandard import ZstdDecompressor, ZstdError
 
+from ...command.written import naming
 from .chunk import MAX_CHUNK_BYTES
 from .mcap_file import TopicInfo
 from .recordings import Record, Recording
@@ -50,13 +51,11 @@ class UnpackedRecording:
         with ExitStack() as stack:
             folder = Path(stack.enter_context(TemporaryDirectory(prefix="adhesion_node_")))
             try:
-                found = [self._unpacked(file, folder) if file.suffix == PACKED else file for file in files]
+                with naming(f"{folder} (TMPDIR)"):
+                    found = [self._unpacked(file, folder) if file.suffix == PACKED else file for file in files]
                 if not (some := [file for file in found if file in files or file.stat().st_size]):
                     raise ValueError(f"bag = {files[0]}: nothing of it can be decompressed: name another recording")
                 self._recording = open_files(some)
-            except OSError as error:
-                error.filename = error.filename or str(folder)
-                raise
             except ValueError as error:
                 raise ValueError(str(error).replace(str(folder), str(files[0].parent))) from error
             stack.callback(self._recording.close)

@@ -11,7 +11,9 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+import tempfile
 from contextlib import closing
 from itertools import product
 from pathlib import Path
@@ -21,6 +23,7 @@ import cdrs
 import pytest
 from recorded import S
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
+from test_recording_survives import file_size_limit
 
 from adhesion_node.bag import BagReader, Record, typestore
 from adhesion_node.tools import recover
@@ -115,6 +118,22 @@ def test_what_a_killed_recorder_has_left_beside_its_database_is_read(tmp_path: P
     with BagReader(killed) as reader:
         assert [record.log_ns for record in reader.messages()] == [n * S for n in range(100)]
         assert list(reader.messages())[:50] == written
+
+
+@pytest.mark.parametrize("mode", [CompressionMode.FILE, CompressionMode.NONE])
+def test_no_room_for_what_is_unpacked_names_its_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], mode: CompressionMode
+) -> None:
+    file, _ = recording(tmp_path / "run", StoragePlugin.SQLITE3, mode, steps=2000)
+    if mode is CompressionMode.NONE:
+        os.truncate(file, 200_000)
+    (tmp_path / "room").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "room"))
+    with file_size_limit(100_000):
+        assert recover.main([str(file), "--output", str(tmp_path / "whole")]) == 1
+    assert capsys.readouterr().err.startswith(f"recover: {tmp_path / 'room'}/adhesion_node_")
+    assert list((tmp_path / "room").iterdir()) == []
+    assert not (tmp_path / "whole").exists()
 
 
 def test_a_path_may_hold_what_means_something_in_an_address(tmp_path: Path) -> None:
