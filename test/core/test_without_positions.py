@@ -151,7 +151,7 @@ def test_the_first_position_places_a_train_known_by_its_speed(far_m: float) -> N
         s._replace(position_m=s.position_m + far_m) if isinstance(s, PositionSample) else s
         for s in stream(lambda k: k >= 60, 0.01)
     ]
-    pipeline, predictions = replayed(Config(speed_source="doppler", iterations=10), samples)
+    pipeline, predictions = replayed(Config(speed_source="doppler", iterations=10, speed_scale_std=0.005), samples)
     assert (pipeline.dropped, pipeline.resets) == ({}, 0)
     first = next(each.estimate for each in predictions if each.estimate.t_ns > 7 * S)
     assert first.position_m - far_m == pytest.approx(80.0 * first.t_ns / S, abs=3.0)

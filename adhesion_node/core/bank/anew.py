@@ -59,9 +59,10 @@ class Anew(NamedTuple):
         if not memory.braked and (before.misled or not memory.misled):
             return Anew()
         opens = memory.braked and not before.braked
-        if opens or self.before is None or len(self.since) >= MOST:
-            return Anew(before, memory.known, (measurement,))
-        return self._replace(since=(*self.since, measurement))
+        if not opens and self.before is not None and len(self.since) < MOST:
+            return self._replace(since=(*self.since, measurement))
+        unproved = bool(measurement.imu) and before.pointing.forward is None
+        return Anew(before, memory.known, (measurement,)) if unproved or _leads(before) else Anew()
 
     def _followed(self, config: Config, memory: Memory, axles_own: bool) -> tuple[Memory, Anew]:
         before = self.before
@@ -87,11 +88,15 @@ def by_wheels(before: Memory, memory: Memory, axles_own: bool) -> Memory | None:
 
     Wheels must be learnt, and so many that some roll. What the accelerometer has shown by now stays known.
     """
-    radii = before.wheels.radii
-    if before.aside or not (axles_own or memory.misled) or not radii.is_learnt or len(radii.own) < FEWEST:
+    if before.aside or not (axles_own or memory.misled) or not _leads(before):
         return None
     course = Course(wandering=before.course.wandering.unseen())
     return before._replace(bank=unscaled(before.bank), pointing=memory.pointing, course=course, aside=True)
+
+
+def _leads(before: Memory) -> bool:
+    """Whether wheels may tell how fast the train is."""
+    return before.wheels.radii.is_learnt and len(before.wheels.radii.own) >= FEWEST
 
 
 def unscaled(bank: Bank) -> Bank:
