@@ -48,6 +48,10 @@ from .sensors.scatter import BRAKED_FAR, PLACE_FAR, SLOW_FAR
 if TYPE_CHECKING:
     from ..config import Config
 
+UNSEEN = 3.0
+"""Times the change of a gauge that may have gone on since its sample it counts as cylinders that fill: an accelerometer
+takes nearly all of it for unknown, lest it take what a brake does between two samples for its bias."""
+
 SPEED_ERROR_MPS = 0.03
 """Of any measured speed, beside what its message tells; it lasts, so that no filter makes it less."""
 
@@ -258,7 +262,8 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int, unde
     sliding = held if held is not None and held >= BRAKE_BELOW else 1.0  # no axle seen to: none does, or all as one
     follows = config.pressure_kind == "demanded" or not undemanded
     fills = follows and brake.applied_pa < brake.demanded_pa
-    filling = config.train.specific_brake(brake.demanded_pa) if fills else 0.0
-    slid = told(share, brake.has_slid(now_ns), fell, slides.one_rolls(now_ns))
     alone = undemanded and config.pressure_kind != "demanded"
+    unseen_pa = UNSEEN * brake.unseen_pa(now_ns) if alone else 0.0
+    filling = config.train.specific_brake(brake.demanded_pa if fills else unseen_pa)
+    slid = told(share, brake.has_slid(now_ns), fell, slides.one_rolls(now_ns))
     return Braking(applied, sliding, brake.rising, slid, filling, alone)

@@ -64,7 +64,7 @@ class Braking(NamedTuple):
     told: float = 0.0
     """Log odds per second by which axles are known to slide, or below 0 to roll."""
     filling: float = 0.0
-    """B/(M g) that they will press with once they have filled; 0: they have, or it is measured."""
+    """B/(M g) that they will press with once they have filled, or what counts as that; 0: they have, or it is seen."""
     alone: bool = False
     """Whether nothing but a gauge of cylinders tells of the brake: another one may be at work beside."""
 

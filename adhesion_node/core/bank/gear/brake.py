@@ -141,7 +141,7 @@ class BrakeSeen(NamedTuple):
         applied = pressure
         if dumping:
             applied = demanded  # the axles that roll are pressed as is asked of them
-        elif config.pressure_kind == "mean" and pressure <= recent[0].pressure_pa * (1.0 + RISING_SHARE):
+        elif config.pressure_kind == "mean" and not rolls and pressure <= recent[0].pressure_pa * (1.0 + RISING_SHARE):
             applied = sum(each.pressure_pa for each in recent) / len(recent)  # slide protection makes it swing
         if demand_pa is not None:  # what cylinders lack of it an electric brake gives
             applied = max(applied, self._following(config, sample, demand_pa))
@@ -180,6 +180,13 @@ class BrakeSeen(NamedTuple):
             return False
         measured = self.gauged and config.pressure_kind != "demanded"
         return now_ns - self.full_ns < (EMPTY_NS if measured else RELEASED * config.brake_build_up_s * S)
+
+    def unseen_pa(self, now_ns: int) -> float:
+        """By how much the pressure may have changed since it was measured, if it goes on as it did."""
+        if self.dumped_ns is not None or len(self.recent) < 2:
+            return 0.0
+        (before_ns, before_pa), (newest_ns, newest_pa) = self.recent[-2:]
+        return abs(newest_pa - before_pa) * min((now_ns - newest_ns) / (newest_ns - before_ns), 1.0)
 
     @property
     def pressure_pa(self) -> float:

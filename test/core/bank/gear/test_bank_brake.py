@@ -73,6 +73,34 @@ def test_what_cylinders_lack_of_the_demand_an_electric_brake_gives(config: Confi
     assert pressed[-1] == pytest.approx(share, abs=0.01)
 
 
+def test_while_every_axle_rolls_the_newest_pressure_presses() -> None:
+    """Else the mean, which slide protection makes swing; while a driver releases it would be up to twice as much."""
+    samples = sampled(released, 6.0)
+    behind = np.array([each.applied_pa for each in seen(MEAN, samples)]) / [
+        max(one.pressure_pa, 1.0) for one in samples
+    ]
+    assert np.max(behind[45:]) > 1.5
+    assert [each.applied_pa for each in seen(MEAN, samples, rolls=True)] == [one.pressure_pa for one in samples]
+
+
+@pytest.mark.parametrize("config", [CYLINDER, MEAN])
+def test_what_a_gauge_may_not_have_shown_is_its_last_change(config: Config) -> None:
+    """In proportion to the time since, up to the whole of it; none is left once a sample tells."""
+    one, *more = seen(config, sampled(applying, 2.5, every_ms=500))
+    assert one.unseen_pa(2 * S) == 0.0
+    for index, brake in enumerate(more[:3], 1):
+        unseen = [brake.unseen_pa(S + index * S // 2 + round(since * S)) for since in (0.0, 0.1, 0.5, 3.0)]
+        assert unseen == pytest.approx([0.0, 0.05 * FULL_PA, 0.25 * FULL_PA, 0.25 * FULL_PA])
+    assert seen(config, sampled(released, 8.0))[-1].unseen_pa(20 * S) < 0.01 * FULL_PA
+
+
+def test_a_dump_leaves_nothing_unseen() -> None:
+    """What presses is what is demanded then."""
+    brake = seen(CYLINDER, sampled(cycling(1.0, 40e3), 4.3))[-1]
+    assert brake.has_slid(brake.recent[-1].t_ns)
+    assert brake.unseen_pa(brake.recent[-1].t_ns + S) == 0.0
+
+
 @pytest.mark.parametrize("kind", [CYLINDER, MEAN])
 @pytest.mark.parametrize("slid", [False, True])
 @pytest.mark.parametrize("seconds", [0.3, 1.5, 4.0])
