@@ -54,9 +54,9 @@ DRIVEN = 1.2
 RELEASED = 4.0
 """Times its build-up that a brake takes to let go where no gauge shows it: 15 to 20 s for 3 to 5 (UIC 540)."""
 
-SWING_SHARE = 0.03
-"""Behind a dump the protection is at work as long as the pressure falls and rises, or rises and falls, by so much of
-what is demanded within a second: a driver's hand is steadier."""
+SWING_PA, SWING_SHARE = 10e3, 0.03
+"""Behind a dump the protection is at work as long as the pressure falls and rises, or rises and falls, by so much, and
+by so much of what is demanded, within a second: a driver's hand is steadier, and so is a gauge."""
 
 RISING_SHARE, RISING_NS = 0.1, S
 """Of the full pressure within this time, is a brake that is being applied harder."""
@@ -94,7 +94,7 @@ class BrakeSeen(NamedTuple):
         Of the `demands` heard since the call before each counts from its stamp on, else the one given, the newest.
 
         Where every axle `rolls`, or as the demand falls, what falls was released; None: no wheels are seen. As long as
-        some are seen to slide the protection that has dumped is at work.
+        some are seen to slide the protection that has dumped is at work; of what is demanded no more it tells nothing.
         """
         brake, heard = self, sorted({*self.asked, *demands})
         for sample in pressures:
@@ -117,7 +117,8 @@ class BrakeSeen(NamedTuple):
             return BrakeSeen(recent, pressure, follows, None, full_ns, gauged=self.gauged, asked=self.asked)
         lately = recent[bisect_left(recent, (t_ns - at_least(DUMP_NS, LATELY, every_ns),)) :]
         peak = max([each.pressure_pa for each in lately])
-        dumped_ns = None if rolls else self.dumped_ns
+        eased = demand_pa is not None and demand_pa < min(self.demanded_pa, (1.0 - DUMP_SHARE) * self.applied_pa)
+        dumped_ns = None if rolls or eased else self.dumped_ns
         if demand_pa is not None or rolls is not None:
             dumps = _falls(lately) and (demand_pa is None or pressure < (1.0 - DUMP_SHARE) * demand_pa)
         else:  # nothing tells it from a release but that it is quicker, or comes back
@@ -126,7 +127,7 @@ class BrakeSeen(NamedTuple):
                 recent, max(DUMP_PA, DUMP_SHARE * peak)
             )
         if dumped_ns is not None:
-            dumps = dumps or _swings(recent, SWING_SHARE * self.demanded_pa)
+            dumps = dumps or _swings(recent, max(SWING_PA, SWING_SHARE * self.demanded_pa))
         fell = peak - pressure >= max(FELL_PA, FELL_SHARE * peak) and (
             demand_pa is None or pressure < (1.0 - FELL_SHARE) * demand_pa
         )
@@ -150,11 +151,12 @@ class BrakeSeen(NamedTuple):
         )
 
     def _following(self, config: Config, sample: PressureSample, demanded_pa: float) -> float:
-        """What presses by now of what is demanded, as the brake builds up and is released."""
+        """What presses by now of what is demanded: it builds up as a ramp, and lets go as one, or as it empties."""
         if not self.recent:
             return sample.pressure_pa
-        most = (sample.t_ns - self.recent[-1].t_ns) / S * config.train.full_pressure_pa / config.brake_build_up_s
-        return self.applied_pa + min(max(demanded_pa - self.applied_pa, -most), most)
+        times = (sample.t_ns - self.recent[-1].t_ns) / S / config.brake_build_up_s
+        most, more = times * config.train.full_pressure_pa, demanded_pa - self.applied_pa
+        return self.applied_pa + (min(more, most) if more > 0.0 else max(more * (1.0 - LEFT**times), -most))
 
     def repeats(self, pressure_pa: float | None) -> bool:
         """Whether a pressure is no new one, but the last sample said again until the next."""
