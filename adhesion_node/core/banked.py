@@ -174,7 +174,7 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
         before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
-    scale_mps = state.odometer.scale_error * float(belief.mean[1])
+    scale_mps = state.odometer.scale_error(memory.course.wandering) * float(belief.mean[1])
     told = Gaussian(belief.mean, belief.covariance + SPEED_ERROR + np.diag([0.0, scale_mps**2]))
     verdict = _verdict(memory, findings, told, memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict, findings.known)

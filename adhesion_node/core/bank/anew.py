@@ -22,7 +22,6 @@ import numpy as np
 from ..belief.rail import Rail
 from ..intake.samples import Measurement
 from .following import followed
-from .gear.wheels import FEWEST
 from .layout import RADIUS, SIZE, SPEED, Bank
 from .memory import Memory
 from .sensors.odometer import SCALE
@@ -30,6 +29,9 @@ from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
+
+FEWEST = 2
+"""Wheels that lead: of a single one nothing tells whether it slides."""
 
 MOST = 500
 """Measurements that are held; where a braking lasts longer, it is gone back no farther than to behind them."""

@@ -16,8 +16,9 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ...intake.samples import Measurement, WheelSample
 from ..gear.radii import LEARNING_MPS
-from ..gear.wheels import FEWEST, WheelsSeen
+from ..gear.wheels import WheelsSeen
 from .plausible import strongest_mps2
+from .wandering import Wandering
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -77,10 +78,13 @@ class Odometer(NamedTuple):
         """Whether the positions are those of an axle."""
         return max(self.running, default=0.0) > FOUND
 
-    @property
-    def scale_error(self) -> float:
-        """Error of the speed that they tell, relative: what wheels roll as no receiver does may be an axle's own."""
-        return SCALE if self.learnt >= LEAST_LEARNT and self.variance < QUIET_MPS**2 else 0.0
+    def scale_error(self, wandering: Wandering) -> float:
+        """Error of the speed that they tell, relative: what wheels roll as no receiver does may be an axle's own.
+
+        So may positions that hardly wander.
+        """
+        quiet = self.learnt >= LEAST_LEARNT and self.variance < QUIET_MPS**2
+        return SCALE if quiet or wandering.is_rolled else 0.0
 
     def after(
         self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool, hanging: tuple[int, ...] = ()
@@ -101,7 +105,7 @@ class Odometer(NamedTuple):
             return self
         rims = [each / self.samples for each in self.sums_mps]
         known = [each for each in rims if not math.isnan(each)]
-        if len(known) < FEWEST or median(known) < LEARNING_MPS:
+        if not known or median(known) < LEARNING_MPS:
             return begun
         speed_mps = S * (place_m - self.since[1]) / elapsed_ns
         least_mps = min(median(known), speed_mps / self.scale)  # axles that spin are faster than the train

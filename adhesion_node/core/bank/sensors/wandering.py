@@ -21,6 +21,9 @@ LEAST, MOST, FEW = 40, 120, 24.0
 FLOOR = 1.0 / 16.0
 """Part of what positions may wander by, in m^2/s, below which none are believed: places differ."""
 
+ROLLED = 1e-3
+"""Positions that wander by less, in m^2/s, are a wheel's: the best receivers do by 8e-3."""
+
 MOVING_MPS = 5.0
 """A train that is slower tells nothing: a wheel that stands errs by nothing, and many a receiver holds its place."""
 
@@ -47,6 +50,11 @@ class Wandering(NamedTuple):
         learnt = min(self.learnt + 1, MOST)
         wandered = 0.5 * per_square * (looks[-1] - looks[0]) ** 2
         return Wandering(looks, self.mean + (wandered - self.mean) / learnt, learnt)
+
+    @property
+    def is_rolled(self) -> bool:
+        """Whether the positions are a wheel's, as they hardly wander."""
+        return self.learnt >= LEAST and self.mean < ROLLED
 
     def of(self, most: float) -> float:
         """Variance over the time by which the positions may wander, m^2/s, if others do by `most`."""

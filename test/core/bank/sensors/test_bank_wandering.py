@@ -75,6 +75,28 @@ def test_an_axle_that_rolls_and_a_receiver_as_smooth_are_believed(mu: float, see
     assert not state.counts[Outcome.SLIDING]
 
 
+@pytest.mark.parametrize("worn", [0.98, 1.02])
+def test_the_speed_by_positions_that_hardly_wander_is_known_as_a_wheels(worn: float) -> None:
+    """Before: the speed of an odometer alone was told to within 0.1 m/s, and off by 0.8."""
+    _, speeds = truth(0.2)
+    _, estimates = followed(of_axle(worn * speeds, 0.0, 1), 0.1)
+    for each in estimates:
+        t_s = (each.t_ns - S) / S
+        if t_s > BRAKE_S - 10.0:
+            assert abs(each.speed_mps - np.interp(t_s, TIMES, speeds)) < 3.0 * each.speed_std_mps < 1.5
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_speed_by_satellites_is_told_as_well_as_it_is_known(seed: int) -> None:
+    """They wander by half a metre over a minute, as the best that were recorded."""
+    places, _ = truth(0.2)
+    rng, wandering = np.random.default_rng(seed), [0.0]
+    for shock in rng.standard_normal(TIMES.size - 1):
+        wandering.append((1.0 - H / 60.0) * wandering[-1] + 0.5 * math.sqrt(2.0 * H / 60.0) * shock)
+    _, estimates = followed(places + np.array(wandering) + 0.05 * rng.standard_normal(TIMES.size))
+    assert max(each.speed_std_mps for each in estimates if each.t_ns > S + 40 * S) < 0.3
+
+
 @pytest.mark.parametrize("size_m", [-2.0, -1.0, -0.5, 1.0])
 @pytest.mark.parametrize("at_s", [BRAKE_S + 4.0, BRAKE_S + 9.0])
 def test_a_balise_that_corrects_an_axle_that_rolls_is_no_slide(size_m: float, at_s: float) -> None:
