@@ -66,8 +66,8 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     The result has `time` as the frame has it, and the columns of `replay --offline --out`; its `attrs` hold
     `measurements`, `accepted`, `dropped` by reason, the `digest`, and `why` nothing is identified, or None. Raises
     ValueError naming what is wrong with the frame, the configuration or the seed, and what to do. Warns where many of
-    the measurements were not used, where the positions fall along the run, where a 0 seems to stand for no value, or
-    where a pressure is absolute.
+    the measurements were not used, where the positions fall along the run, where an axle turns backwards, where a 0
+    seems to stand for no value, or where a pressure is absolute.
     """
     config = Config() if config is None else config
     if not isinstance(config, Config):
@@ -96,7 +96,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if pipeline.back_m > BACK_M:
         text = "positions fall while the train runs: change their sign, and turn the track"
         warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
-    for odd in (far, *doubts(t_ns, columns, std_m), pipeline.off_track, seen.too_fast):
+    for odd in (far, *doubts(t_ns, columns, std_m), pipeline.off_track, pipeline.turned, seen.too_fast):
         if odd is not None:
             warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))

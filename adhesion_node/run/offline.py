@@ -96,8 +96,7 @@ def remarks(pipeline: Pipeline, why: str | None = None, brake: str | None = None
         yield BACKWARDS
     if brake is not None and brake != why:
         yield brake
-    if pipeline.off_track is not None:
-        yield pipeline.off_track
+    yield from filter(None, (pipeline.off_track, pipeline.turned))
     rail_map, last = pipeline.config.rail_map, pipeline.last
     first_ns = min((piece.t_ns for piece in rail_map.pieces), default=None) if rail_map else None
     if first_ns is not None and last is not None and first_ns > last.t_ns:

@@ -10,14 +10,16 @@
 
 import math
 import struct
+from collections import Counter
 from functools import partial
 from typing import final
 
-from ..core import Config, Estimate, Outcome, Prediction, State, estimator, predict
+from ..core import Config, Estimate, Outcome, Prediction, Sample, State, WheelSample, estimator, predict
 from ..core.physics.braking import BrakingCurve
 from ..core.physics.track import Track
 from ..wire.topics import POSITIONS
 from .engine import EstimatorPipeline, Verbs
+from .turned import TURNS_RADPS, turned
 
 BACK_MPS, BACK_M = 3.0, 10.0
 """A train that runs back faster and further than this does not roll back: its positions fall along the run."""
@@ -63,6 +65,15 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
         self.is_shown = True
         """Whether what the newest estimate says of the train's direction was measured, not only foreseen."""
         self._ran_m = (math.inf, -math.inf)
+        self._turns = Counter[str]()
+        """How often an axle turned forward, less how often back."""
+
+    def push(self, sample: Sample) -> list[Prediction]:
+        """Take one sample of any sensor and return what it completes."""
+        if isinstance(sample, WheelSample):
+            for axle, radps in enumerate(sample.speeds_radps, 1):
+                self._turns[f"axle {axle}"] += (radps > TURNS_RADPS) - (radps < -TURNS_RADPS)
+        return super().push(sample)
 
     def adopt(self, other: EstimatorPipeline[State, Estimate, Prediction]) -> None:
         """Go on with what another one is configured with; a latency may be another, and stamps step as is meant."""
@@ -102,6 +113,11 @@ class Pipeline(EstimatorPipeline[State, Estimate, Prediction]):
     def off_track(self) -> str | None:
         """Why the track cannot be that of this run; None where it can."""
         return None if self.last is None else off_track(self.config.track, *self._ran_m)
+
+    @property
+    def turned(self) -> str | None:
+        """Which axles are counted backwards, unless the train itself ran back; None: none is."""
+        return None if self.back_m > BACK_M else turned(self._turns)
 
     def _back_m(self, estimate: Estimate) -> float:
         return 0.0 if self._back_from_m is None else self._back_from_m - estimate.position_m

@@ -90,8 +90,8 @@ WHEEL_SPEED = _sensor(
     "wheel_speed",
     "sensor_msgs/msg/JointState",
     sensors.WHEEL_SPEED,
-    "**in**, optional: rad/s, one velocity per axle, NaN where it has none. Sliding wheels show that adhesion limits, "
-    "rolling ones that the brake does. **In** of `creep_estimator`: the driven axles",
+    "**in**, optional: rad/s, forward along the run, one velocity per axle, NaN where it has none. Sliding wheels "
+    "show that adhesion limits, rolling ones that the brake does. **In** of `creep_estimator`: the driven axles",
 )
 TRACTION_FORCE = _sensor(
     "traction_force",

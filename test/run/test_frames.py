@@ -219,6 +219,15 @@ def test_an_absolute_pressure_is_warned_of(name: str) -> None:
         estimate(frame)
 
 
+@pytest.mark.parametrize(("signs", "told"), [((1, -1), "axle 2"), ((-1, -1), "axle 1, axle 2")])
+def test_wheels_that_turn_backwards_are_warned_of(signs: tuple[int, int], told: str) -> None:
+    """They seemed to slide: on a dry rail mu was told as what a weak brake gives."""
+    frame = with_everything()
+    wheels = {f"wheel_speed_{axle}": sign * frame[f"wheel_speed_{axle}"] for axle, sign in enumerate(signs, 1)}
+    with pytest.warns(UserWarning, match=f"^{told}: turned backwards while the train runs: change the sign, wheels"):
+        estimate(frame.assign(**wheels))
+
+
 def test_positions_too_coarse_for_their_deviation_are_warned_of() -> None:
     frame = measured()
     coarse = frame.assign(position=75.0 * (frame["position"] / 75.0).round())

@@ -19,7 +19,11 @@ import pytest
 from test_import_csv import Import, importing
 from test_import_log import ride, text
 
+from adhesion_node.nodes import replay
+
 __all__ = ["importing"]
+
+Capture = pytest.CaptureFixture[str]
 
 
 @pytest.mark.parametrize(
@@ -82,6 +86,18 @@ def test_wheels_that_turn_otherwise_than_the_train_runs_are_told(
     told = [said for said in importing.summary["odd"] if said.startswith("the wheels turn")]
     assert len(told) == (unit is not None)
     assert not unit or told[0].endswith(f"another unit? --wheel-unit {unit}")
+
+
+@pytest.mark.parametrize("speed", [1.0, -1.0])
+def test_an_axle_that_turns_backwards_is_told_by_all(importing: Import, capsys: Capture, speed: float) -> None:
+    """But not where the train itself runs back, by its positions: then these are told."""
+    rows = ride().assign(wheel_speed_1=lambda rows: rows.speed / 0.46, wheel_speed_2=lambda rows: -rows.speed / 0.46)
+    back = rows.assign(position=speed * rows.position, speed=speed * rows.speed)
+    assert importing(text(back)) == 1
+    told = "wheel_speed_2: turned backwards while the train runs: change the sign, wheels count forward along the run"
+    assert (told in importing.summary["odd"]) == (speed > 0.0)
+    replay.main([str(importing.output), "--offline"])
+    assert ("replay: axle 2: turned backwards while the train runs" in capsys.readouterr().err) == (speed > 0.0)
 
 
 def test_all_that_is_odd_is_told_at_once(importing: Import) -> None:

@@ -30,7 +30,7 @@ from .dropouts import dropouts
 from .frozen import frozen
 from .motion import BRAKES_MPS2, LEAST_M, LEAST_S, RUNS_MPS2, Motion, motion_of
 from .seldom import seldom
-from .sensors import felt, rolling, shifted
+from .sensors import felt, rolling, shifted, turning
 from .sentinels import sentinels
 from .ways import backwards, leaps, radians, slow_or_falling, speed_against_positions
 
@@ -78,6 +78,7 @@ def odd(log: Log) -> list[str]:
         *_pipe(motion),
         *([*felt(motion, log.form)] or shifted(motion)),
         *rolling(motion, log.form),
+        *turning(log, motion),
         *_clock(log, t_s),
         *_last(t_s),
     ]

@@ -13,7 +13,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ....run.turned import TURNS_RADPS, turned
 from ..format import ACCELERATION_UNITS, Format, wheel_units
+from ..whole.read import Log
 from .motion import BRAKES_MPS2, LEAST_S, OVER_S, RUNS_MPS2, SAME, Motion
 
 SIMILAR = 3.0
@@ -62,6 +64,15 @@ def shifted(motion: Motion) -> Iterator[str]:
             f"the acceleration is {off:+.2g} m/s^2 beside what the speed changes by, more than any grade makes: is it "
             "that of another axis, or off? Subtract it"
         )
+
+
+def turning(log: Log, motion: Motion) -> Iterator[str]:
+    """Wheels turn forward while positions rise, or the speed is above 0."""
+    course = motion.course_mps if np.isfinite(motion.course_mps).any() else motion.speed_mps
+    axles = [name for name in log.columns.axles if name in log.rows]
+    if not np.nansum(course) < 0.0:
+        forward, back = (log.rows[axles] > TURNS_RADPS).sum(), (log.rows[axles] < -TURNS_RADPS).sum()
+        yield from filter(None, [turned((forward - back).to_dict())])
 
 
 def rolling(motion: Motion, form: Format) -> Iterator[str]:
