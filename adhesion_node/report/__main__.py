@@ -38,7 +38,6 @@ from ..command.written import write_text
 from ..core.physics.train import KMH, Train
 from ..core.setting import settings_of
 from ..run.offline import parameters_of
-from ..run.pipeline import off_track
 from ..run.results.rows import Write, rows_to
 from ..wire.settings.nodes import TRAIN_FILE
 from ..wire.settings.setup import Setup, setup_of
@@ -108,6 +107,9 @@ def _work(options: argparse.Namespace) -> int:
         result["runs"].append(
             {"name": subject.name, "source": subject.source, "pictures": list(map(str, pictures)), **found}
         )
+        for remark in subject.remarks:
+            if remark != found["why"]:
+                print(f"report: {subject.name}: {remark}", file=sys.stderr)
         if found["why"] is not None:
             print(f"report: {subject.name}: nothing is identified: {found['why']}", file=sys.stderr)
         identified |= found["why"] is None
@@ -136,6 +138,7 @@ def _page(output: Path, subjects: Sequence[Subject], options: argparse.Namespace
 
 def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -> Subject:
     targets = (0.0, options.target * KMH)
+    remarks: tuple[str, ...] = ()
     with BagReader(path) as reader, _rows(options) as write:
         for loss in reader.damage:
             print(f"report: {loss}", file=sys.stderr)
@@ -154,13 +157,11 @@ def _subject(path: Path, name: str, options: argparse.Namespace, setup: Setup) -
             selection = select_from(reader, options.remap, namespace=options.namespace)
             for hint in left_out(reader, selection):
                 print(f"report: {name}: {hint}", file=sys.stderr)
-            run, lost = estimate_run(reader, selection, setup, write, targets)
+            run, lost, remarks = estimate_run(reader, selection, setup, write, targets)
             source = "estimated from the recorded sensors"
-            if (off := off_track(setup.config.track, run.position.values.min(), run.position.values.max())) is not None:
-                print(f"report: {name}: {off}", file=sys.stderr)
         for topic, count in lost.items():
             print(f"report: {topic}: {count} messages do not decode and are left out", file=sys.stderr)
-        return Subject(name, source, run, setup.config, setup.train)
+        return Subject(name, source, run, setup.config, setup.train, remarks)
 
 
 @contextmanager

@@ -23,11 +23,12 @@ from slowing import START_NS, TRUTH, S, record, rows, undrawn
 from std_msgs.msg import Float64
 from test_offline import samples, write_run
 
-from adhesion_node.bag import BagReader, BagWriter
+from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize
 from adhesion_node.bag.types import Definition
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
-from adhesion_node.wire.topics import TRUTH_MU
+from adhesion_node.wire.topic import Topic
+from adhesion_node.wire.topics import BRAKE_PRESSURE, TRUTH_MU
 
 __all__ = ["undrawn"]
 
@@ -129,6 +130,27 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     last = run["moments"][-1]
     assert last["safe"]["x"][0] == last["nominal"]["x"][0] == pytest.approx(last["place"], abs=0.1)
     assert last["safe"]["y"][-1] == 0.0
+
+
+@pytest.mark.usefixtures("undrawn")
+def test_what_a_replay_remarks_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Half of the pressures are in bar, and so refused; the train slows by more than its brake."""
+
+    def in_bar(topic: Topic, index: int, cdr: bytes) -> bytes:
+        message = deserialize(cdr, topic.type)
+        if topic is BRAKE_PRESSURE and index % 2:
+            message.fluid_pressure /= 1e5
+        return serialize(message, topic.type)
+
+    write_run(tmp_path / "bag", samples(), edit=in_bar)
+    weak = (*QUICK, "--set", "train.mass_kg=1500e3")
+    replay.main([str(tmp_path / "bag"), "--offline", *weak])
+    replayed = capsys.readouterr().err.splitlines()
+    make(tmp_path, str(tmp_path / "bag"), *weak)
+    assert capsys.readouterr().err.splitlines() == [line.replace("replay: ", "report: bag: ", 1) for line in replayed]
+    refused, brake = replayed
+    assert "IMPLAUSIBLE_PRESSURE: brake_pressure: fluid_pressure = " in refused
+    assert "check the units of speed and pressure, and the train (--train)" in brake
 
 
 @pytest.mark.usefixtures("undrawn")

@@ -49,6 +49,8 @@ class Subject(NamedTuple):
     config: Config
     train: str = ""
     """For which its distances are computed, in words."""
+    remarks: tuple[str, ...] = ()
+    """What is odd of its sensors and settings."""
 
 
 def chart_data(subject: Subject, target_kmh: float) -> dict[str, Any]:

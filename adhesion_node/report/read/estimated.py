@@ -22,7 +22,9 @@ from ...core.intake.samples import DemandSample, PressureSample
 from ...run import offline
 from ...run.offline import Recorded
 from ...run.pipeline import Pipeline
+from ...run.results.brake import odd_brake
 from ...run.results.rows import Write, row_of
+from ...run.results.seen import Seen, heading_of, pressure_of
 from ...wire.line import Line
 from ...wire.messages.refused import Rejected
 from ...wire.settings.setup import Setup
@@ -38,25 +40,30 @@ from .series import Series
 
 def estimate_run(
     reader: BagReader, selection: Mapping[str, str], setup: Setup, write: Write, targets: Sequence[float] = ()
-) -> tuple[Run, Mapping[str, int]]:
+) -> tuple[Run, Mapping[str, int], tuple[str, ...]]:
     """Run the recorded topics of `selection` (recorded name to ours) through the estimator; write each estimate.
 
     Return the run, whose braking distances to `targets`, m/s, are those of every curve, and by recorded topic how many
-    messages do not decode. Raises ValueError when nothing could be estimated.
+    messages do not decode, and what `replay --offline` remarks. Raises ValueError when nothing could be estimated.
     """
     pipeline, inputs, lost = Pipeline(setup.config, setup.seed), Inputs(), Counter[str]()
     estimates, safe, nominal = _Estimates(), Curves(targets), Curves(targets)
+    seen = Seen(setup.config.train.full_pressure_pa)
     recorded = progress(offline.messages(reader, selection, setup.line), "messages")
     for made in _predictions(pipeline, inputs, _noting(inputs, lost, recorded, setup.line), setup.line):
         write(row_of(pipeline, made, setup.line.sign))
-        estimates.note(made.estimate)
+        estimates.note(e := made.estimate)
+        seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
         for curves, curve in ((safe, made.safe), (nominal, made.nominal)):
             if curve is not None:
                 places = made.estimate.position_m + curve.distance_m
                 curves.add(np.array([made.estimate.t_ns]), places[np.newaxis], curve.speed_mps[np.newaxis])
     if pipeline.last is None:
         dropped = listed(pipeline.dropped) or "nothing, it is too short"
-        raise ValueError(f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}")
+        why = "".join(f"; {remark}" for remark in offline.remarks(pipeline))
+        raise ValueError(
+            f"bag = {reader.path}: nothing to estimate from; dropped of its sensor messages: {dropped}{why}"
+        )
     read_topics(reader, [(DIAGNOSTICS, inputs.creep.take)])
     namespaces = (theirs.strip("/").removesuffix(ours).strip("/") for theirs, ours in selection.items())
     run = estimates.put_into(inputs.run)._replace(
@@ -72,7 +79,8 @@ def estimate_run(
             "digest": pipeline.digest,
         },
     )
-    return run, {theirs: lost[ours] for theirs, ours in selection.items() if ours in lost}
+    remarks = tuple(offline.remarks(pipeline, brake=odd_brake(seen, pipeline)))
+    return run, {theirs: lost[ours] for theirs, ours in selection.items() if ours in lost}, remarks
 
 
 class _Estimates:

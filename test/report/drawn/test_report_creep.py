@@ -85,7 +85,7 @@ def test_of_a_train_that_is_remapped_the_curves_are_its_own(tmp_path: Path) -> N
             writer.write("/diagnostics", DIAGNOSTICS.type, told(START_NS, name[:7], False, name), START_NS)
     with BagReader(tmp_path / "bag") as reader:
         own = [f"/train_a/{topic.name}:={topic.name}" for topic in (POSITION, BRAKE_PRESSURE)]
-        run, _ = estimate_run(reader, select_from(reader, own), setup_of({"seed": 1}), lambda _: None)
+        run, *_ = estimate_run(reader, select_from(reader, own), setup_of({"seed": 1}), lambda _: None)
     assert [part["why"] for _, part in run.creep] == ["train_a"]
 
 

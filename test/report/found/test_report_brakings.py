@@ -105,7 +105,7 @@ def test_a_table_of_brakings_has_those_of_the_report(tmp_path: Path) -> None:
     with BagReader(tmp_path / "bag") as reader:
         selection = select_from(reader, [])
         made = offline.replay(Pipeline(Config(), 1), Truth(), offline.messages(reader, selection, NOMINAL)).predictions
-        run, _ = estimate_run(reader, selection, setup_of({"seed": 1}), lambda _: None)
+        run, *_ = estimate_run(reader, selection, setup_of({"seed": 1}), lambda _: None)
     (row,) = (one.row for one in of_predictions(made))
     (part,) = brakings(run)
     assert abs(part.start_ns - int(row["t_ns"][0])) <= S
