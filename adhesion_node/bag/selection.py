@@ -168,8 +168,18 @@ def _rename(recorded: Mapping[str, str], remaps: Sequence[tuple[str, str]], name
 
 
 def _what_there_is(name: str, recorded: Mapping[str, str]) -> str:
-    """List the recording's topics and show a remapping: from a topic of the right type where there is one."""
+    """List the recording's topics and show a remapping: from a topic of the right type where there is one.
+
+    Of a position, which others stand in for, it is that of one of these.
+    """
     listed = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(recorded.items())) or "none"
-    expected = _OURS.get(name.lstrip("/"))
-    fitting = next((topic for topic, kind in sorted(recorded.items()) if kind == expected), "/recorded/name")
-    return f"It holds: {listed}. Name the right one, for instance --remap {fitting}:={name.lstrip('/')}"
+    own = name.lstrip("/")
+    places = _ENOUGH if own == topics.POSITION.name else ()
+    made = tuple(f"/{topic.name}" for topic in topics.TOPICS if topic not in topics.SENSORS)  # by us, of no sensor
+    for ours in (own, *(topic.name for topic in places)):
+        for topic, kind in sorted(recorded.items()):
+            if kind == _OURS.get(ours) and not f"/{topic}".endswith(made):
+                return f"It holds: {listed}. Name the right one, for instance --remap {topic}:={ours}"
+    if places:
+        return f"It holds: {listed}. No type of these tells where or how fast it runs: write a CSV for import_csv"
+    return f"It holds: {listed}. Name the right one, for instance --remap /recorded/name:={own}"

@@ -16,6 +16,7 @@ from typing import cast
 import pytest
 
 from adhesion_node.bag import BagReader, choose_train, overlooked, parse_remap, select
+from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import (
     BRAKE_PRESSURE,
     CLOCK,
@@ -62,6 +63,15 @@ def test_a_selection_that_does_not_fit_says_so(
 ) -> None:
     with pytest.raises(ValueError, match=message):
         select(RECORDED_ELSEWHERE, remaps, names)
+
+
+@pytest.mark.parametrize("topic", [FIX, ODOMETRY, SPEED, WHEEL_SPEED])
+def test_without_a_position_what_stands_in_for_one_is_to_be_named(topic: Topic) -> None:
+    """A receiver's fix was to be named `position`, and then refused for its type."""
+    with pytest.raises(ValueError, match=f"topic position: not in .*--remap /theirs:={topic.name}$"):
+        select({"/theirs": topic.type, "/brake_pressure": BRAKE_PRESSURE.type})
+    with pytest.raises(ValueError, match=r"No type of these tells where or how fast it runs: write a CSV for import_"):
+        select({"/speed_kmh": MU.type, "/adhesion/state": ODOMETRY.type})
 
 
 @pytest.mark.parametrize("text", ["", "a", "a:=", ":=b", "a:=b:=c", "/:=b"])
