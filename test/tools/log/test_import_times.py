@@ -10,6 +10,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -55,6 +57,14 @@ def test_times_as_recorders_write_them(importing: Import, written: str, options:
     rows = ride()[: 10 * len(moments) : 10].assign(time=moments.strftime(written))
     assert importing(text(rows, ";"), *options) == 0, importing.errors
     assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S for i in range(30)]
+
+
+@pytest.mark.parametrize("written", [str, lambda span: str(span.to_pytimedelta())])
+def test_durations_as_pandas_and_python_write_them(importing: Import, written: Callable[[pd.Timedelta], str]) -> None:
+    """Across midnight, and a gap of days."""
+    spans = pd.to_timedelta([86_390.0 + 0.5 * i + 3 * 86_400 * (i > 25) for i in range(30)], unit="s")
+    assert importing(text(ride()[:30].assign(time=list(map(written, spans))), ";")) < 2, importing.errors
+    assert [sample.t_ns for sample in importing.positions()] == spans.as_unit("ns").asi8.tolist()
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,9 @@ _LIKE = (
 """What a date may have otherwise: UTC, small letters, a comma before the next part or the fraction, a colon before
 milliseconds."""
 
+_OF_DAYS = r"^([0-9]{1,5}) days? (?=[0-9])"
+"""How a duration begins that pandas or Python has written, 1 days 00:00:03.500000: the days, then a clock's time."""
+
 _BASIC = re.compile(r"\s*[0-9]{4}(-?)[0-9]{2}\1[0-9]{2}[Tt][0-9]{4}")
 """How a date without colons begins, 20241121T081503 or 2024-11-21T081503."""
 
@@ -189,9 +192,11 @@ def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
             text = text.str.replace(written, meant, regex=True)
     if form in FORMATS[1:] and form != OF_HOUR:
         text = text.str.replace(r"^(.*:[0-9]+)(?=$| *[AaPp][Mm]$)", r"\g<1>.0", regex=True)
+    days = text.str.extract(_OF_DAYS, expand=False) if form == CLOCK else None
     if is_clock(form):
-        form, text = f"%Y-%m-%d {form}", "1970-01-01 " + text
-    return pd.to_datetime(text, format=form, errors="coerce", utc=True)
+        form, text = f"%Y-%m-%d {form}", "1970-01-01 " + text.str.replace(_OF_DAYS, "", regex=True)
+    read = pd.to_datetime(text, format=form, errors="coerce", utc=True)
+    return read if days is None else read + pd.to_timedelta(days.fillna("0").astype(int), unit="D")
 
 
 def _stamps(read: "pd.Series[Any]") -> "np.ndarray[Any, np.dtype[np.int64]]":
