@@ -90,6 +90,15 @@ def test_several_trains_are_told_with_the_option(importing: Import) -> None:
     assert any("differ by 'train': are they of several trains? --where train=11" in line for line in importing.errors)
 
 
+def test_a_part_of_the_time_in_a_column_of_its_own_is_told(importing: Import) -> None:
+    """One row in ten was left where the advice to choose a train was followed."""
+    rows = ride()
+    split = rows.assign(time=rows.time.astype(int), ms=(1000 * (rows.time % 1)).round().astype(int))
+    assert importing(text(split)) == 1
+    cure = "--where ms=0 takes those of one; or is it a part of the time? Write the two in one column"
+    assert any(line.endswith(cure) for line in importing.errors), importing.errors
+
+
 def test_namesakes_that_are_not_read_may_tell_rows_of_one_time_apart(importing: Import) -> None:
     log = text(trains().assign(state=lambda rows: rows.train)).replace("train", "state", 1)
     assert importing(log) == 1

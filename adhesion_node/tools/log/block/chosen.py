@@ -9,6 +9,7 @@
 """The rows of a log that an option chooses: those of one train, of one kind of message."""
 
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import pandas as pd
 
@@ -70,8 +71,16 @@ def several(cells: pd.DataFrame, columns: Columns) -> Iterator[str]:
         values = cells[name].astype(str)
         kinds = values.unique()
         if 1 < len(kinds) <= len(cells) ** 0.5 and not pd.concat([cells[time], values], axis=1).duplicated().any():
+            part = "; or is it a part of the time? Write the two in one column" if _rises(cells[time], values) else ""
             yield (
                 f"rows of one time differ by {name!r}: are they of several trains? --where {name}={kinds[0]} takes "
-                "those of one"
+                f"those of one{part}"
             )
             return
+
+
+def _rises(time: "pd.Series[Any]", values: "pd.Series[str]") -> bool:
+    """Whether values are numbers up to 999 that rise from row to row of a time, as milliseconds and minutes do."""
+    read = pd.to_numeric(values, errors="coerce")
+    steps = read.diff()[time.eq(time.shift())]
+    return bool(read.between(0, 999).all() and (steps > 0).all())
