@@ -31,6 +31,7 @@ from ..core import (
 )
 from ..core.physics.train import Array
 from .pipeline import BACK_M, Pipeline
+from .results.brake import odd_brake
 from .results.doubts import AXLE, doubts
 from .results.rows import COLUMNS, Row, row_of
 from .results.seen import Seen, heading_of, pressure_of
@@ -67,7 +68,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     `measurements`, `accepted`, `dropped` by reason, the `digest`, and `why` nothing is identified, or None. Raises
     ValueError naming what is wrong with the frame, the configuration or the seed, and what to do. Warns where many of
     the measurements were not used, where the positions fall along the run, where an axle turns backwards, where a 0
-    seems to stand for no value, or where a pressure is absolute.
+    seems to stand for no value, where a pressure is absolute, or the brake gives more or less than it is told to.
     """
     config = Config() if config is None else config
     if not isinstance(config, Config):
@@ -76,7 +77,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
         raise ValueError(f"std_m = {std_m!r}: give the positions' standard deviation, above 0 m")
     columns, t_ns = _checked(frame), _nanoseconds(frame["time"])
     far = _too_far(t_ns)
-    pipeline, rows, seen = Pipeline(config, seed), list[Row](), Seen()
+    pipeline, rows, seen = Pipeline(config, seed), list[Row](), Seen(config.train.full_pressure_pa)
     for made in _predictions(pipeline, _samples(t_ns, columns, std_m)):
         e = made.estimate
         seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
@@ -96,12 +97,13 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     if pipeline.back_m > BACK_M:
         text = "positions fall while the train runs: change their sign, and turn the track"
         warnings.warn(f"{text}, so that they grow in the direction of travel", stacklevel=2)
-    for odd in (far, *doubts(t_ns, columns, std_m), pipeline.off_track, pipeline.turned, seen.too_fast):
+    brake = (odd_brake(seen, pipeline) or "").replace("--train", "Config.train") or None
+    for odd in (far, *doubts(t_ns, columns, std_m), pipeline.off_track, pipeline.turned, seen.too_fast, brake):
         if odd is not None:
             warnings.warn(odd, stacklevel=2)
     result = pd.DataFrame(rows, columns=list(COLUMNS)).astype(dict(COLUMNS))
     result.insert(0, "time", _like(result["t_ns"].to_numpy(), frame["time"]))
-    result.attrs.update(used, why=seen.why_not())
+    result.attrs.update(used, why=seen.why_not(brake))
     return result
 
 

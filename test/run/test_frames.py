@@ -235,6 +235,13 @@ def test_positions_too_coarse_for_their_deviation_are_warned_of() -> None:
         estimate(coarse)
 
 
+def test_a_brake_that_gives_more_than_it_is_told_to_is_warned_of() -> None:
+    """A train of three times its mass: `replay --offline` told it."""
+    told = r"the train slows by 0\.7\d m/s\^2, its full brake gives 0\.3\d: check the units .*Config.train"
+    with pytest.warns(UserWarning, match=told):
+        estimate(measured(), Config(train=Train(mass_kg=1608e3)))
+
+
 def test_a_track_elsewhere_is_warned_of() -> None:
     elsewhere = Config(track=Track((Grade(1e5, 1.2e5, 10.0),)))
     with pytest.warns(UserWarning, match="no section of the track is where the train ran: the nearest is 9.* m ahead"):
