@@ -39,6 +39,27 @@ def test_the_speed_of_a_step_of_the_clock_is_said(importing: Import) -> None:
     assert "--time-zone" not in importing.errors[0], "which is refused for times without a date"
 
 
+@pytest.mark.parametrize("every", [1, 15, 20, 50])
+def test_a_recorder_slower_than_a_second_is_judged_alike(importing: Import, every: int) -> None:
+    """Every 2 s nothing was said, every 1.5 s a good log was to be in mph, every 5 s the speed fell by nan."""
+    rows = ride().assign(speed=lambda rows: rows.speed + 0.1 * np.sin(rows.time))[::every]
+    for wrong, cure in (
+        ({}, ""),
+        ({"speed": 3.6 * rows.speed}, "--speed-unit kmh"),
+        ({"position": rows.position / 1e3}, "--position-unit km"),
+        ({"position": 9e3 - rows.position}, "--direction down"),
+    ):
+        importing.output = importing.output.with_name(f"in {cure}")
+        assert importing(text(rows.assign(**wrong))) == bool(cure), importing.errors
+        assert [cure in odd for odd in importing.summary["odd"]] == [True] * bool(cure), importing.summary["odd"]
+
+
+def test_places_that_come_more_seldom_than_speeds_are_compared(importing: Import) -> None:
+    rows = ride().assign(speed=lambda rows: 3.6 * rows.speed)
+    assert importing(text(rows.assign(position=rows.position.where(rows.index % 50 == 0)))) == 1
+    assert [odd for odd in importing.summary["odd"] if odd.endswith("another unit? --speed-unit kmh")]
+
+
 def test_there_and_back_is_said(importing: Import) -> None:
     there = ride()
     back = there.assign(time=there.time + 60.0, position=there.position.iloc[-1] - there.position + 1000.0)

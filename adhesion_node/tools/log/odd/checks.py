@@ -150,10 +150,11 @@ def _hard(motion: Motion, form: Format) -> Iterator[str]:
     """Without positions only the braking tells of a wrong unit of the speed."""
     steps = (motion.speed_mps[HARD_S:] - motion.speed_mps[:-HARD_S]) / HARD_S
     slows_fast = motion.slows_mps2[np.abs(motion.speed_mps) > FAST_MPS] < -FAST_MPS2
+    hardest = float(np.nanmin(np.concatenate([steps, motion.slows_mps2]), initial=0.0))
     if np.nanmin(steps, initial=0.0) < -HARDEST_MPS2 or slows_fast.any():
         unit = "km/h read as m/s, --speed-unit kmh? Or " if form.unit("speed") == "mps" else ""
         other = "is it of a wheel that locked, or do numbers stand for no value? Leave those cells empty"
-        yield f"the speed falls by {-np.nanmin(steps):.1f} m/s^2, harder than any train brakes: {unit}{other}"
+        yield f"the speed falls by {-hardest:.1f} m/s^2, harder than any train brakes: {unit}{other}"
 
 
 def _too_fast(motion: Motion, form: Format) -> Iterator[str]:

@@ -30,6 +30,10 @@ OVER_S = 5
 EARTH_M = 6.371e6
 """Radius of a sphere like it."""
 
+SLOWEST_S, GAP = 10.0, 2.5
+"""A column whose values come more seldom than every second counts as linear in between: where they come that often,
+and over so many usual steps."""
+
 SAME = math.log(1.25)
 """By so much positions and speed may differ, as where a wheel slides."""
 
@@ -82,21 +86,33 @@ class Motion(NamedTuple):
 
 
 def motion_of(log: Log, t_s: Array) -> Motion:
-    """Means of the rows by the whole seconds of their times."""
+    """Means of the rows by the whole seconds of their times; of what comes more seldom, what it is half-way of them."""
     rows, second = log.rows, np.floor(t_s).astype(np.int64)
     means = rows.groupby(second).mean().reindex(range(int(second[-1]) + 1)) if second[-1] < 10**6 else rows
 
     def column(name: str, offset: float = 0.0) -> Array:
         values = means[name] if name in means else pd.Series(math.nan, index=means.index)
         read: Array = values.to_numpy(dtype=np.float64) - offset
-        return read
+        known = rows[name].notna().to_numpy() if name in rows and means is not rows else np.zeros(0, dtype=bool)
+        is_slow = known.sum() > 2 and 1.0 < np.median(np.diff(t_s[known])) <= SLOWEST_S
+        return _between(t_s[known], rows[name].to_numpy()[known] - offset, len(read)) if is_slow else read
 
     axles = [name for name in log.columns.axles if name in means]
-    rolls = means[axles].abs().median(axis=1).to_numpy(dtype=np.float64) if axles else column("")
+    turns = pd.DataFrame({name: column(name) for name in axles}).abs().median(axis=1)
+    rolls = turns.to_numpy(dtype=np.float64) if axles else column("")
     pressure, others = column("brake_pressure", log.form.ambient_pressure_pa), (column("acceleration"), rolls)
     if {"lat", "lon", "speed"} <= set(means) and "position" not in means:
         return Motion(_way_along(column("lat"), column("lon")), column("speed"), pressure, *others, by_fixes=True)
     return Motion(column("position"), column("speed"), pressure, *others)
+
+
+def _between(t_s: Array, values: Array, seconds: int) -> Array:
+    """Values half-way of the seconds, linear between two; NaN in gaps, and outside."""
+    at = np.arange(seconds) + 0.5
+    behind = np.clip(np.searchsorted(t_s, at), 1, len(t_s) - 1)
+    gaps, inside = np.diff(t_s), (at >= t_s[0]) & (at <= t_s[-1])
+    is_known = inside & (gaps[behind - 1] <= GAP * np.median(gaps))
+    return np.where(is_known, np.interp(at, t_s, values), math.nan)
 
 
 def _way_along(lat: Array, lon: Array) -> Array:
