@@ -60,6 +60,16 @@ def test_places_that_come_more_seldom_than_speeds_are_compared(importing: Import
     assert [odd for odd in importing.summary["odd"] if odd.endswith("another unit? --speed-unit kmh")]
 
 
+@pytest.mark.parametrize(("counts", "unit", "cure"), [(10, "s", 0.1), (100, "ms", 10), (3, "s", None)])
+def test_times_that_count_other_steps_are_said(importing: Import, counts: int, unit: str, cure: float | None) -> None:
+    """Tenths of a second as s, and the ticks of 10 ms of an event recorder as ms; a third is no count."""
+    t_s = np.arange(0.0, 300.0, 0.2)
+    rows = pd.DataFrame({"time": counts * t_s, "position": 15.0 * t_s, "speed": 15.0 + 0.1 * np.sin(t_s)}).round(3)
+    assert importing(text(rows), "--time-unit", unit) == 1
+    told = next(odd for odd in importing.summary["odd"] if odd.startswith("the positions move at "))
+    assert (f" are the times counts, to be multiplied by {cure}, " in told) == (cure is not None)
+
+
 def test_there_and_back_is_said(importing: Import) -> None:
     there = ride()
     back = there.assign(time=there.time + 60.0, position=there.position.iloc[-1] - there.position + 1000.0)

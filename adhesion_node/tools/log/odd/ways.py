@@ -21,6 +21,7 @@ from ..whole.clock import moment
 from ..whole.moving import MOVES_MPS
 from ..whole.read import Log
 from .motion import LEAST_M, LEAST_S, SAME, Motion
+from .sensors import JUST
 from .sentinels import LEAPS
 
 ONE_WAY = 0.9
@@ -93,7 +94,10 @@ def speed_against_positions(motion: Motion, form: Format) -> Iterator[str]:
     if ratio < 1e-4 and np.nanmax(np.abs(motion.place_m)) <= 180.0:
         yield f"{told}: are they degrees? --lat COL --lon COL"
     else:
-        yield f"{told}: are both units right, is the speed that of a wheel which slid?"
+        power = math.log10(max(ratio, 1e-30))
+        is_power = round(power) != 0 and math.log(10.0) * abs(power - round(power)) < JUST
+        counts = f" are the times counts, to be multiplied by {10.0 ** round(power):g}," if is_power else ""
+        yield f"{told}: are both units right,{counts} is the speed that of a wheel which slid?"
 
 
 def backwards(motion: Motion) -> Iterator[str]:
