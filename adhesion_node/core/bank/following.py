@@ -48,7 +48,7 @@ from .sensors.scatter import BRAKED_FAR, PLACE_FAR, SLOW_FAR
 if TYPE_CHECKING:
     from ..config import Config
 
-UNSEEN = 3.0
+GONE_ON = 3.0
 """Times the change of a gauge that may have gone on since its sample it counts as cylinders that fill: an accelerometer
 takes nearly all of it for unknown, lest it take what a brake does between two samples for its bias."""
 
@@ -263,7 +263,7 @@ def _braking(config: Config, memory: Memory, brake: BrakeSeen, now_ns: int, unde
     follows = config.pressure_kind == "demanded" or not undemanded
     fills = follows and brake.applied_pa < brake.demanded_pa
     alone = undemanded and config.pressure_kind != "demanded"
-    unseen_pa = UNSEEN * brake.unseen_pa(now_ns) if alone else 0.0
+    unseen_pa = GONE_ON * brake.unseen_pa(now_ns) if alone else 0.0
     filling = config.train.specific_brake(brake.demanded_pa if fills else unseen_pa)
     slid = told(share, brake.has_slid(now_ns), fell, slides.one_rolls(now_ns))
     return Braking(applied, sliding, brake.rising, slid, filling, alone)
