@@ -45,7 +45,7 @@ class Radii(NamedTuple):
     """What is known of the radii."""
 
     own: tuple[float, ...] = ()
-    """True over expected radius of each, over the same of all."""
+    """True over expected radius of each, over the same of all; below 0 where it counts backwards."""
     learnt: int = 0
     """Samples from which they were learnt."""
     noise: float = 0.0
@@ -58,18 +58,21 @@ class Radii(NamedTuple):
         """Whether they are learnt."""
         return self.learnt >= LEAST_LEARNT and self.way_m >= LEAST_M
 
-    def after(self, rims: list[float], elapsed_ns: int) -> Radii:
-        """Learn from rims that roll, of the expected radius all; NaN: not known."""
-        turning = [rim for rim in rims if rim > 0.0]  # never true of NaN
-        middle = median(turning) if turning else 0.0
+    def after(self, rims: list[float], elapsed_ns: int, runs: bool = False) -> Radii:
+        """Learn from rims that roll, of the expected radius all; NaN: not known.
+
+        Such as turn backwards count so where the train surely `runs`.
+        """
+        rolls = [rim > 0.0 or (runs and rim < 0.0) for rim in rims]  # never true of NaN
+        middle = median([abs(rim) for rim, one in zip(rims, rolls, strict=True) if one] or [0.0])
         if middle < LEARNING_MPS:
             return self
         part = max(LEARNT, 1.0 / (self.learnt + 1))
         own = tuple(
-            before + part * (middle / rim - before) if rim > 0.0 else before
-            for before, rim in zip(self.own, rims, strict=True)
+            _nearer(before, middle / rim, part) if one else before
+            for before, rim, one in zip(self.own, rims, rolls, strict=True)
         )
-        turned = (each * rim / middle - 1.0 for each, rim in zip(self.own, rims, strict=True) if rim > 0.0)
+        turned = (each * rim / middle - 1.0 for each, rim, one in zip(self.own, rims, rolls, strict=True) if one)
         off = [min(each**2, UNEQUAL**2) for each in turned]  # more is no noise: an axle slides
         noise = self.noise + max(LEARNT, 1.0 / self.learnt) * (sum(off) / len(off) - self.noise) if self.learnt else 0.0
         return Radii(own, self.learnt + 1, noise, self.way_m + middle * elapsed_ns / S)
@@ -88,3 +91,8 @@ class Radii(NamedTuple):
     def by_chance(self, count: int) -> float:
         """By how much the fastest of so many is faster than their mean by chance, relative; the slowest is as slow."""
         return BY_CHANCE * math.sqrt(2.0 * math.log(count) * self.noise)
+
+
+def _nearer(before: float, shown: float, part: float) -> float:
+    """By a part nearer to what is shown; at once where that is of the other direction."""
+    return before + part * (shown - before) if before * shown > 0.0 else shown

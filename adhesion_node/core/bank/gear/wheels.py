@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 
 S = 1_000_000_000
 
+MANY = 3.0
+"""Standard deviations of its speed by which a train surely runs."""
+
 SPUN_NS = 3 * S
 """For so long behind traction axles that have spun may spin still."""
 
@@ -58,7 +61,7 @@ class WheelsSeen(NamedTuple):
             own = [radius * rim for radius, rim in zip(radii.own, rims, strict=True)]
             slides = slides.after(config, own, sample.t_ns, speed_mps, std_mps)
         elif not (pulled and radii.is_learnt):
-            radii = radii.after(rims, slides.every_ns)
+            radii = radii.after(rims, slides.every_ns, speed_mps - MANY * std_mps > LEARNING_MPS)
         return wheels._replace(radii=radii, slides=slides)
 
     def agreeing(self, rims: list[float], least_mps: float, t_ns: int) -> WheelsSeen:

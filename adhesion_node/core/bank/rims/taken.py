@@ -17,6 +17,7 @@ from ...intake.samples import Measurement, WheelSample
 from ..free import runs_back
 from ..gear.fastest import UNTOLD_NS
 from ..gear.radii import LEARNING_MPS
+from ..gear.wheels import MANY
 from ..layout import MU, SPEED, Bank
 from ..memory import Memory
 from ..motion import SLOWED
@@ -27,9 +28,6 @@ from .unbraked import SLOW_MPS
 
 if TYPE_CHECKING:
     from ...config import Config
-
-MANY = 3.0
-"""Standard deviations of its speed by which a train surely runs."""
 
 PULLED = 0.004
 """Traction over the train's weight, beyond what holds its speed on the level, from which driven axles may spin."""
@@ -49,7 +47,7 @@ def with_wheels(config: Config, memory: Memory, measurement: Measurement) -> Mem
     rim, std = rim_speed(as_rolled(memory.bank, fastest.wander.rolled))
     runs = not pressed and rim - MANY * std > LEARNING_MPS
     for sample in measurement.wheels:
-        rims = [each * config.train.wheel_radius_m for each in sample.speeds_radps]
+        rims = [abs(each) * config.train.wheel_radius_m for each in sample.speeds_radps]
         axles = axles.after(rims, sample.t_ns, memory.slowed_mps, runs)
         newest = sample.without(axles.lying(memory.slowed_mps))
         wheels = wheels.after(config, newest, rim, std, pressed, drives)
