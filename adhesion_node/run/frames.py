@@ -34,7 +34,7 @@ from .pipeline import BACK_M, Pipeline
 from .results.brake import odd_brake
 from .results.doubts import AXLE, doubts
 from .results.rows import COLUMNS, Row, row_of
-from .results.seen import Seen, heading_of, pressure_of
+from .results.seen import Seen
 
 MEASURED = ("position", "variance", "speed", "speed_std", "brake_pressure", "brake_demand", "acceleration")
 """Columns beside `time` and those of the axles; m, m^2, m/s, Pa above the atmosphere, m/s^2."""
@@ -80,7 +80,7 @@ def estimate(frame: pd.DataFrame, config: Config | None = None, *, seed: int = 1
     pipeline, rows, seen = Pipeline(config, seed), list[Row](), Seen(config.train.full_pressure_pa)
     for made in _predictions(pipeline, _samples(t_ns, columns, std_m)):
         e = made.estimate
-        seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
+        seen.follow(pipeline, e)
         rows.append(row_of(pipeline, made))
     used = {name: getattr(pipeline, name) for name in ("measurements", "accepted", "dropped", "digest")}
     if not rows:

@@ -37,7 +37,7 @@ from .reader import Reader
 from .results.brake import odd_brake
 from .results.rows import row_of, rows_to
 from .results.score import Identified, Point, Truth, mean_relative_error_percent
-from .results.seen import MANY, Seen, heading_of, pressure_of
+from .results.seen import MANY, Seen
 
 Recorded = tuple[str, Any, int]
 """Our name of a message's topic; the message, what was read of it, or why it is refused; its log time in ns."""
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
         for made in predictions(pipeline, truth, recorded, setup.line, window_ms):
             write(row_of(pipeline, made, setup.line.sign))
             e = made.estimate
-            seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
+            seen.follow(pipeline, e)
             if truth is not None:
                 compared.append(Point(made.estimate.t_ns, made.estimate.mu))
     result = {"train": setup.train, **summary(pipeline, window_ms, truth, compared)}

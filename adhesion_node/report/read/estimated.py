@@ -24,7 +24,7 @@ from ...run.offline import Recorded
 from ...run.pipeline import Pipeline
 from ...run.results.brake import odd_brake
 from ...run.results.rows import Write, row_of
-from ...run.results.seen import Seen, heading_of, pressure_of
+from ...run.results.seen import Seen
 from ...wire.line import Line
 from ...wire.messages.refused import Rejected
 from ...wire.settings.setup import Setup
@@ -53,7 +53,7 @@ def estimate_run(
     for made in _predictions(pipeline, inputs, _noting(inputs, lost, recorded, setup.line), setup.line):
         write(row_of(pipeline, made, setup.line.sign))
         estimates.note(e := made.estimate)
-        seen.note(e.t_ns, e.regime.name, e.mu, e.mu_lower, heading_of(pipeline, e), pressure_of(pipeline))
+        seen.follow(pipeline, e)
         for curves, curve in ((safe, made.safe), (nominal, made.nominal)):
             if curve is not None:
                 places = made.estimate.position_m + curve.distance_m

@@ -70,6 +70,15 @@ class Seen:
         self._fastest_mps = 0.0
         self._newest: deque[tuple[int, float]] = deque()
 
+    def follow(self, pipeline: Pipeline, newest: Estimate) -> None:
+        """Take a pipeline's newest estimate; its speed is below 0 only where that is measured and not only foreseen."""
+        speed_mps = newest.speed_mps if pipeline.is_shown else abs(newest.speed_mps)
+        heard = pipeline.state.newest
+        pressure_pa = None if heard is None else heard.brake_pressure_pa
+        if heard is not None and pressure_pa is None:
+            pressure_pa = heard.demand_pa
+        self.note(newest.t_ns, newest.regime.name, newest.mu, newest.mu_lower, speed_mps, pressure_pa)
+
     def note(
         self, t_ns: int, regime: str, mu: float, mu_lower: float, speed_mps: float, pressure_pa: float | None
     ) -> None:
@@ -168,16 +177,3 @@ class Seen:
             f"braked by up to {self.hardest_mps2:.2f} m/s^2, and a weaker brake would look the same as a slippery rail:"
             " wheel speeds tell, a speed by radar or Doppler (speed_source), or a brake known better (brake_std)"
         )
-
-
-def heading_of(pipeline: Pipeline, estimate: Estimate) -> float:
-    """The speed of the newest estimate, below 0 only where that is measured and not only foreseen, m/s."""
-    return estimate.speed_mps if pipeline.is_shown else abs(estimate.speed_mps)
-
-
-def pressure_of(pipeline: Pipeline) -> float | None:
-    """The newest brake pressure, or demand where there is none, gauge."""
-    newest = pipeline.state.newest
-    if newest is None or newest.brake_pressure_pa is not None:
-        return newest and newest.brake_pressure_pa
-    return newest.demand_pa
