@@ -125,7 +125,7 @@ def _told(braking: list[Prediction], cell_m: float, sign: int) -> Braking:
         "mu_lower": _bound(lower, adhesion, shown),
         "share_adhesion": claimed.mean(),
         "share_brake": brake.mean(),
-        "share_unclaimed": 1.0 - claimed.mean() - brake.mean(),
+        "share_unclaimed": (~claimed & ~brake).mean(),
         "safe_m": length_m(braking[0].safe),
         "nominal_m": length_m(braking[0].nominal),
         "estimates": len(braking),

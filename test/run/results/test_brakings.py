@@ -89,6 +89,16 @@ def test_what_was_hardly_seen_says_nothing_of_the_rail() -> None:
     assert not found.cells.size
 
 
+def test_no_share_is_below_zero_where_all_is_claimed() -> None:
+    """1 - 2/11 - 9/11 is -1e-16, which `report` refused in the table."""
+    claimed = [
+        made if k not in (1, 2) else at(99.0 + k, 41.0 - k, ADHESION)
+        for k, made in enumerate(braking(100.0, BRAKE, seconds=11))
+    ]
+    (found,) = brakings(claimed)
+    assert found.row["share_unclaimed"] == 0.0
+
+
 def test_release_and_gaps_divide_brakings_and_dabs_are_none() -> None:
     stream = [*braking(100.0, BRAKE), *braking(200.0, BRAKE)[1:], *braking(250.0, BRAKE, seconds=1)]
     assert [float(found.row["t_ns"][0]) / S for found in brakings(stream)] == [100.0, 200.0]
