@@ -29,6 +29,10 @@ can stand for any number of them. Of the shortest messages so many make some 400
 _MESSAGE = Struct("<H4xQ8x")
 """Channel and log time of a message, its number and time of publishing passed over; its data follow."""
 
+_NAME_LENGTH = Struct("<28xI")
+"""How long the name of a chunk's compression is, in its body."""
+
+_LENGTH = Struct("<Q")
 
 Message = tuple[int, int, bytes]
 """What is used of a message: its channel, its log time in ns, its data."""
@@ -43,17 +47,21 @@ class Content(NamedTuple):
     """How many messages are left out, whose log time is later than any that a recording may hold."""
 
 
-def unpack(opcode: int, body: bytes) -> Content:
-    """Return what a chunk holds; another record stands for itself.
+def unpack(opcode: int, body: bytes, *, cut: bool = False) -> Content:
+    """Return what a chunk holds, or where it is cut off the records before that; another record stands for itself.
 
     The library makes several objects of every number, which takes twice as long.
     Raises ValueError, or what the libraries raise, when the bytes are not what they seem.
     """
     content = HEAD.pack(opcode, len(body)) + body
     if opcode == Opcode.CHUNK:
-        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+        chunk = Chunk.read(ReadDataStream(BytesIO(_ended(body) if cut else body)))
         content = _content(chunk)
-        if chunk.uncompressed_crc and crc32(content) != chunk.uncompressed_crc:
+        if cut:
+            content = _whole_records(content)
+        elif len(content) != chunk.uncompressed_size:
+            raise ValueError(f"chunk of {chunk.uncompressed_size} bytes, as it says: it holds another number")
+        elif chunk.uncompressed_crc and crc32(content) != chunk.uncompressed_crc:
             raise ValueError(f"chunk of {len(content)} bytes: its checksum is another")
     messages, declared, beyond, offset = list[Message](), list[Schema | Channel](), 0, 0
     while offset < len(content):
@@ -90,6 +98,20 @@ def _content(chunk: Chunk) -> bytes:
         content = chunk.data
     else:
         raise ValueError(f"chunk compression = {chunk.compression!r}: only zstd, lz4 and none are known")
-    if len(content) != size:
-        raise ValueError(f"chunk of {size} bytes, as it says: it holds another number")
     return bytes(content)
+
+
+def _ended(body: bytes) -> bytes:
+    """A chunk that is cut off, as if it were no longer than it is: the length of its content stands before that."""
+    (letters,) = _NAME_LENGTH.unpack_from(body)
+    at = _NAME_LENGTH.size + letters + _LENGTH.size
+    return body[: at - _LENGTH.size] + _LENGTH.pack(len(body) - at) + body[at:]
+
+
+def _whole_records(content: bytes) -> bytes:
+    """The records before the one that is cut off."""
+    end = following = 0
+    while following <= len(content) - HEAD.size:
+        end = following
+        following += HEAD.size + HEAD.unpack_from(content, end)[1]
+    return content[: following if following <= len(content) else end]

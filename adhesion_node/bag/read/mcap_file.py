@@ -33,7 +33,7 @@ from zstandard import ZstdError
 from ..qos import parse
 from ..types import Definition
 from .chunk import Message, unpack
-from .records import Record, next_chunk, record_at
+from .records import Record, begun_chunk, next_chunk, record_at
 
 _UNREADABLE = (error, ValueError, OverflowError, MemoryError, EOFError, McapError, ZstdError, RuntimeError)
 """What the decoders raise on bytes that are not what they seem."""
@@ -46,6 +46,8 @@ class Block(NamedTuple):
     offset: int
     opcode: int
     length: int
+    cut: bool
+    """Whether the file ends before the chunk does."""
 
 
 class TopicInfo(NamedTuple):
@@ -86,7 +88,7 @@ class McapFile:
         with self.path.open("rb") as stream:
             stream.seek(block.offset)
             body = stream.read(block.length)
-        return unpack(block.opcode, body).messages
+        return unpack(block.opcode, body, cut=block.cut).messages
 
     def _scan(self, stream: BinaryIO) -> None:
         if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
@@ -105,6 +107,7 @@ class McapFile:
                 counted = _messages(stream.read(length))
             if opcode in (Opcode.CHUNK, Opcode.MESSAGE, Opcode.SCHEMA, Opcode.CHANNEL):
                 self._take_block(opcode, offset, stream.read(length))
+        begun = None if finished else self._take_begun(stream, end)
         self._name_topics()
         if nameless := sum(count for channel, count in self.counts.items() if channel not in self._channels):
             self.damage.append(f"{self.path}: {nameless} messages are left out, the names of their topics are lost")
@@ -114,6 +117,7 @@ class McapFile:
         if not finished:
             stream.seek(end)
             rest = f", the {extent} bytes there are left out" if (extent := _extent(stream)) else ""
+            rest = f", {begun} messages of the chunk there are read" if begun else rest
             reason = "its recording was interrupted or the file was cut"
             self.damage.append(f"{self.path} breaks off at byte {end}: {reason}{rest}")
 
@@ -135,12 +139,20 @@ class McapFile:
                 searched_from = position
         yield record
 
-    def _take_block(self, opcode: int, offset: int, body: bytes) -> None:
+    def _take_begun(self, stream: BinaryIO, end: int) -> int:
+        """Take what is left of a chunk at which the file breaks off, and tell how many messages that is."""
+        chunk, before = begun_chunk(stream, end, stream.seek(0, 2)), self.counts.total()
+        if chunk is not None:
+            stream.seek(chunk.offset)
+            self._take_block(chunk.opcode, chunk.offset, stream.read(), cut=True)
+        return self.counts.total() - before
+
+    def _take_block(self, opcode: int, offset: int, body: bytes, *, cut: bool = False) -> None:
         """Note a record of the data section; a damaged one is left out as a whole."""
         try:
             if opcode == Opcode.MESSAGE and self.blocks and self.blocks[-1].opcode == Opcode.CHUNK:
                 raise ValueError("behind a chunk comes its index, which one wrong bit makes a message")
-            messages, declared, beyond = unpack(opcode, body)
+            messages, declared, beyond = unpack(opcode, body, cut=cut)
             self._declare(declared)
         except _UNREADABLE:
             self.damage.append(f"{self.path} is damaged at byte {offset}: the {len(body)} bytes there are left out")
@@ -149,7 +161,7 @@ class McapFile:
             later = f"{beyond} messages are left out, their log time is beyond 2^63 - 1 ns"
             self.damage.append(f"{self.path} is damaged at byte {offset}: {later}")
         if messages:
-            self.blocks.append(Block(min(log_ns for _, log_ns, _ in messages), offset, opcode, len(body)))
+            self.blocks.append(Block(min(log_ns for _, log_ns, _ in messages), offset, opcode, len(body), cut))
             self.counts.update(channel for channel, _, _ in messages)
 
     def _declare(self, records: list[Schema | Channel]) -> None:

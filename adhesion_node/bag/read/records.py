@@ -53,6 +53,15 @@ def record_at(stream: BinaryIO, position: int, size: int) -> Record | None:
     return None if opcode == 0 or record.end > size else record
 
 
+def begun_chunk(stream: BinaryIO, position: int, size: int) -> Record | None:
+    """Return what is left of a chunk that begins there and that the end of the stream cuts off; None without one."""
+    stream.seek(position)
+    head = stream.read(_LONGEST)
+    if not head.startswith(bytes([Opcode.CHUNK])) or not _is_chunk(head, 0):
+        return None
+    return Record(Opcode.CHUNK, position + HEAD.size, size - position - HEAD.size, True)
+
+
 def next_chunk(stream: BinaryIO, position: int, size: int) -> int | None:
     """Return where the next chunk begins, at a place or behind it, that ends within the stream; None without one."""
     for start in range(position, size, _STRIDE):

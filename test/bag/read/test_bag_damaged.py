@@ -28,6 +28,7 @@ from mcap.writer import Writer as McapWriter
 from recorded import write_steps
 
 from adhesion_node.bag import BagReader
+from adhesion_node.bag.types import definition
 from adhesion_node.bag.write.writer import file_name
 
 WRITER_THAT_IS_KILLED = """
@@ -89,6 +90,35 @@ def test_a_cut_file_is_read_up_to_the_cut(tmp_path: Path) -> None:
     cut.write_bytes(whole[: summary.chunk_indexes[0].chunk_start_offset + 300])
     with pytest.raises(ValueError, match="holds no readable message"):
         BagReader(cut)
+
+
+@pytest.mark.parametrize("compression", CompressionType)
+def test_a_chunk_that_is_cut_off_is_read_up_to_the_cut(compression: CompressionType, tmp_path: Path) -> None:
+    """Other recorders write chunks of megabytes: that with the cut was lost."""
+    written = write_steps(tmp_path / "bag", 1500)
+    cut = tmp_path / "cut.mcap"
+    with cut.open("wb") as stream:
+        writer: Any = McapWriter(stream, compression=compression, chunk_size=2**30)
+        writer.start()
+        channels = {
+            topic: writer.register_channel(
+                topic, "cdr", writer.register_schema(kind, "ros2msg", definition(kind).text.encode())
+            )
+            for topic, kind, _, _ in written[:2]
+        }
+        for topic, _, cdr, log_ns in written:
+            writer.add_message(channels[topic], log_ns, cdr, log_ns)
+        writer.finish()
+    chunk = index_of(cut).chunk_indexes[0]
+    cut.write_bytes(cut.read_bytes()[: chunk.chunk_start_offset + chunk.chunk_length // 2])
+    with BagReader(cut) as reader:
+        read = list(reader.messages())
+        assert reader.damage == (
+            f"{cut} breaks off at byte {chunk.chunk_start_offset}: its recording was interrupted or the file was cut, "
+            f"{len(read)} messages of the chunk there are read",
+        )
+    assert len(read) > 1000
+    assert read == written[: len(read)]
 
 
 def index_of(file: Path) -> Summary:

@@ -80,3 +80,14 @@ def test_a_chunk_that_is_not_what_it_seems_is_refused(content: bytes, checksum: 
     with pytest.raises(ValueError, match=why):
         unpack(Opcode.CHUNK, chunk_of(content, checksum))
     assert unpack(Opcode.CHUNK, chunk_of(record(Opcode.MESSAGE, message(b"xy")), 0)).messages, "0: no checksum"
+
+
+def test_of_a_chunk_that_is_cut_off_the_records_before_that_are_read() -> None:
+    """Wherever the cut is: it was left out as a whole."""
+    content = b"".join(record(Opcode.MESSAGE, message(b"xy" * at, at)) for at in range(4))
+    whole, begins = chunk_of(content), len(chunk_of(b""))
+    for size in range(begins, len(whole)):
+        messages, _, _ = unpack(Opcode.CHUNK, whole[:size], cut=True)
+        assert messages == [(3, at, b"xy" * at) for at in range(len(messages))]
+        left = len(whole) - size
+        assert len(messages) == 3 - (left > 37) - (left > 37 + 35) - (left > 37 + 35 + 33)
