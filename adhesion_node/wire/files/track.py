@@ -51,7 +51,7 @@ def read_track_line(path: str, start_m: float = 0.0) -> TrackLine:
     read = _geojson if Path(path).suffix.lower() in GEOJSON else _csv
     try:
         points = [_checked(where, *values) for where, *values in read(text)]
-    except TypeError as error:
+    except (TypeError, csv.Error, RecursionError) as error:
         raise ValueError(f"{source}: {error}: {SHAPE}") from error
     except ValueError as error:
         raise ValueError(f"{source}: {error}") from error
@@ -114,7 +114,7 @@ def _checked(where: str, *values: Any) -> Point:
     try:
         lat, lon = float(latitude), float(longitude)
         height_m = None if height is None else float(height)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{where}: {values}: not numbers") from None
     if not all(map(math.isfinite, (lat, lon, height_m or 0.0))):
         raise ValueError(f"{where}: {values}: not finite")

@@ -8,8 +8,8 @@
 
 """Files that describe a train in the terms of its papers; what they give the estimator are settings by name."""
 
-import math
 import reprlib
+import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from difflib import get_close_matches
@@ -87,8 +87,10 @@ def _train_of(content: Any, stem: str) -> TrainFile:
     values |= {KNOWN_TO[name]: _number(std, f"known_to: {name}") for name, std in known_to.items()}
     values |= _force(brake, make(Train, values, "train."))
     top = _number(whole.get("max_speed_kmh", 160.0), "max_speed_kmh")
+    if top <= 0.0:
+        raise ValueError(f"max_speed_kmh = {top:g}: give a speed above 0 km/h")
     make(Train, values, "train.")  # refuses what no train has
-    return TrainFile(str(whole.get("name", stem)), top, empty, loaded, values["brake_build_up_s"], values)
+    return TrainFile(str(whole.get("name") or stem), top, empty, loaded, values["brake_build_up_s"], values)
 
 
 def _mass(whole: Mapping[str, Any]) -> tuple[float, float, float]:
@@ -114,6 +116,8 @@ def _force(brake: Mapping[str, Any], train: Train) -> dict[str, float]:
         raise ValueError(f"brake: give deceleration_mps2, or else all of {', '.join(GEOMETRY)}")
     if geometry:
         values = {f"train.{name}": _number(brake[name], f"brake: {name}") for name in GEOMETRY}
+        if not values["train.pads"].is_integer():
+            raise ValueError(f"brake: pads = {values['train.pads']:g}: give a whole number")
         return values | {"train.pads": int(values["train.pads"])}
     slowing = _number(brake["deceleration_mps2"], "brake: deceleration_mps2")
     if not 0.01 <= slowing <= 5.0:
@@ -139,6 +143,6 @@ def _mapping(value: Any, what: str, needed: tuple[str, ...], optional: tuple[str
 
 
 def _number(value: Any, name: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= sys.float_info.max:
         raise ValueError(f"{name} = {reprlib.repr(value)}: give a number")
     return float(value)

@@ -98,6 +98,13 @@ BAD = {
         "lat,lon,height\n47,8,-3.4028235e+38\n47.1,8,400\n",
         r"line 2: height -3.40282e\+38 is not within -500 to 9000 m: is it in another unit, or does it stand for none",
     ),
+    "a quote that does not end": (
+        "a.csv",
+        'lat,lon\n"' + 30_000 * "47.1,8\n",
+        r"a\.csv: field larger than .*: give GeoJSON",
+    ),
+    "deep": ("a.json", 100_000 * "[", r"a\.json: maximum recursion .*: give GeoJSON"),
+    "digits": ("a.json", json.dumps(line_string([[10**400, 1], [2, 3]])), r"coordinates\[0\] = .*: not numbers"),
     "nan": ("a.csv", "lat,lon\n47,8\n47.1,nan\n", r"line 3: .*: not finite"),
 }
 

@@ -26,7 +26,7 @@ from adhesion_node.core.physics.train import CRH3
 from adhesion_node.nodes import replay
 from adhesion_node.nodes.estimator import Estimator
 from adhesion_node.tools.log.options import add_options, format_of
-from adhesion_node.wire.files.train import SHIPPED, read_train
+from adhesion_node.wire.files.train import GEOMETRY, SHIPPED, read_train
 from adhesion_node.wire.settings.given import given
 from adhesion_node.wire.settings.nodes import SETTINGS
 from adhesion_node.wire.settings.setup import setup_of
@@ -127,6 +127,7 @@ def test_a_key_that_stands_twice_is_refused(tmp_path: Path) -> None:
 
 
 BRAKE = UNIT["brake"]
+SHARES = {"full_pressure_pa": 380e3, "build_up_s": 1.5, **dict.fromkeys(GEOMETRY, 0.5)}
 
 
 @pytest.mark.parametrize(
@@ -145,6 +146,9 @@ BRAKE = UNIT["brake"]
         ({"brake": {"full_pressure_pa": 380e3, "build_up_s": 1.5}}, "brake: give deceleration_mps2, or else all of"),
         ({"brake": {**BRAKE, "deceleration_mps2": 120}}, r"deceleration_mps2 = 120: give 0.01 to 5 m/s\^2"),
         ({"brake": {**BRAKE, "full_pressure_pa": 3.8}}, "train.full_pressure_pa = 3.8: give a value from 1000"),
+        ({"brake": {**SHARES, "pads": 96.5}}, "brake: pads = 96.5: give a whole number"),
+        ({"length_m": 10**400}, "length_m = 10+[.]+0+: give a number"),
+        ({"max_speed_kmh": -80}, "max_speed_kmh = -80: give a speed above 0 km/h"),
         ({"known_to": {"wheels": 0.1}}, "known_to: wheels means nothing: choose of mass, brake"),
     ],
 )
@@ -154,6 +158,13 @@ def test_what_no_train_has_is_refused_by_key_value_and_remedy(
     path = written(tmp_path, **changes)
     with pytest.raises(ValueError, match=rf"train = {path}: .*{message}"):
         read_train(path)
+
+
+def test_an_empty_name_is_none(tmp_path: Path) -> None:
+    """It was shown as None."""
+    path = Path(written(tmp_path))
+    path.write_text(path.read_text(encoding="utf-8").replace("name: regional unit", "name:"), encoding="utf-8")
+    assert read_train(str(path)).name == "unit"
 
 
 @pytest.mark.parametrize("text", ["[1, 2", "- 1", "", "a: &a [*a]"])
