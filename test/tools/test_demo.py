@@ -266,14 +266,16 @@ def test_an_option_that_means_nothing_is_one_line_and_code_2_and_leaves_nothing(
     assert not (tmp_path / "demo").exists()
 
 
+@pytest.mark.parametrize("seed", [-1, 2**31, 2**63])
 def test_a_bad_seed_is_one_line_and_code_2_and_leaves_nothing(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    seed: int, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
-    assert demo.main(["--output", str(tmp_path / "demo"), "--seed", "-1"]) == 2
+    """Of more than 64 bits ROS ends in a traceback."""
+    assert demo.main(["--output", str(tmp_path / "demo"), "--seed", str(seed)]) == 2
     out, err = capfd.readouterr()
     (line,) = err.splitlines()
     assert out == ""
-    assert line.startswith("demo: seed = -1: give ")
+    assert line.startswith(f"demo: seed = {seed}: give ")
     assert not (tmp_path / "demo").exists()
 
 

@@ -30,7 +30,7 @@ from sim_node.settings import SENSORS
 from sim_node.train.scenario import SCENARIOS
 
 from ...bag import BagReader
-from ...command.checks import refuse
+from ...command.checks import at_least, refuse
 from ...command.options import DONE, FAILED, help_texts, json_option, report, run_tool
 from ...command.signals import stop_on_signals
 from ...core import Estimate
@@ -99,6 +99,7 @@ def main(args: Sequence[str] | None = None) -> int:
 
 def _demo(options: argparse.Namespace) -> int:
     """Run it; ValueError where an option would mean nothing."""
+    at_least(options, seed=0)
     if not options.live:
         refuse(options, ["host", "port"], "there is no page without --live: add that, or leave this out")
     if options.scenario not in REAL:
