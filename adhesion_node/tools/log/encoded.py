@@ -27,6 +27,8 @@ _BROKEN = (EOFError, zlib.error, lzma.LZMAError, OSError)
 NO_TEXT = (
     (b"PK\x03\x04", "is a zip file or a workbook, no text: unpack it, or save it as CSV"),
     (b"\xd0\xcf\x11\xe0", "is a workbook, no text: unpack it, or save it as CSV"),
+    *((begins, "is packed: unpack it, or pack it by gzip") for begins in (b"\x28\xb5\x2f\xfd", b"\x04\x22\x4d\x18")),
+    (b"7z\xbc\xaf\x27\x1c", "is a 7z file, no text: unpack it"),
     *((begins, "is a recording, no log: replay --offline reads it") for begins in (b"\x89MCAP", b"SQLite format 3")),
     (b"#ROSBAG", "is a recording of ROS 1, no log: convert it with rosbags-convert, replay --offline reads it then"),
 )

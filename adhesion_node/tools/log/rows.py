@@ -34,6 +34,12 @@ NO_VALUE = "it stands for no value: leave such cells empty, the rest of the row 
 
 FLAG = "; or true and false, of a full brake, with --pressure-unit full"
 
+_NAMED_ZONE = re.compile(r"(?<=[0-9])\s*\[?[A-Z][A-Za-z/_]{2,}\]?$")
+
+SINCE = "; of seconds since 1904 subtract 2082844800 from all, of those since 1900 2208988800"
+MAC_2001, NTP_2038 = 978_307_200 + 2_082_844_800, 2**31 + 2_208_988_800
+"""The beginnings of such years in seconds since 1904, and since 1900."""
+
 IN_GROUPS = "is it in groups of thousands? Export it without them; or is the --decimal another?"
 
 
@@ -128,14 +134,20 @@ def _refuse_times(refuse: Callable[..., None], bad: Flags, cells: "pd.Series[Any
     if form.time_format is not None:
         known = "in a way that is known" if form.time_format == "ISO8601" else f"as {form.time_format!r}"
         how = f"it is not written {known}: say how with --time-format, such as '%d.%m.%Y %H:%M:%S.%f'"
-        refuse(bad, "not_a_time", "time", lambda _: how)
+        refuse(bad, "not_a_time", "time", lambda i: how + _zone(str(cells.iloc[i])))
         return
     read = numbers(cells, form.decimal or ".", form.thousands)
     refuse(bad & (read < 0.0), "out_of_range", "time", lambda _: "it is below 0: add the same to all, so that none is")
     outside = bad & np.isfinite(read)
     range_ = "a stamp lies between 1970 (or 0) and 2038: is the --time-unit another? Or --time-format %Y%m%d%H%M%S?"
-    refuse(outside, "out_of_range", "time", lambda _: range_)
+    refuse(outside, "out_of_range", "time", lambda i: range_ + (SINCE if MAC_2001 <= read[i] < NTP_2038 else ""))
     refuse(bad, "not_a_number", "time", lambda _: f"{NO_NUMBER}; a date is told by --time-format")
+
+
+def _zone(cell: str) -> str:
+    """What to do about a zone by its name behind a date, as CET or [Europe/Berlin], which no parser reads."""
+    named = _NAMED_ZONE.search(cell)
+    return f"; with {named.group()!r} at its end, and the zone by --time-zone, such as Europe/Berlin" if named else ""
 
 
 def _out_of_range(read: Any, least: float, most: float, remedy: str) -> Callable[[int], str]:

@@ -29,6 +29,7 @@ __all__ = ["importing"]
     [
         (b"PK\x03\x04\x14", "is a zip file or a workbook, no text: unpack it, or save it as CSV"),
         (b"\xd0\xcf\x11\xe0", "is a workbook, no text: unpack it, or save it as CSV"),
+        (b"\x28\xb5\x2f\xfd\x24\0", "is packed: unpack it, or pack it by gzip"),
         (b"\x89MCAP0\r\n\0", "is a recording, no log: replay --offline reads it"),
         (b"MDF     4.10\0\0\0", "is no text: save it as CSV or as Parquet, or name its --encoding"),
         (b"TDSm\x0e\0\0\0", "is no text: save it as CSV or as Parquet, or name its --encoding"),

@@ -59,8 +59,14 @@ def test_times_as_recorders_write_them(importing: Import, written: str, options:
     assert [sample.t_ns for sample in importing.positions()] == [first_ns + i * S for i in range(30)]
 
 
-@pytest.mark.parametrize("written", [str, lambda span: str(span.to_pytimedelta())])
-def test_durations_as_pandas_and_python_write_them(importing: Import, written: Callable[[pd.Timedelta], str]) -> None:
+@pytest.mark.parametrize(
+    "written",
+    [
+        *(str, lambda span: str(span.to_pytimedelta())),
+        *(pd.Timedelta.isoformat, lambda span: f"PT{span.total_seconds():.1f}S"),
+    ],
+)
+def test_durations_as_programs_write_them(importing: Import, written: Callable[[pd.Timedelta], str]) -> None:
     """Across midnight, and a gap of days."""
     spans = pd.to_timedelta([86_390.0 + 0.5 * i + 3 * 86_400 * (i > 25) for i in range(30)], unit="s")
     assert importing(text(ride()[:30].assign(time=list(map(written, spans))), ";")) < 2, importing.errors
@@ -189,6 +195,25 @@ def test_a_date_that_names_its_zone_is_in_no_other(importing: Import, written: s
     assert importing(f"time,position\n{rows}", "--time-zone", "America/New_York", *options) == 0
     begins = pd.Timestamp(importing.positions()[0].t_ns).floor("s")
     assert begins == pd.Timestamp("2024-11-21 07:15:00")
+
+
+@pytest.mark.parametrize("zone", [" CET", " Europe/Berlin", "[Europe/Berlin]"])
+def test_of_a_zone_by_its_name_the_remedy_is_told(importing: Import, zone: str) -> None:
+    log = f"time,position\n2024-11-21 00:00:00{zone},1\n2024-11-21 00:00:01{zone},2\n"
+    assert importing(log) == 2
+    behind = f"; with {zone!r} at its end, and the zone by --time-zone, such as Europe/Berlin"
+    assert importing.errors[0].endswith(behind)
+    assert importing(log, "--time-format", f"%Y-%m-%d %H:%M:%S{zone}", "--time-zone", "Europe/Berlin") == 0
+    assert pd.Timestamp(importing.positions()[0].t_ns) == pd.Timestamp("2024-11-20 23:00:00")
+
+
+@pytest.mark.parametrize("year", [1900, 1904])
+def test_of_seconds_since_another_year_what_to_subtract_is_told(importing: Import, year: int) -> None:
+    since = (pd.Timestamp("2024-11-21") - pd.Timestamp(f"{year}-01-01")).total_seconds()
+    assert importing(f"time,position\n{since:.1f},1\n{since + 1:.1f},2\n") == 2
+    less = (pd.Timestamp("1970-01-01") - pd.Timestamp(f"{year}-01-01")).total_seconds()
+    assert f"{year}" in importing.errors[0]
+    assert f" {less:.0f}" in importing.errors[0]
 
 
 def test_a_date_without_a_zone_is_in_the_one_that_is_told(importing: Import) -> None:

@@ -63,6 +63,9 @@ milliseconds."""
 _OF_DAYS = r"^([0-9]{1,5}) days? (?=[0-9])"
 """How a duration begins that pandas or Python has written, 1 days 00:00:03.500000: the days, then a clock's time."""
 
+_DURATION = re.compile(r"\s*P[0-9T]")
+"""How a duration of ISO 8601 begins, PT1M3.5S; it is a clock's time, as that above is."""
+
 _BASIC = re.compile(r"\s*[0-9]{4}(-?)[0-9]{2}\1[0-9]{2}[Tt][0-9]{4}")
 """How a date without colons begins, 20241121T081503 or 2024-11-21T081503."""
 
@@ -155,7 +158,9 @@ def time_formats(cells: Iterable[str]) -> list[str]:
     (['%d.%m.%Y %H:%M:%S.%f'], [])
     """
     texts = map(str, cells)  # of Parquet a time may be missing
-    text = pd.Series([cell for cell in texts if ":" in cell or _BASIC.match(cell)], dtype=object).astype(str)
+    text = pd.Series(
+        [cell for cell in texts if ":" in cell or _BASIC.match(cell) or _DURATION.match(cell)], dtype=object
+    ).astype(str)
     counts = {form: int(_parsed(text, form).notna().sum()) for form in FORMATS if len(text)}
     return [form for form, count in counts.items() if count == max(counts.values())]
 
@@ -187,6 +192,7 @@ def has_dates(form: Format) -> bool:
 
 def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
     """The dates of a format; a clock's are those of the day on which the epoch begins."""
+    lasting = text.where(text.str.match(_DURATION)) if form == CLOCK else None
     if form in FORMATS:
         for written, meant in _LIKE:
             text = text.str.replace(written, meant, regex=True)
@@ -196,7 +202,10 @@ def _parsed(text: "pd.Series[str]", form: str) -> "pd.Series[Any]":
     if is_clock(form):
         form, text = f"%Y-%m-%d {form}", "1970-01-01 " + text.str.replace(_OF_DAYS, "", regex=True)
     read = pd.to_datetime(text, format=form, errors="coerce", utc=True)
-    return read if days is None else read + pd.to_timedelta(days.fillna("0").astype(int), unit="D")
+    if days is None:
+        return read
+    read += pd.to_timedelta(days.fillna("0").astype(int), unit="D")
+    return read.fillna(_EPOCH + pd.to_timedelta(lasting, errors="coerce"))
 
 
 def _stamps(read: "pd.Series[Any]") -> "np.ndarray[Any, np.dtype[np.int64]]":
