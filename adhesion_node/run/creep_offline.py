@@ -10,6 +10,7 @@
 
 import argparse
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -19,9 +20,9 @@ from ..command.options import DONE, FAILED, progress, report
 from ..wire.settings.given import given
 from ..wire.settings.nodes import CREEP_SETTINGS
 from ..wire.settings.setup import creep_setup_of
-from ..wire.topics import CREEP_INPUTS, WHEEL_SPEED
+from ..wire.topics import CREEP_INPUTS
 from .creep_pipeline import CreepPipeline
-from .offline import feed, messages
+from .offline import feed, messages, much_dropped
 
 NODE = "creep_estimator"
 
@@ -35,14 +36,16 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
     refuse(options, ["seed"], "the creep identification draws nothing: leave it out")
     refuse(options, ["train"], "the locomotive of the creep identification is told by --set: leave it out")
     refuse(options, ["out"], "rows are there of the adhesion alone, not of the creep curve: leave it out")
-    if WHEEL_SPEED.name not in selection.values():
-        raise ValueError(f"bag = {reader.path}: holds no {WHEEL_SPEED.name}, without which there is no creep")
+    if lacking := [topic.name for topic in CREEP_INPUTS if topic.name not in selection.values()]:
+        raise ValueError(f"bag = {reader.path}: holds no {' and no '.join(lacking)}, without which there is no creep")
     setup = creep_setup_of(given(options, NODE, CREEP_SETTINGS))
     pipeline = CreepPipeline(setup.config)
     recorded = progress(messages(reader, selection, setup.line), "messages")
     for _ in feed(pipeline, recorded, CREEP_INPUTS, setup.line):
         pass
     pipeline.finish()
+    for why in much_dropped(pipeline) if pipeline.last is None else ():
+        print(f"replay: nothing is identified: {why}", file=sys.stderr)
     result = summary(pipeline)
     report(options.json, result, "\n".join(f"{name:<28} {value}" for name, value in result.items()))
     return FAILED if pipeline.last is None else DONE

@@ -84,12 +84,7 @@ def run(options: argparse.Namespace, reader: BagReader, selection: Mapping[str, 
 
 def remarks(pipeline: Pipeline, why: str | None = None, brake: str | None = None) -> Iterator[str]:
     """What a person must hear: nothing is identified, much was dropped, its brake, its way, or a map to come."""
-    for reason, count in pipeline.dropped.items():
-        is_line = reason == Reason.NO_TRACK_LINE.name  # that is no fault now and then: it is all fixes
-        if is_line or count > MANY * pipeline.measurements:
-            known = Outcome[reason].value if reason in Outcome.__members__ else pipeline.refused.get(reason)
-            what = "fixes" if is_line else "messages"
-            yield f"{count} {what} were dropped: {reason}" + (f": {known}" if known else "")
+    yield from much_dropped(pipeline)
     if why is not None:
         yield f"nothing is identified: {why}"
     elif pipeline.back_m > BACK_M:
@@ -102,6 +97,16 @@ def remarks(pipeline: Pipeline, why: str | None = None, brake: str | None = None
     if first_ns is not None and last is not None and first_ns > last.t_ns:
         late = f"rail_map begins at t_ns = {first_ns}, this recording ends at {last.t_ns}"
         yield f"{late}: no train is less careful by what later ones saw: name a map of earlier ones"
+
+
+def much_dropped(pipeline: EstimatorPipeline[Any, Any, Any]) -> Iterator[str]:
+    """Why so many messages were not used that it matters."""
+    for reason, count in pipeline.dropped.items():
+        is_line = reason == Reason.NO_TRACK_LINE.name  # that is no fault now and then: it is all fixes
+        if is_line or count > MANY * pipeline.measurements:
+            known = Outcome[reason].value if reason in Outcome.__members__ else pipeline.refused.get(reason)
+            what = "fixes" if is_line else "messages"
+            yield f"{count} {what} were dropped: {reason}" + (f": {known}" if known else "")
 
 
 def parameters_of(options: argparse.Namespace) -> dict[str, Any]:

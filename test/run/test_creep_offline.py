@@ -153,7 +153,25 @@ def test_bad_input_is_one_line_and_code_2(
     assert message in line
 
 
-def test_a_bag_without_wheel_speeds_says_so(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(
+    ("held", "lacking"),
+    [
+        (["speed"], "traction_force and no wheel_speed"),
+        (["wheel_speed", "speed"], "traction_force"),
+        (["wheel_speed", "traction_force"], "speed"),
+    ],
+)
+def test_a_bag_without_what_makes_creep_says_so(
+    held: list[str], lacking: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     bag = write(tmp_path / "bag", recorded(20), position=True)
-    assert replay.main([str(bag), "--offline", "--estimator", "creep", "--topics", "speed"]) == 2
-    assert "holds no wheel_speed, without which there is no creep" in capfd.readouterr().err
+    assert replay.main([str(bag), "--offline", "--estimator", "creep", "--topics", *held]) == 2
+    assert f"holds no {lacking}, without which there is no creep" in capfd.readouterr().err
+
+
+def test_where_nothing_is_identified_it_is_said_why(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """A locomotive that is slower than the setting all the way."""
+    bag = write(tmp_path / "bag", recorded(160))
+    offline(bag, "--set", "min_speed_mps=50", code=1)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert line.startswith("replay: nothing is identified: 160 messages were dropped: SLOW: slower than min_speed_mps")
