@@ -76,6 +76,14 @@ def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(demo, "draw", lambda *_: None)
 
 
+@pytest.fixture
+def short_metro(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the metro on leaves brake from 22 km/h."""
+    slow = replace(REAL["metro_leaves"], speed_mps=6.0, demands=((3.0, 1.0),))
+    for module in (simulator, demo, staged):
+        monkeypatch.setattr(module, "REAL", {"metro_leaves": slow})
+
+
 def test_the_demo_leaves_a_recording_a_picture_and_the_same_numbers_as_offline(
     tmp_path: Path, run_demo: Callable[..., dict[str, Any]], capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -134,13 +142,10 @@ def test_a_line_is_told_to_be_level_unless_it_is_not(name: str, told: dict[str, 
 def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_known_when(
     sensors: str,
     tmp_path: Path,
+    short_metro: None,
     run_demo: Callable[..., dict[str, Any]],
-    monkeypatch: pytest.MonkeyPatch,
     capfd: pytest.CaptureFixture[str],
 ) -> None:
-    short = replace(REAL["metro_leaves"], speed_mps=6.0, demands=((3.0, 1.0),))
-    for module in (simulator, demo, staged):
-        monkeypatch.setattr(module, "REAL", {"metro_leaves": short})
     result = run_demo("--scenario", "metro_leaves", "--sensors", sensors)
     out, _ = capfd.readouterr()
     assert result["live_equals_offline"] is True
@@ -157,6 +162,15 @@ def test_a_real_train_too_gives_the_same_numbers_as_offline_and_shows_what_was_k
     report.main([result["bag"], "--output", str(tmp_path / "page"), "--json", str(tmp_path / "report.json")])
     (run,) = json.loads((tmp_path / "report.json").read_text())["runs"]
     assert run["mean_relative_error_percent"] == pytest.approx(result["mean_relative_error_percent"], rel=1e-9)
+
+
+def test_the_first_curves_may_come_all_at_once(
+    short_metro: None, run_demo: Callable[..., dict[str, Any]], undrawn: None
+) -> None:
+    """Without a position the first estimates wait for 3 s; the demo took the curves between for lost, and ended."""
+    result = run_demo("--scenario", "metro_leaves", "--sensors", "doppler_only")
+    assert result["live_equals_offline"] is True
+    assert result["measurements"] == 0
 
 
 def test_where_ros_cannot_start_it_is_said_in_one_line(

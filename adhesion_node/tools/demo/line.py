@@ -53,6 +53,9 @@ NODES = ("recorder", "estimator", "atp_monitor", "simulator", "live")
 QUIET = {"atp_monitor": LoggingSeverity.FATAL}
 """It brakes until the first estimates are sure enough; its levels are part of the result."""
 
+EVERY_CURVE = {f"qos_overrides./{BRAKING_CURVE.name}.subscription.depth": 100}
+"""Of the monitor, which needs the newest curve alone: several come at once where the first estimates have waited."""
+
 DOMAINS = range(1, 102)
 """Domains whose ports are free on every system."""
 
@@ -91,7 +94,7 @@ def play(executor: SingleThreadedExecutor, task: Task, bag: Path, pace: Pace) ->
     recorder = Recorder(bag, by_log_time=True, parameter_overrides=simulated(), context=context)
     identifying = simulated(**task.estimator, seed=task.seed, sensor_timeout_s=NEVER_S)
     estimator = Estimator(parameter_overrides=identifying, context=context)
-    supervising = simulated(**task.monitor, clock_timeout_s=NEVER_S)
+    supervising = simulated(**task.monitor, **EVERY_CURVE, clock_timeout_s=NEVER_S)
     monitor = AtpMonitor(parameter_overrides=supervising, context=context)
     for node in (recorder, estimator, monitor, simulator):
         executor.add_node(node)
