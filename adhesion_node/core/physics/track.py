@@ -84,6 +84,9 @@ Section = Grade | Curve | Tunnel
 STEEPEST, TIGHTEST_M = 0.15, 10.0
 """Grade and radius of trams in Lisbon and Toronto, rounded outwards: beyond them a profile is a slip of the pen."""
 
+LONGEST_TUNNEL_M = 70e3
+"""No railway's is longer. The air's resistance grows with its length: all of a line as one seems to brake a train."""
+
 RAMP = 8
 """Steps on a train's length in which what lies under it changes."""
 
@@ -100,8 +103,8 @@ class Track:
 
     `train_length_m` is that of the train: a grade and a curve come under it, and leave it, in `RAMP` steps.
 
-    Raises ValueError naming the section when it is none, does not end beyond its start, or is steeper or tighter than
-    any train could pass.
+    Raises ValueError naming the section when it is none, does not end beyond its start, or is steeper, tighter or
+    further in a tunnel than any train could pass.
     """
 
     sections: tuple[Section, ...] = ()
@@ -121,6 +124,12 @@ class Track:
                 raise ValueError(f"track section {section}: give finite numbers and an end_m beyond start_m")
             if isinstance(section, Curve) and not section.radius_m >= TIGHTEST_M:
                 raise ValueError(f"track section {section}: give a radius_m of at least {TIGHTEST_M:g} m")
+            if isinstance(section, Curve) and section.angle_deg < 0.0:
+                raise ValueError(f"track section {section}: give an angle_deg of at least 0, to either side")
+            if isinstance(section, Tunnel) and section.end_m - section.start_m > LONGEST_TUNNEL_M:
+                raise ValueError(
+                    f"track section {section}: none is longer than {LONGEST_TUNNEL_M / 1e3:g} km: give each by itself"
+                )
             if isinstance(section, Grade) and abs(section.resistance(0.0)) > STEEPEST:
                 steep = f"{100.0 * section.resistance(0.0):.3g} %"
                 raise ValueError(

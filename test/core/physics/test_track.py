@@ -143,6 +143,8 @@ def test_refuses_a_text_it_cannot_read(text: str) -> None:
         (Curve(0.0, 100.0, math.nextafter(10.0, 0.0), 1.0), "give a radius_m of at least 10 m"),
         (Grade(0.0, 1e6, 5e6), "rises by 500 %, and trains climb 15 % at most: rise_m is the height gained between"),
         (Grade(0.0, 100.0, -15.1), "rises by -15.1 %, and trains climb 15 % at most"),
+        (Curve(0.0, 100.0, 300.0, -20.0), "give an angle_deg of at least 0, to either side"),
+        (Tunnel(-1e5, 1e5), "none is longer than 70 km: give each by itself"),
         (("grade", 0, 1, 2), r"track section \('grade', 0, 1, 2\): give a Grade, a Curve or a Tunnel"),
     ],
 )
