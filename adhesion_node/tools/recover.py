@@ -23,7 +23,7 @@ def main(args: Sequence[str] | None = None) -> int:
     """Run `recover BAG --output DIR`."""
     example = "recover broken_run --output whole_run"
     parser = argparse.ArgumentParser("recover", parents=[json_option()], **help_texts(__doc__, example))
-    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory or an .mcap file")
+    parser.add_argument("bag", metavar="BAG", help="a rosbag2 directory, an .mcap or a .db3 file")
     text = "leave out messages that do not decode as what they say they are"
     parser.add_argument("--drop-undecodable", action="store_true", help=text)
     parser.add_argument("--output", metavar="DIR", required=True, help="the new recording, a new directory")
