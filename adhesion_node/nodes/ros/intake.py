@@ -28,8 +28,10 @@ from .diagnostics import Finding, doubled, unlike
 from .hearing import Hearing
 
 AS_WANTED = (Reason.OTHER_SOURCE.name, Reason.SWITCHED_OFF.name)
-UNUSED = (*AS_WANTED, Reason.DISABLED.name)
-"""Reasons of a refusal that say nothing against the message: its sensor is alive."""
+"""Reasons of a refusal that somebody wanted so: the message is counted, no more."""
+
+ALIVE = (Reason.OTHER_SOURCE.name, Reason.DISABLED.name)
+"""Those that say nothing of the sensor: it is heard. One that is switched off is as good as silent."""
 
 
 class Listener(Protocol):
@@ -127,7 +129,7 @@ class Intake:
             try:
                 sample = self._sample(topic, message)
             except Rejected as refusal:
-                self._heard(topic, str(refusal) if refusal.reason not in UNUSED else "")
+                self._heard(topic, str(refusal) if refusal.reason not in ALIVE else "")
                 self._listener.refuse(topic, refusal)
                 if refusal.reason not in AS_WANTED:  # nothing is wrong: it is counted
                     self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")

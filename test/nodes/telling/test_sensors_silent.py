@@ -70,6 +70,21 @@ def test_what_a_train_is_followed_by_without_a_position_may_die(make_line: Calla
         while_sending(line, lambda _: None, *silent, level=DiagnosticStatus.STALE)
 
 
+def test_a_position_that_is_switched_off_is_silent(make_line: Callable[..., Line]) -> None:
+    line = make_line(Estimator, **QUICK)
+    place, speed = positions(line), line.outlet(topics.SPEED)
+    while_sending(line, place, "no brake pressure", level=DiagnosticStatus.WARN)
+    assert line.node.set_parameters_atomically([Parameter("use_position", value=False)]).successful
+    off = "nothing that can be used for ", "use_position = false: set it to true"
+    while_sending(line, place, *off, level=DiagnosticStatus.STALE)
+
+    def both(k: int) -> None:
+        place(k)
+        speed.publish(messages.speed(9 * S + k * S // 20, 30.0, 0.1))
+
+    while_sending(line, both, "the train is followed by its speed or its wheels", level=DiagnosticStatus.WARN)
+
+
 @pytest.mark.parametrize(
     ("step_ns", "why"),
     [(0, "same stamp: dropped; does its clock stand still, or header.stamp stay 0?"), (-S // 20, "max_lag_s: dropped")],
