@@ -95,6 +95,7 @@ class EstimatingNode(ManagedNode, Generic[P]):
         self._resets: deque[int] = deque(maxlen=OFTEN)
         """When the latest ones were seen."""
         self._seen_resets = 0
+        """Of the pipeline's: those in `_resets`, and those asked for by a service, which tell of no jump."""
         self._reader = Reader(self._kind.inputs, line)
         self._told_state: Any = None
         self._told_ns = -NEWS_NS
@@ -189,15 +190,21 @@ class EstimatingNode(ManagedNode, Generic[P]):
         return [Finding(Severity.WARN, f"{text}; does a recording loop, is there a second publisher?")]
 
     def _on_reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self.publish(self.pipeline.reset())
+        self._begin_anew()
         self._reader.source = None
         return self._answered(response, "reset", "started anew")
 
     def _on_set_enabled(self, request: SetBool.Request, response: SetBool.Response) -> SetBool.Response:
         if self._intake.enabled and not request.data:
-            self.publish(self.pipeline.reset())
+            self._begin_anew()
         self._intake.enabled = request.data
         return self._answered(response, "set_enabled", "enabled" if request.data else "disabled: nothing is identified")
+
+    def _begin_anew(self) -> None:
+        """Start anew as asked, and publish what had waited."""
+        outputs = self.pipeline.reset()
+        self._seen_resets += 1
+        self.publish(outputs)
 
     def _answered(self, response: Any, service: str, message: str) -> Any:
         response.success, response.message = True, message

@@ -21,6 +21,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from rclpy.context import Context
 from rclpy.node import Node
 from std_msgs.msg import String
+from std_srvs.srv import Trigger
 from told_line import Line, S, beside, make_line
 
 from adhesion_node.live.node import Live
@@ -181,3 +182,15 @@ def test_resets_again_and_again_are_told(make_line: Callable[..., Line]) -> None
     assert "resets so far" not in line.last.message
     play(400)
     line.wait_until_said("2 resets so far, 2 of them within 60 s: stamps or positions jump")
+
+
+def test_resets_that_are_asked_for_are_no_jumps(make_line: Callable[..., Line]) -> None:
+    line = make_line(Estimator, diagnostics_period_s=0.1)
+    reset = line.driver.create_client(Trigger, "estimator/reset")
+    line.wait(reset.service_is_ready)
+    for _ in range(3):
+        line.wait(reset.call_async(Trigger.Request()).done)
+    line.told.clear()
+    line.wait(lambda: len(line.told) > 1)
+    assert line.values["resets"] == "3"
+    assert line.last.message.endswith("no estimate yet"), "and no word of resets"
