@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterable, Sequence
 from functools import partial
@@ -139,6 +140,18 @@ def test_the_first_mistaken_message_is_flagged_with_the_remedy(make_line: MakeLi
     assert last(line).level == DiagnosticStatus.WARN
     assert remedy in last(line).message
     assert "(1 so far)" in last(line).message
+
+
+def test_each_sensor_has_a_count_of_its_own(make_line: MakeLine) -> None:
+    line = make_line()
+    for _ in range(3):
+        line.send(topics.POSITION, messages.position(S, math.nan, 0.5))
+    line.send(topics.SPEED, messages.speed(S, math.nan, 0.1))
+    line.hear_all()
+    remedy = "give a finite number, or publish nothing while there is none"
+    for topic, count in (("position", 3), ("speed", 1)):
+        assert f"{topic}: message refused: {topic} x = nan: {remedy} ({count} so far)" in last(line).message
+    assert line.values()["dropped.NOT_FINITE"] == "4"
 
 
 def test_a_gauge_pressure_shows_while_the_brake_is_released(make_line: MakeLine) -> None:

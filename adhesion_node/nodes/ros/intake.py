@@ -84,13 +84,13 @@ class Intake:
         self._reader.line = line
         self._hearing.silence.change(timeout_s)
 
-    def note(self, reason: str, text: str) -> None:
-        """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of a reason is told at once."""
-        self._counts[reason] += 1
-        count = self._counts[reason]
-        self._refusals[reason] = f"{text} ({count} so far)"
+    def note(self, what: str, text: str) -> None:
+        """Keep what went wrong for the next report; the 1st, 2nd, 4th, 8th ... of `what` is told at once."""
+        self._counts[what] += 1
+        count = self._counts[what]
+        self._refusals[what] = f"{text} ({count} so far)"
         if count & (count - 1) == 0:
-            self._node.get_logger().warning(self._refusals[reason])
+            self._node.get_logger().warning(self._refusals[what])
             self._listener.report()
 
     def tell(self, event: str) -> None:
@@ -132,7 +132,7 @@ class Intake:
                 self._heard(topic, str(refusal) if refusal.reason not in ALIVE else "")
                 self._listener.refuse(topic, refusal)
                 if refusal.reason not in AS_WANTED:  # nothing is wrong: it is counted
-                    self.note(refusal.reason, f"{topic.name}: message refused: {refusal}")
+                    self.note(f"{topic.name} {refusal.reason}", f"{topic.name}: message refused: {refusal}")
             else:
                 outputs, events = self._listener.take(sample)
                 self._heard(topic, next((str(event) for event in events if event.outcome in KEPT_OUT), ""))
