@@ -57,6 +57,8 @@ class Setting(NamedTuple):
         """
         kind: Any = type(self.default)
         what = f"{owner}{self.name} = {value!r}"
+        if isinstance(value, float) and str(value) in self.choices:
+            return str(value)  # YAML takes the words nan and inf for numbers
         accepted = {float: Real, int: Integral}.get(kind, kind)  # numbers of numpy are numbers
         if not isinstance(value, accepted) or (isinstance(value, bool) and kind is not bool):
             raise ValueError(f"{what}: give a value of type {kind.__name__} ({self.allowed()})")

@@ -175,6 +175,14 @@ def test_what_a_scenario_does_not_heed_is_refused(context: Context, given: dict[
         _simulator(context, **given)
 
 
+@pytest.mark.parametrize("fault", ["nan", "inf"])
+def test_a_fault_whose_name_is_a_number_to_yaml_is_taken(context: Context, fault: str) -> None:
+    node = Simulator(paced=False, context=context, cli_args=["--ros-args", "-p", f"fault:={fault}"])
+    assert node.values["fault"] == fault
+    assert node.get_parameter("fault").value == fault
+    _destroy(node)
+
+
 def test_same_seed_same_messages_another_seed_others(context: Context, sent: Sent) -> None:
     runs = []
     for seed in (5, 5, 6):
