@@ -52,6 +52,8 @@ class Fault:
     sensors: Callable[[SensorSettings, Dose], SensorSettings] = _same
     rate_hz: float | None = None
     """Rate of the run where the fault needs one of its own."""
+    of: str = ""
+    """The setting by which the sensor is there that the fault is of, where it may be absent."""
 
 
 def _graded(scenario: Scenario, dose: Dose) -> Scenario:
@@ -68,6 +70,8 @@ def _heavy_tailed(settings: SensorSettings, dose: Dose) -> SensorSettings:
 
 
 _RARELY = Dose(share=0.1)
+
+_SPEED, _WHEELS = "speed_std_mps", "wheel_speed_std_radps"
 
 FAULTS: Mapping[str, Fault] = {
     NONE: Fault("all is well"),
@@ -102,10 +106,12 @@ FAULTS: Mapping[str, Fault] = {
     "mass": Fault("a train of another mass", Dose(size=1.1), "times its mass", scenario=_loaded),
     "balise_step": Fault("positions moved from one on", Dose(size=2.0), "m", streams.shifted),
     "wrong_frame": Fault("positions in another frame", stream=streams.misframed),
-    "kmh": Fault("speeds in km/h", stream=streams.in_kmh),
-    "speed_zero": Fault("speeds of 0, as of a receiver without satellites", stream=streams.standing),
-    "wheels_silent": Fault("wheels that show a standstill", Dose(size=0.5), "of the axles", streams.silent),
-    "wheels_stuck": Fault("one speed of each wheel again and again, freshly stamped", stream=streams.wheels_stuck),
+    "kmh": Fault("speeds in km/h", stream=streams.in_kmh, of=_SPEED),
+    "speed_zero": Fault("speeds of 0, as of a receiver without satellites", stream=streams.standing, of=_SPEED),
+    "wheels_silent": Fault("wheels that show a standstill", Dose(size=0.5), "of the axles", streams.silent, of=_WHEELS),
+    "wheels_stuck": Fault(
+        "one speed of each wheel again and again, freshly stamped", stream=streams.wheels_stuck, of=_WHEELS
+    ),
     "gauge": Fault("gauge for absolute pressures", stream=streams.gauge),
 }
 """The faults by name."""

@@ -79,6 +79,9 @@ class Simulator(RunNode):
         self._refuse((SENSORS,), "are those of a real train: leave them out, or choose a scenario of one")
         if self.values["fault"] == NONE:
             self._refuse(FAULT, "nothing goes wrong without `fault`: name one, or leave this out")
+        sensor = FAULTS[self.values["fault"]].of
+        if sensor and not self.values[sensor]:
+            raise ValueError(f"fault = {self.values['fault']!r}: there is no such sensor: give {sensor} above 0")
 
     def _refuse(self, settings: Sequence[Setting], why: str) -> None:
         for one in settings:

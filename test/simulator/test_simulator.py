@@ -168,6 +168,16 @@ def test_a_real_train_keeps_the_pace_of_its_clock(
         ),
         ({"sensors": "full"}, "sensors = 'full': are those of a real train: leave them out, or choose a scenario of"),
         ({"fault_size": 3.0}, r"fault_size = 3\.0: nothing goes wrong without `fault`: name one, or leave this out"),
+        ({"fault": "kmh"}, "fault = 'kmh': there is no such sensor: give speed_std_mps above 0"),
+        ({"fault": "speed_zero"}, "fault = 'speed_zero': there is no such sensor: give speed_std_mps above 0"),
+        (
+            {"fault": "wheels_silent", "speed_std_mps": 0.1},
+            "fault = 'wheels_silent': there is no such sensor: give wheel_speed_std_radps above 0",
+        ),
+        (
+            {"fault": "wheels_stuck"},
+            "fault = 'wheels_stuck': there is no such sensor: give wheel_speed_std_radps above 0",
+        ),
     ],
 )
 def test_what_a_scenario_does_not_heed_is_refused(context: Context, given: dict[str, Any], said: str) -> None:
