@@ -80,11 +80,13 @@ def test_tools_see_unit_range_and_choices(make: Make) -> None:
 
 
 def test_a_typo_is_named_with_the_nearest_parameter(make: Make) -> None:
-    given = {"start_nu": 0.1, "zzz": 1, "use_sim_time": True, "qos_overrides./position.subscription.depth": 5}
+    typos = {"start_nu": 0.1, "zzz": 1, "use_simtime": True}
+    given = {**typos, "use_sim_time": True, "qos_overrides./position.subscription.depth": 5}
     node = make(given)
     declare(node, SPECS)
     assert sorted(unknown(node, SPECS)) == [
         "start_nu = 0.1: probe has no such parameter; did you mean start_mu?",
+        "use_simtime = True: probe has no such parameter; did you mean use_sim_time?",
         "zzz = 1: probe has no such parameter",
     ]
 

@@ -175,11 +175,11 @@ def unknown(node: Node, settings: Sequence[Setting]) -> list[str]:
 
     Only a warning: `-p` and the wildcard `/**` of a YAML file reach every node of a process.
     """
-    names = [setting.name for setting in settings]
+    names = [*_OF_RCLPY, *(setting.name for setting in settings)]
     return [
         _no_such(node, node.get_parameter(name), names)
         for name in node.list_parameters([], 0).names
-        if not name.startswith(_OF_RCLPY_QOS) and name not in (*names, *_OF_RCLPY)
+        if not name.startswith(_OF_RCLPY_QOS) and name not in names
     ]
 
 
