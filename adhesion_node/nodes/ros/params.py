@@ -191,7 +191,7 @@ def misplaced(node: Node) -> list[str]:
     names = [node.resolve_topic_name(topic.name) for topic in TOPICS]
     given = ((name, _QOS.fullmatch(name)) for name in node.list_parameters([], 0).names)
     return [
-        f"{name}: {node.get_name()} has no such topic{_hint(topic[1], names)}"
+        f"{name}: {node.get_name()} has no such topic{hint(topic[1], names)}"
         for name, topic in given
         if topic and topic[1] not in names
     ]
@@ -204,9 +204,10 @@ def _given(node: Node, setting: Setting) -> object:
 
 
 def _no_such(node: Node, given: Parameter, names: Sequence[str]) -> str:
-    return f"{given.name} = {given.value!r}: {node.get_name()} has no such parameter{_hint(given.name, names)}"
+    return f"{given.name} = {given.value!r}: {node.get_name()} has no such parameter{hint(given.name, names)}"
 
 
-def _hint(name: str, names: Sequence[str]) -> str:
+def hint(name: str, names: Sequence[str]) -> str:
+    """Ask whether the nearest of the names is meant, if one is near."""
     close = get_close_matches(name, names, n=1)
     return f"; did you mean {close[0]}?" if close else ""

@@ -33,6 +33,7 @@ from adhesion_node.command.signals import StopRequest, stop_on_signals
 from ...command.options import BAD_INPUT, DONE, FAILED, complain, complete, help_texts, version_option
 from ...core.setting import Setting, by_group
 from ...wire.files.parameters import unheeded, without_value
+from .remapped import misnamed
 
 POLL_S = 0.1
 """Longest time until a signal is seen: no signal interrupts rclpy's wait."""
@@ -142,7 +143,7 @@ def _start_and_spin(program: str, make_node: Callable[[], Node], ros: list[str],
         node = make_node()
     except _BAD_START as error:
         return complain(program, _named(error, ros), BAD_INPUT)
-    for warning in unheeded(ros, node.get_fully_qualified_name()):
+    for warning in (*unheeded(ros, node.get_fully_qualified_name()), *misnamed(ros, node)):
         node.get_logger().warning(warning)
     executor = SingleThreadedExecutor()
     executor.add_node(node)

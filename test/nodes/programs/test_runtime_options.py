@@ -72,6 +72,27 @@ def test_a_parameter_file_without_parameters_is_told(start: Start, tmp_path: Pat
     assert f"params = {file}: not a readable ROS parameter file: it is to hold, one in the other, NODE" in errors
 
 
+@pytest.mark.parametrize(
+    ("rules", "told"),
+    [
+        (("positon:=/gnss",), "-r positon:=/gnss: probe has no topic /positon; did you mean /position?"),
+        (
+            ("__ns:=/train1", "/position:=/gnss"),
+            "-r /position:=/gnss: probe has no topic /position; did you mean /train1/position?",
+        ),
+        (("probe:zzz:=/gnss",), "-r probe:zzz:=/gnss: probe has no topic /zzz"),
+        (("__ns:=/train1", "position:=/gnss", "/train1/imu:=/imu/data"), ""),
+        (("rosservice://~/reset:=/again", "probe/reset:=/again", "other:zzz:=/gnss", "/clock:=/time"), ""),
+    ],
+)
+def test_a_topic_that_is_remapped_but_not_there_is_told(start: Start, rules: tuple[str, ...], told: str) -> None:
+    """ROS takes it without a word, and a sensor that may be missing is missed for ever."""
+    given = [word for rule in rules for word in ("-r", rule)]
+    code, errors = end(start("--ros-args", *given, TASK="finish"))
+    assert code == 0
+    assert [line.partition("]: ")[2] for line in errors if "has no topic" in line] == ([told] if told else [])
+
+
 @pytest.mark.parametrize("value", ["{}", "[]"])
 def test_a_parameter_without_a_value_is_named(start: Start, tmp_path: Path, value: str) -> None:
     file = tmp_path / "parameters.yaml"
