@@ -9,6 +9,7 @@
 
 """What of a path is a recording: a file, or those of a directory, some of them compressed as a whole."""
 
+import os
 from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -38,6 +39,7 @@ def open_recording(path: Path, metadata: Metadata) -> Recording:
 
 def _open_directory(path: Path, metadata: Metadata) -> Recording:
     """Open what is there: the metadata is only asked for what the files cannot tell."""
+    os.scandir(path).close()  # raises where it may not be read, which glob takes for empty
     files = next(filter(None, (_numbered(path, kind) for kind in KINDS)), None)
     if files is None:
         inner = sorted(file.parent for kind in KINDS for file in path.glob(f"*/*{kind}*"))

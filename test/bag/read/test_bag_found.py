@@ -10,7 +10,10 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from recorded import write_steps
@@ -57,6 +60,15 @@ def test_directories_without_a_recording_are_refused(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match=r"missing: does not exist: name a rosbag2 directory"):
         BagReader(tmp_path / "missing")
     with pytest.raises(ValueError, match=r"holds no \.mcap or \.db3 file"):
+        BagReader(tmp_path)
+
+
+def test_a_folder_that_may_not_be_read_is_not_told_to_be_empty(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(path: Any) -> None:
+        raise PermissionError(errno.EACCES, "Permission denied", str(path))
+
+    monkeypatch.setattr(os, "scandir", refuse)
+    with pytest.raises(PermissionError, match="Permission denied"):
         BagReader(tmp_path)
 
 
