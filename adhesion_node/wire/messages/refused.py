@@ -44,7 +44,8 @@ class Reason(Enum):
     WRONG_FRAME = "set header.frame_id, or the reader's parameter frame, so that both agree"
     NOT_FINITE = "give a finite number, or publish nothing while there is none"
     BAD_VARIANCE = (
-        f"give covariance[0] in SI units squared, {MIN_VARIANCE_M2:g} to {MAX_VARIANCE_M2:g}, or 0 where unknown"
+        f"give covariance[0] in SI units squared, {MIN_VARIANCE_M2:g} to {MAX_VARIANCE_M2:g};"
+        " a sensor's position may have 0 where unknown"
     )
     IMPLAUSIBLE_POSITION = f"position is in m along the track, within +-{MAX_POSITION_M:g}"
     NO_FIX = "the receiver has no fix: nothing is used until it has one"

@@ -152,6 +152,7 @@ def test_an_estimated_state_tells_how_sure_it_is(part: str, variance: float, rea
     with pytest.raises(Rejected, match=r"(position|speed) covariance\[0\] = ") as refusal:
         topics.STATE.read(message)
     assert refusal.value.reason == reason
+    assert "or 0 where unknown" not in str(refusal.value), "0 is what is refused here"
     if variance == 0.0:  # what a simulator knows is exact
         assert topics.TRUTH_STATE.read(message).speed_mps == 70.0
 
