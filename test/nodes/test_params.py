@@ -51,7 +51,7 @@ def test_given_values_win_and_an_integer_serves_for_a_float(make: Make, automati
         ("law", "muddy", r"law = 'muddy': choose one of dry, wet"),
         ("law", 1, r"law = 1: give a value of type str \(one of dry, wet\)"),
         ("verbose", 1, r"verbose = 1: give a value of type bool \(true or false\)"),
-        ("output", 5, r"output = 5: give a value of type str \(a text\)"),
+        ("output", 5, r"output = 5: give a value of type str \(a text\): in quotes that reach ROS, -p output:=\"'5'\""),
     ],
 )
 def test_a_bad_value_is_refused_with_name_value_and_what_is_allowed(

@@ -123,7 +123,7 @@ def declare(
     defaults = {one.name: one.default for one in settings}
     given = {one.name: node.get_parameter(one.name).value for one in settings if node.has_parameter(one.name)}
     settings = settings if preset is None else preset(settings, given)
-    values = {setting.name: setting.check(_given(node, setting)) for setting in settings}
+    values = {setting.name: _checked(setting, _given(node, setting)) for setting in settings}
     for name in values:  # an integer may have been given for a float
         node.set_descriptor(name, ParameterDescriptor(dynamic_typing=True))
     node.set_parameters([Parameter(name, value=value) for name, value in values.items()])
@@ -201,6 +201,16 @@ def _given(node: Node, setting: Setting) -> object:
     if node.has_parameter(setting.name):  # declared from what the node was given
         return node.get_parameter(setting.name).value
     return node.declare_parameter(setting.name, setting.default, ParameterDescriptor(dynamic_typing=True)).value
+
+
+def _checked(setting: Setting, given: Any) -> Any:
+    """Check it; of a text that YAML has taken for a number say how to give it: a shell takes its quotes away."""
+    try:
+        return setting.check(given)
+    except ValueError as error:
+        if type(setting.default) is not str or setting.choices or isinstance(given, str):
+            raise
+        raise ValueError(f"{error}: in quotes that reach ROS, -p {setting.name}:=\"'{given}'\"") from None
 
 
 def _no_such(node: Node, given: Parameter, names: Sequence[str]) -> str:
