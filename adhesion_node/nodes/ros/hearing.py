@@ -21,7 +21,7 @@ from adhesion_node.core.atp.supervision import Severity
 from adhesion_node.run.reader import Reader
 from adhesion_node.wire.settings.sensing import USE
 from adhesion_node.wire.topic import Topic
-from adhesion_node.wire.topics import POSITION, SPEED, WHEEL_SPEED
+from adhesion_node.wire.topics import POSITION, POSITIONS, SPEED, WHEEL_SPEED
 
 from .diagnostics import Finding
 from .silence import Moment, Silence
@@ -99,13 +99,21 @@ class Hearing:
         gone_s = {topic: age_s for topic, age_s in ages_s.items() if age_s is not None and age_s < math.inf}
         if not (gone_s or self.silence.ever_heard or any(map(self._unusable.get, self._watched))):
             publishers = sum(map(self._node.count_publishers, self.awaited))
-            remedy = "is the sensor running, its topic remapped?"
+            remedy = f"is the sensor running, its topic remapped?{self._instead()}"
             return f"{' or '.join(self.awaited)}: nothing received yet, publishers: {publishers}: {remedy}"
         text = self._nothing(((*self._watched, *gone_s), min(gone_s.values(), default=for_s)))
         source, others = self._reader.source, [topic for topic in self._reader.anchors if self._comes(topic)]
         if source is None or not others:
             return text
         return f"{text}; {others[0].name} comes but is not used: set {USE}{source.name} to false, or call ~/reset"
+
+    def _instead(self) -> str:
+        """Say which other source of the position is published, and what keeps it from being one."""
+        watched = self._watched[0] in POSITIONS
+        others = [self._node.resolve_topic_name(one.name) for one in POSITIONS if watched and one not in self._watched]
+        named = "track_line" if self._reader.line.position_source == "auto" else "position_source"
+        published = filter(self._node.count_publishers, others)
+        return next((f" {name} is published but not used: set {named}" for name in published), "")
 
     def _nothing(self, *silent: tuple[Sequence[Topic], float]) -> str:
         """Say of topics for how long nothing has come of any of them; the remedy stands once."""

@@ -27,6 +27,7 @@ from told_line import Line, S, make_line
 
 from adhesion_node.nodes.creep_estimator import CreepEstimator
 from adhesion_node.nodes.estimator import Estimator
+from adhesion_node.nodes.ros import qos
 from adhesion_node.nodes.ros.types import new
 from adhesion_node.wire import topics
 
@@ -68,6 +69,20 @@ def test_what_a_train_is_followed_by_without_a_position_may_die(make_line: Calla
         while_sending(line, send, "the train is followed by its speed or its wheels", level=DiagnosticStatus.WARN)
         silent = f"/position or /odometry or /{by.name}: nothing for ", "is the sensor alive?"
         while_sending(line, lambda _: None, *silent, level=DiagnosticStatus.STALE)
+
+
+@pytest.mark.parametrize(
+    ("topic", "given", "missing"),
+    [(topics.FIX, {}, "track_line"), (topics.ODOMETRY, {"position_source": "position"}, "position_source")],
+)
+def test_another_source_that_is_published_is_told_with_what_it_lacks(
+    make_line: Callable[..., Line], topic: Any, given: dict[str, Any], missing: str
+) -> None:
+    line = make_line(Estimator, **QUICK, **given)
+    output = qos.advertise(line.driver, topic)
+    line.wait_until_said(f"remapped? /{topic.name} is published but not used: set {missing}")
+    assert line.last.level == DiagnosticStatus.STALE
+    assert output.get_subscription_count() == 0
 
 
 def test_a_position_that_is_switched_off_is_silent(make_line: Callable[..., Line]) -> None:
