@@ -33,7 +33,7 @@ from adhesion_node.wire.topic import Topic
 
 from . import qos
 from .diagnostics import Diagnostics, Finding, Told
-from .intake import Intake
+from .listening.intake import Intake
 from .managed import ManagedNode
 from .params import current, declare
 from .types import new

@@ -23,8 +23,8 @@ from adhesion_node.wire.line import Line
 from adhesion_node.wire.messages.refused import Reason, Rejected
 from adhesion_node.wire.topic import Topic
 
-from . import qos
-from .diagnostics import Finding, doubled, unlike
+from .. import qos
+from ..diagnostics import Finding, doubled, unlike
 from .hearing import Hearing
 
 AS_WANTED = (Reason.OTHER_SOURCE.name, Reason.SWITCHED_OFF.name)

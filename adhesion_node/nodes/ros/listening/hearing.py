@@ -23,7 +23,7 @@ from adhesion_node.wire.settings.sensing import USE
 from adhesion_node.wire.topic import Topic
 from adhesion_node.wire.topics import POSITION, POSITIONS, SPEED, WHEEL_SPEED
 
-from .diagnostics import Finding
+from ..diagnostics import Finding
 from .silence import Moment, Silence
 
 BY_SPEED = "no position: the train is followed by its speed or its wheels alone, wherever it is on the track"
