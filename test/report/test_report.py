@@ -13,62 +13,20 @@ from __future__ import annotations
 import json
 import os
 import re
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
 import pytest
-from rclpy.serialization import serialize_message
-from slowing import START_NS, TRUTH, S, record, rows, undrawn
-from std_msgs.msg import Float64
+from reported import Parser, lines, make
+from slowing import TRUTH, record, undrawn
 from test_offline import samples, write_run
 
-from adhesion_node.bag import BagReader, BagWriter, deserialize, serialize
-from adhesion_node.bag.types import Definition
 from adhesion_node.nodes import replay
 from adhesion_node.report.__main__ import main
-from adhesion_node.wire.topic import Topic
-from adhesion_node.wire.topics import BRAKE_PRESSURE, TRUTH_MU
 
 __all__ = ["undrawn"]
 
 QUICK = ("--set", "estimate_s=1.0")
-
-
-class Parser(HTMLParser):
-    """Collects texts, the embedded data, and every attribute that could fetch something."""
-
-    def __init__(self, html: str) -> None:
-        super().__init__()
-        self.texts: list[str] = []
-        self.fetched: list[str] = []
-        self._inside = ""
-        self.data: dict[str, Any] = {}
-        self.feed(html)
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._inside = tag if tag in ("script", "style") else self._inside
-        if tag == "script" and ("id", "data") in attrs:
-            self._inside = "data"
-        asked = [name for name, value in attrs if not str(value).startswith("data:")]
-        self.fetched += [f"{tag} {name}" for name in asked if name in ("src", "href", "srcset", "action")]
-        self.fetched += [tag] if tag in ("iframe", "object", "base") else []
-
-    def handle_endtag(self, tag: str) -> None:
-        self._inside = "" if tag in ("script", "style") else self._inside
-
-    def handle_data(self, data: str) -> None:
-        if self._inside == "data":
-            self.data = json.loads(data)
-        elif not self._inside and data.strip():
-            self.texts.append(data.strip())
-
-
-def make(tmp_path: Path, *arguments: str) -> tuple[dict[str, Any], Parser]:
-    """Run the command; return its JSON and the page."""
-    result = tmp_path / "result.json"
-    assert main([*arguments, "--output", str(tmp_path / "report"), "--json", str(result)]) == 0
-    return json.loads(result.read_text()), Parser((tmp_path / "report" / "report.html").read_text(encoding="utf-8"))
 
 
 def test_a_name_of_bytes_that_are_no_text_is_escaped(tmp_path: Path) -> None:
@@ -77,12 +35,6 @@ def test_a_name_of_bytes_that_are_no_text_is_escaped(tmp_path: Path) -> None:
     result, page = make(tmp_path, str(named))
     assert result["runs"][0]["name"] == "t\\udcff"
     assert "t\\udcff" in " ".join(page.texts)
-
-
-def lines(run: dict[str, Any], title: str) -> dict[str, dict[str, Any]]:
-    """Return the lines of the chart whose title begins so, by their labels."""
-    (chart,) = (chart for chart in run["charts"] if chart["title"].startswith(title))
-    return {line["label"]: line for line in chart["lines"]}
 
 
 @pytest.fixture(scope="module")
@@ -132,54 +84,6 @@ def test_of_sensors_alone_the_results_are_those_of_an_offline_replay(tmp_path: P
     assert last["safe"]["y"][-1] == 0.0
 
 
-@pytest.mark.usefixtures("undrawn")
-def test_what_a_replay_remarks_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Half of the pressures are in bar, and so refused; the train slows by more than its brake."""
-
-    def in_bar(topic: Topic, index: int, cdr: bytes) -> bytes:
-        message = deserialize(cdr, topic.type)
-        if topic is BRAKE_PRESSURE and index % 2:
-            message.fluid_pressure /= 1e5
-        return serialize(message, topic.type)
-
-    write_run(tmp_path / "bag", samples(), edit=in_bar)
-    weak = (*QUICK, "--set", "train.mass_kg=1500e3")
-    replay.main([str(tmp_path / "bag"), "--offline", *weak])
-    replayed = capsys.readouterr().err.splitlines()
-    make(tmp_path, str(tmp_path / "bag"), *weak)
-    assert capsys.readouterr().err.splitlines() == [line.replace("replay: ", "report: bag: ", 1) for line in replayed]
-    refused, brake = replayed
-    assert "IMPLAUSIBLE_PRESSURE: brake_pressure: fluid_pressure = " in refused
-    assert "check the units of speed and pressure, and the train (--train)" in brake
-
-
-@pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize("results", [True, False])
-def test_messages_that_do_not_decode_are_left_out_and_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], results: bool
-) -> None:
-    if results:
-        record(tmp_path / "whole")
-    else:
-        write_run(tmp_path / "whole", samples(16.0, 24.0))
-    spoilt: set[str] = set()
-    with BagReader(tmp_path / "whole") as reader, BagWriter(tmp_path / "bag") as writer:
-        for one in reader.messages():
-            last = one.topic in spoilt or one.log_ns < START_NS + 5 * S
-            writer.write(one.topic, one.type, one.cdr if last else b"\0\1\0\0\xff", one.log_ns)
-            spoilt |= set() if last else {one.topic}
-        writer.add_topic("/odd", TRUTH_MU.type, known_as=Definition("ros2msg", "int8 data"))
-        writer.write("/odd", TRUTH_MU.type, b"\0\1\0\0\7", 0)
-    result, _ = make(tmp_path, str(tmp_path / "bag"), *(() if results else QUICK))
-    assert result["runs"][0]["source"] == "as recorded" if results else "estimated from the recorded sensors"
-    told = [line for line in capsys.readouterr().err.splitlines() if line.startswith("report: ")]
-    assert len(spoilt) > 3
-    odd = f"recorded with another definition of {TRUTH_MU.type} (its fields are int8 data, ours float64 data)"
-    told.remove(f"report: bag: topic /odd: {odd}: 1 messages are left out")
-    assert set(told) <= {f"report: {topic}: 1 messages do not decode and are left out" for topic in spoilt}
-    assert len(told) >= 3
-
-
 def test_results_are_estimated_anew_on_demand(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bag = record(tmp_path / "mine")  # without positions: as recorded it can be shown
     report = tmp_path / "new" / "report"
@@ -206,35 +110,6 @@ def test_recordings_stand_side_by_side_under_their_own_names(tmp_path: Path) -> 
     assert ["true" in lines(run, "Adhesion") for run in page.data["runs"]] == [True, False]
     assert page.data["target_kmh"] == 180.0
     assert all(Path(path).is_file() for run in result["runs"] for path in run["pictures"])
-
-
-def test_a_recorded_number_that_is_none_leaves_a_gap(tmp_path: Path) -> None:
-    with BagWriter(tmp_path / "bag") as writer:
-        for second in range(20):
-            for topic, cdr in rows(second):
-                broken = topic is TRUTH_MU and second == 7
-                cdr_ = serialize_message(Float64(data=float("nan"))) if broken else cdr
-                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr_, START_NS + second * S)
-    _, page = make(tmp_path, str(tmp_path / "bag"))
-    values = lines(page.data["runs"][0], "Adhesion")["true"]["y"]
-    assert [second for second, value in enumerate(values) if value is None] == [7]
-
-
-@pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize("text", ["high", "", "inf", "\u00b2", "9" * 5000])
-def test_what_should_be_a_number_and_is_none_is_told(
-    text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    told = dict.fromkeys(("confidence", "dropped.LATE", "changes", "stamp_ns"), text) | {"dropped.OLD": "2"}
-    with BagWriter(tmp_path / "bag") as writer:
-        for second in range(20):
-            for topic, cdr in rows(second, **(told if second > 10 else {})):
-                writer.write(f"/{topic.name.lstrip('/')}", topic.type, cdr, START_NS + second * S)
-    result, _ = make(tmp_path, str(tmp_path / "bag"))
-    assert result["runs"][0]["dropped"] == {"OLD": 2}
-    (line,) = capsys.readouterr().err.splitlines()
-    odd = ", ".join(f"{key} = {text[:20]!r}" for key in ("confidence", "dropped.LATE"))
-    assert line == f"report: bag: its diagnostics tell no number: {odd}: left out"
 
 
 @pytest.mark.usefixtures("undrawn")
@@ -275,31 +150,3 @@ def test_a_name_cannot_break_the_page(tmp_path: Path) -> None:
     _, page = make(tmp_path, str(record(tmp_path / "<b>&amp;<script>")))
     assert page.data["runs"][0]["name"] == "<b>&amp;<script>"
     assert "<b>&amp;<script>" in page.texts
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["nowhere"], "does not exist"),
-        (["mine", "--target", "-1"], "target = -1.0: give"),
-        (["mine", "--set", "windov=3"], "windov"),
-        (["mine", "--low", "0.05"], "--low 0.05: is for tables of brakings, not for recordings: leave it out"),
-        (
-            ["mine", "--set", "start_mu=0.1"],
-            "--set start_mu=0.1: results are shown as recorded: add --esti",
-        ),
-        (["mine", "--seed", "1"], "--seed 1: results are shown as recorded: add --estimate, or leave this out"),
-        (["mine", "--remap", "/a:=position"], "--remap /a:=position: results are shown as recorded: add --est"),
-        (["mine", "--node", "/a"], "--node /a: says whose of --params: add that, or leave this out"),
-    ],
-)
-def test_bad_input_is_one_line_and_leaves_nothing(
-    arguments: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    record(tmp_path / "mine")
-    assert main([*arguments, "--output", "report"]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("report: ")
-    assert said in line
-    assert not (tmp_path / "report").exists()
