@@ -22,6 +22,7 @@ from .bank.steps import Stepping
 from .belief.gaussian import Gaussian
 from .belief.rail import Rail
 from .belief.rail_map import Way
+from .belief.regime import Regime
 from .config import Config
 from .estimate import Estimate, estimate_of, unknown
 from .intake.outcome import ACCEPTED, TICK, Event, Outcome, counted
@@ -81,7 +82,9 @@ def _followed(config: Config, state: State, measurement: Measurement) -> tuple[S
     off = off._replace(tells=stepping.tells(config, measurement, off))
     if elsewhere or (measurement.has_position and doubted) or off.nearest > config.gate_sigma:
         if memory.braked and not doubted:  # one that may have stepped far tells nothing
-            memory = memory._replace(course=memory.course.outlying(measurement.t_ns, off.stds, off.tells))
+            rolled_m = measurement.position_m if memory.is_rolled else None
+            course = memory.course.outlying(measurement.t_ns, off.stds, off.tells, rolled_m)
+            memory = memory._replace(course=course)
         state = state._replace(stepping=stepping)
         elsewhere = elsewhere or (state.outliers + 1 >= config.max_outliers and not doubted)
         return _unbelieved(config, state, memory, measurement, off, elsewhere, rail)
@@ -174,7 +177,8 @@ def _told(config: Config, state: State) -> tuple[State, Estimate]:
     if memory.braked:  # the bound alone: what is told of mu would be taken for this train's own, and told again
         before = before._replace(lower=max(before.lower, _informed(config, before, newest.t_ns, belief).lower))
     findings = found(config, memory, before, nothing)
-    scale_mps = state.odometer.scale_error(memory.course.wandering) * float(belief.mean[1])
+    creeps = findings.regime is Regime.ADHESION_LIMITED and not memory.wheels.radii.is_learnt
+    scale_mps = state.odometer.scale_error(memory.is_rolled, creeps) * float(belief.mean[1])
     told = Gaussian(belief.mean, belief.covariance + SPEED_ERROR + np.diag([0.0, scale_mps**2]))
     verdict = _verdict(memory, findings, told, memory.changes > knowledge.changes)
     knowledge = knowledge.after(newest.t_ns, verdict, findings.known)

@@ -25,7 +25,6 @@ from .following import followed
 from .layout import RADIUS, SIZE, SPEED, Bank
 from .memory import Memory
 from .sensors.odometer import SCALE
-from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -92,7 +91,7 @@ def by_wheels(before: Memory, memory: Memory, axles_own: bool) -> Memory | None:
     """
     if before.aside or not (axles_own or memory.misled) or not _leads(before):
         return None
-    course = Course(wandering=before.course.wandering.unseen())
+    course = before.course.forgotten()
     return before._replace(bank=unscaled(before.bank), pointing=memory.pointing, course=course, aside=True)
 
 

@@ -20,7 +20,6 @@ from .free import by_noise, closed
 from .labels.kinds import STEADY
 from .layout import MU, POSITION, ROUGH, SPEED, Bank
 from .memory import Memory, steps
-from .sensors.plausible import Course
 
 if TYPE_CHECKING:
     from ..config import Config
@@ -50,9 +49,7 @@ def led_again(memory: Memory) -> Memory:
     """The brake is released, no wheel slides any more: positions count again, wherever they say that the train is."""
     bank = closed(memory.bank)
     bank = bank.with_fresh(POSITION, bank.mean[:, POSITION], math.sqrt(MAX_VARIANCE_M2))
-    return memory._replace(
-        bank=bank, misled=False, aside=False, course=Course(wandering=memory.course.wandering.unseen())
-    )
+    return memory._replace(bank=bank, misled=False, aside=False, course=memory.course.forgotten())
 
 
 def forwards(bank: Bank) -> Bank:

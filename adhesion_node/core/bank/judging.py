@@ -71,7 +71,8 @@ def judged(config: Config, memory: Memory, rail: Callable[[], Rail]) -> Memory:
     if not before:
         return _coasted(memory._replace(bank=held(bank)) if pressed else memory)
     if memory.asks:
-        if memory.course.is_impossible(config, bank, memory.declared_m, memory.coarse.std_m):
+        errors = memory.declared_m, memory.coarse.std_m, memory.is_rolled
+        if memory.course.is_impossible(config, bank, *errors, memory.braking.applied):
             return misled(config, memory)
         if memory.braking.told:
             bank = wheels_seen(config, bank, memory.braking, memory.since_s).normalised()

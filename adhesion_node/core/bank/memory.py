@@ -119,6 +119,11 @@ class Memory(NamedTuple):
         return bool(self.bank.covariance[0, POSITION, POSITION] < 0.5 * MAX_VARIANCE_M2)
 
     @property
+    def is_rolled(self) -> bool:
+        """Whether the positions are a wheel's: they hardly wander, hardly scatter, or come in its pulses."""
+        return self.course.wandering.is_rolled or self.course.rolling.is_known or self.coarse.are_pulses
+
+    @property
     def is_dark(self) -> bool:
         """Whether no position tells how fast the train is: then nothing tells what the scale of its speed is off by.
 

@@ -16,6 +16,10 @@ from typing import NamedTuple
 STEPS_M = (100.0, 50.0, 25.0, 20.0, 10.0, 5.0, 2.5, 2.0, 1.0, 0.5, 0.25, 0.2)
 """Steps that positions mostly come in, the coarsest first; finer ones are within what any receiver errs by."""
 
+FINEST_M, ROUND_M = 0.05, (0.05, 0.0625, 0.03048, 0.1609344)
+"""The finest step that is looked for. One that is no multiple of 5 cm, 1/16 m, a tenth of a foot or 1/10000 mile is
+what a wheel rolls from pulse to pulse: nobody rounds so."""
+
 EXACT_M, SURE = 1e-4, 20
 """How far from a step none lies, and so many positions that lie on steps do so by no chance."""
 
@@ -50,9 +54,16 @@ class Coarse(NamedTuple):
         return Coarse(self.first_m, position_m, self.moves + 1, step_m, move_m)
 
     @property
+    def are_pulses(self) -> bool:
+        """Whether the positions are a wheel's, counted in pulses."""
+        if self.moves <= SURE or self.step_m == 0.0 or not math.isinf(self.move_m):
+            return False
+        return all(abs(self.step_m - unit * round(self.step_m / unit)) > 2 * EXACT_M for unit in ROUND_M)
+
+    @property
     def std_m(self) -> float:
         """Least standard deviation of a position; where a train ever moves by one length, by the usual step."""
-        if self.moves <= SURE or self.step_m == 0.0:
+        if self.moves <= SURE or self.step_m < STEPS_M[-1] - EXACT_M:
             return 0.0
         if math.isinf(self.move_m):
             return ROUNDED * self.step_m
@@ -68,4 +79,4 @@ def _common(step_m: float, way_m: float) -> float:
     length, rest = (way_m, 0.0) if math.isinf(step_m) else (max(step_m, way_m), min(step_m, way_m))
     while rest > EXACT_M:
         length, rest = rest, abs(length - rest * round(length / rest))
-    return length if length > STEPS_M[-1] - EXACT_M else 0.0
+    return length if length > FINEST_M - EXACT_M else 0.0

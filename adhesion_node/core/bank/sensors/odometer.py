@@ -17,8 +17,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from ...intake.samples import Measurement, WheelSample
 from ..gear.radii import LEARNING_MPS
 from ..gear.wheels import WheelsSeen
-from .plausible import strongest_mps2
-from .wandering import Wandering
+from .possible import strongest_mps2
 
 if TYPE_CHECKING:
     from ...config import Config
@@ -39,8 +38,9 @@ NOISY_MPS, QUIET_MPS = 0.5, 0.15
 """Standard deviations of that from which positions are no odometer's, and below which they may be: satellites that err
 by 0.1 m white differ by 0.3 m/s."""
 
-SCALE = 0.01
-"""Error of an odometer's scale: its wheel's radius is known no better."""
+SCALE, CREEP = 0.01, 0.03
+"""Error of an odometer's scale: its wheel's radius is known no better; and by how much more it errs where its axle
+slides so gently that nothing shows it."""
 
 MATCHED, MOST = 3.0, 6.5
 """Standard deviations within which positions go with an axle, and log odds that one look tells at most."""
@@ -78,13 +78,13 @@ class Odometer(NamedTuple):
         """Whether the positions are those of an axle."""
         return max(self.running, default=0.0) > FOUND
 
-    def scale_error(self, wandering: Wandering) -> float:
+    def scale_error(self, rolled: bool, creeps: bool) -> float:
         """Error of the speed that they tell, relative: what wheels roll as no receiver does may be an axle's own.
 
-        So may positions that hardly wander.
+        If they are known to be a wheel's, they are. Without wheels beside them, that one `creeps` where axles slide.
         """
         quiet = self.learnt >= LEAST_LEARNT and self.variance < QUIET_MPS**2
-        return SCALE if quiet or wandering.is_rolled else 0.0
+        return math.hypot(SCALE, CREEP * creeps) if rolled else SCALE if quiet else 0.0
 
     def after(
         self, config: Config, wheels: WheelsSeen, measurement: Measurement, braked: bool, hanging: tuple[int, ...] = ()

@@ -17,12 +17,15 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ...physics.train import GRAVITY, Array
+from ...physics.train import Array
 from ...quick import quick
 from ..kernels import parabola
 from ..labels import noises
-from ..layout import SPEED, Bank
+from ..layout import Bank
 from ..motion import white_variance
+from . import rolling
+from .possible import SURELY, Possible, possible_of
+from .rolling import Rolling
 from .wandering import Wandering
 
 if TYPE_CHECKING:
@@ -34,11 +37,8 @@ LOOKS_S, SPANNED, SIGMA = (3.0, 1.5), 0.8, 5.0
 """Times over which positions are looked at, the part of one that they must span, as the error is reckoned for all of
 it, and the standard deviations beyond which no train brakes so: twice a second for minutes four come by chance."""
 
-SPAN_NS, LEAST = round(max(LOOKS_S) * S), 8
+SPAN_NS, LEAST = round(max(rolling.LOOKS_S) * S), 8
 """Time of the positions that are kept, and how many must be looked at together."""
-
-BRAKE_ERROR, RESISTANCE_ERROR, GRADE_SIGMA = 1.15, 1.2, 2.0
-"""Factors on the full brake and the running resistance that are possible, and standard deviations of the grade."""
 
 WHITE, WANDERING = 720.0, 34.0
 """Variance of the deceleration of a parabola through n positions over a time T: so many times that of white errors over
@@ -56,8 +56,8 @@ by chance, however large, do not follow each other so, and those that wander are
 BURST_NS = 150_000_000
 """Positions not believed that follow each other sooner have one cause, as a signal that is reflected."""
 
-GAIN_MPS2, BRAKED_NS = 0.1, 3 * S
-"""A train that has been braked so long does not gain speed by more than this, and the grade's part."""
+BRAKED_NS = 3 * S
+"""A train that has been braked so long gains no speed."""
 
 
 @quick
@@ -70,6 +70,7 @@ class Course(NamedTuple):
     rolls_ns: int | None = None
     """... or since when it is not."""
     wandering: Wandering = Wandering()
+    rolling: Rolling = Rolling()
     stepped_ns: int = -SPAN_NS
     """Stamp of the last step of the positions, ..."""
     stepped_m: float = 0.0
@@ -99,22 +100,33 @@ class Course(NamedTuple):
         before_m = self.stepped_m if t_ns - self.stepped_ns < SPAN_NS else 0.0
         braked_ns, rolls_ns = (None if since_ns is None else t_ns for since_ns in (self.braked_ns, self.rolls_ns))
         stepped_m = before_m + abs(size_m)
-        return Course(self.recent, braked_ns, rolls_ns, self.wandering.unseen(), t_ns, stepped_m)
+        unseen = self.wandering.unseen(), self.rolling.unseen()
+        return Course(self.recent, braked_ns, rolls_ns, *unseen, t_ns, stepped_m)
+
+    def forgotten(self) -> Course:
+        """With what is known of how the positions err, alone."""
+        return Course(wandering=self.wandering.unseen(), rolling=self.rolling.unseen())
 
     def rolled(self, speed_mps: float) -> Course:
-        """With a look at how the positions of a train wander that no brake slows down."""
-        time, places = self._from_newest()
+        """With a look at how the positions of a train err that no brake slows down."""
+        time, places = self._from_newest(self.recent[-1][0] if self.rolls_ns is None else self.rolls_ns)
+        seen = self._replace(rolling=self.rolling.after(time, places, speed_mps))
         first = _seen(time, LOOKS_S[0])
-        if first is None or self.rolls_ns is None or self.recent[first][0] < self.rolls_ns:
-            return self._replace(wandering=self.wandering.unseen())
+        if first is None:
+            return seen._replace(wandering=self.wandering.unseen())
         slowing = -2.0 * parabola.curvature(time[first:], places[first:])
-        return self._replace(wandering=self.wandering.after(slowing, LOOKS_S[0] ** 3 / WANDERING, speed_mps))
+        return seen._replace(wandering=self.wandering.after(slowing, LOOKS_S[0] ** 3 / WANDERING, speed_mps))
 
-    def outlying(self, t_ns: int, off: float, tells: bool = True) -> Course:
-        """With a position that is not believed: such as come soon are of one burst."""
+    def outlying(self, t_ns: int, off: float, tells: bool = True, rolled_m: float | None = None) -> Course:
+        """With a position that is not believed: such as come soon are of one burst.
+
+        A wheel's that comes seldom and lies behind is looked at as the others are: it does not err by chance.
+        """
         if t_ns - self.heard_ns < BURST_NS:
             return self._replace(heard_ns=t_ns)
-        return self._running(t_ns, off, tells)
+        if rolled_m is None or off > 0.0 or len(self.recent) >= rolling.SELDOM:
+            return self._running(t_ns, off, tells)
+        return self._replace(recent=(*self.recent, (t_ns, rolled_m)))._running(t_ns, off, tells)
 
     def _running(self, t_ns: int, off: float | None, tells: bool) -> Course:
         if off is None:
@@ -128,16 +140,33 @@ class Course(NamedTuple):
         """Whether the positions under the brake run off in a way that none of the known errors does."""
         return self.running > RUNS_OFF
 
-    def is_impossible(self, config: Config, bank: Bank, declared_m: float, rounded_m: float = 0.0) -> bool:
-        """Whether no train moves so: they run off, or a parabola through them says so in spite of their errors."""
-        if self.runs_off:
-            return True
-        if self.braked_ns is None or len(self.recent) < LEAST:
-            return False
-        speed = max(bank.mean_of(SPEED), 0.0)
-        grade, most = GRADE_SIGMA * config.grade_error, strongest_mps2(config, speed)
+    def is_impossible(
+        self,
+        config: Config,
+        bank: Bank,
+        declared_m: float,
+        rounded_m: float = 0.0,
+        rolled: bool = False,
+        applied: float = 0.0,
+    ) -> bool:
+        """Whether no train moves so: they run off, or parabolas through them say so in spite of their errors.
+
+        A wheel's are known to err by as much as they have shown, whatever brake is `applied`, over the weight.
+        """
+        if self.runs_off or self.braked_ns is None:
+            return self.runs_off
         time, places = self._from_newest()
-        white, slow = _errors(bank, declared_m, rounded_m)
+        settled_s = (self.braked_ns + BRAKED_NS - self.recent[-1][0]) / S
+        if rolled and self.rolling.is_learnt:
+            possible = possible_of(config, bank, places, applied, SURELY)
+            return self.rolling.slides(time, places, rounded_m, settled_s, possible)
+        errors, possible = _errors(bank, declared_m, rounded_m), possible_of(config, bank, places)
+        return len(self.recent) >= LEAST and self._strays(time, places, errors, settled_s, possible)
+
+    def _strays(
+        self, time: Array, places: Array, errors: tuple[float, float], settled_s: float, possible: Possible
+    ) -> bool:
+        white, slow = errors
         seen = self.wandering.of(slow)
         for span_s in LOOKS_S:
             first = _seen(time, span_s)
@@ -145,26 +174,19 @@ class Course(NamedTuple):
                 continue
             slowing = -2.0 * parabola.curvature(time[first:], places[first:])
             shifted = STEPPED * self.stepped_m / span_s**2 if self.stepped_ns >= self.recent[first][0] else 0.0
-            if slowing > most + shifted + SIGMA * _error(white, seen, span_s, time.size - first):
+            if slowing > possible.most_mps2 + shifted + SIGMA * _error(white, seen, span_s, time.size - first):
                 return True
             error = shifted + SIGMA * _error(white, slow, span_s, time.size - first)
-            long = self.recent[first][0] - self.braked_ns >= BRAKED_NS
-            if long and slowing < -GAIN_MPS2 - GRAVITY * grade - error:
+            if time[first] >= settled_s and slowing < possible.least_mps2 - error:
                 return True
         return False
 
-    def _from_newest(self) -> tuple[Array, Array]:
+    def _from_newest(self, since_ns: int = 0) -> tuple[Array, Array]:
         """Times, s, and positions, m, of the last seconds from the newest on."""
         newest_ns, newest_m = self.recent[-1]
-        time = np.array([(t_ns - newest_ns) / S for t_ns, _ in self.recent])
-        return time, np.array([place_m - newest_m for _, place_m in self.recent])
-
-
-def strongest_mps2(config: Config, speed_mps: float) -> float:
-    """By how much a train slows down at most, m/s^2."""
-    c0, c1, c2 = config.train.resistance_si
-    resisting = RESISTANCE_ERROR * (c0 + speed_mps * (c1 + c2 * speed_mps))
-    return GRAVITY * (BRAKE_ERROR * config.train.full_brake + resisting + GRADE_SIGMA * config.grade_error)
+        recent = [each for each in self.recent if each[0] >= since_ns]
+        time = np.array([(t_ns - newest_ns) / S for t_ns, _ in recent])
+        return time, np.array([place_m - newest_m for _, place_m in recent])
 
 
 def _seen(time: Array, span_s: float) -> int | None:

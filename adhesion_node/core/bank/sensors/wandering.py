@@ -10,6 +10,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 APART = 6
@@ -42,13 +43,16 @@ class Wandering(NamedTuple):
         """With a look that sees too few positions: others begin anew."""
         return self._replace(looks=()) if self.looks else self
 
-    def after(self, slowing: float, per_square: float, speed_mps: float) -> Wandering:
-        """With a deceleration, m/s^2; `per_square` times its variance is that of positions that wander, m^2/s."""
+    def after(self, slowing: float, per_square: float, speed_mps: float, most: float = math.inf) -> Wandering:
+        """With a deceleration, m/s^2; `per_square` times its variance is that of positions that wander, m^2/s.
+
+        One difference counts as no more than `most`.
+        """
         looks = (*self.looks[-APART:], slowing)
         if len(looks) <= APART or speed_mps < MOVING_MPS:
             return self._replace(looks=looks)
         learnt = min(self.learnt + 1, MOST)
-        wandered = 0.5 * per_square * (looks[-1] - looks[0]) ** 2
+        wandered = min(0.5 * per_square * (looks[-1] - looks[0]) ** 2, most)
         return Wandering(looks, self.mean + (wandered - self.mean) / learnt, learnt)
 
     @property

@@ -20,7 +20,7 @@ from oracles import specific_resistance
 
 from adhesion_node.core import Measurement, Outcome, SpeedSample, State, WheelSample, init, step
 from adhesion_node.core.bank.motion import Foreseen
-from adhesion_node.core.bank.sensors import plausible
+from adhesion_node.core.bank.sensors import plausible, possible
 from adhesion_node.core.bank.steps import Stepping
 from adhesion_node.core.estimate import Estimate
 from adhesion_node.core.physics.train import Array
@@ -228,7 +228,7 @@ def test_errors_by_chance_are_believed(tails: float) -> None:
 def test_what_comes_by_chance_within_hours_is_no_sliding_wheel(stds: float, impossible: bool) -> None:
     """Positions of 3 s that seem to gain speed by so many standard deviations: four come once in 100 long brakings."""
     times, bank = np.arange(-30, 1) * H, bank_of([1])
-    gained = plausible.GAIN_MPS2 + stds * plausible._error(*plausible._errors(bank, 2.0), 3.0, times.size)
+    gained = possible.GAIN_MPS2 + stds * plausible._error(*plausible._errors(bank, 2.0), 3.0, times.size)
     recent = [(round((60.0 + t) * S), 40.0 * t + 0.5 * gained * t * t) for t in times.tolist()]
     course = plausible.Course(tuple(recent), braked_ns=round(50.0 * S))
     assert course.is_impossible(CONFIG, bank, 2.0) == impossible
