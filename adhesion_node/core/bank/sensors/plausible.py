@@ -181,10 +181,10 @@ class Course(NamedTuple):
                 return True
         return False
 
-    def _from_newest(self, since_ns: int = 0) -> tuple[Array, Array]:
+    def _from_newest(self, since_ns: int | None = None) -> tuple[Array, Array]:
         """Times, s, and positions, m, of the last seconds from the newest on."""
         newest_ns, newest_m = self.recent[-1]
-        recent = [each for each in self.recent if each[0] >= since_ns]
+        recent = [each for each in self.recent if since_ns is None or each[0] >= since_ns]
         time = np.array([(t_ns - newest_ns) / S for t_ns, _ in recent])
         return time, np.array([place_m - newest_m for _, place_m in recent])
 
